@@ -1,0 +1,41 @@
+// Points with |q-a| + |q-b| = tau on triangles: the ellipsoidal change of variable (theory section 4, paper Eqs. 6-8).
+#pragma once
+#include "core/math/vec.h"
+
+namespace isochron {
+
+/// Ellipsoid of revolution with foci a and b (they may coincide: a sphere) and total length tau >= |a-b|.
+struct Ellipsoid {
+  Vec3 a, b;
+  double tau = 0;
+
+  Vec3 center, axis;               ///< unit axis; any unit vector when the foci coincide
+  double major = 0, minor = 0;     ///< semi-axes
+
+  /// Empty (valid() false) when tau <= |a-b| or is not finite.
+  Ellipsoid(const Vec3& focus_a, const Vec3& focus_b, double total_length);
+  bool valid() const { return minor > 0; }
+};
+
+/// The part of an ellipse that lies inside a triangle: q(phi) = center + e1 cos phi + e2 sin phi over up to three
+/// arcs. The frame (e1, e2) and the order of the arcs vary continuously with tau, foci and triangle, so that equal
+/// random numbers on nearby ellipsoids give nearby points (coupled pairs rely on it).
+struct EllipseArcs {
+  Vec3 center, e1, e2;
+  int count = 0;
+  double start[3], span[3];
+  double total_span = 0;  ///< radians; the density of a uniform pick is 1 / total_span per radian
+
+  /// Angle of the point at fraction u in (0, 1) of the total span.
+  double angle(double u) const;
+  Vec3 point(double phi) const { return center + e1 * std::cos(phi) + e2 * std::sin(phi); }
+};
+
+/// Intersects the ellipsoid with triangle (v0, v1, v2). False when they do not meet in an arc of positive length.
+bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs);
+
+/// dA / (dphi dtau) at q(phi): |dq/dphi| / |P_T (u_a + u_b)|, in length units, with n the triangle's unit normal.
+/// Stays bounded where the ellipse shrinks to a point.
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n);
+
+}  // namespace isochron

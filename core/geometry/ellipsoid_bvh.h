@@ -1,0 +1,35 @@
+// Finds the triangles that an ellipsoidal shell crosses.
+#pragma once
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "core/math/vec.h"
+
+namespace isochron {
+
+/// 8-wide bounding-volume hierarchy over triangles, queried with confocal ellipsoids.
+class EllipsoidBvh {
+ public:
+  struct Input {
+    std::array<Vec3, 3> vertex;
+    int id;  ///< what queries report
+  };
+  EllipsoidBvh();
+  explicit EllipsoidBvh(const std::vector<Input>& triangles);
+  EllipsoidBvh(EllipsoidBvh&&) noexcept;
+  EllipsoidBvh& operator=(EllipsoidBvh&&) noexcept;
+  ~EllipsoidBvh();
+
+  bool empty() const;
+  /// Appends to `ids` every triangle that may meet an ellipsoid with foci a, b and a total length in
+  /// [tau_low, tau_high]: all that do, and few that do not. tau_low below |a-b| means "down to nothing". The order
+  /// depends on the hierarchy only. Safe to call from several threads at once.
+  void query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace isochron

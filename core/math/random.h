@@ -1,0 +1,56 @@
+// Counter-based random numbers (Philox 4x32-10, Salmon et al. 2011): a number depends on its key and counter alone,
+// so results do not depend on the order of execution, on threads or on a resume.
+#pragma once
+#include <array>
+#include <cstdint>
+
+namespace isochron {
+
+/// What separates independent streams: (seed, iteration, pass). `pass` tells primal, target and derivative terms apart.
+struct Stream {
+  std::uint64_t seed = 1;
+  std::uint32_t iteration = 0;
+  std::uint32_t pass = 0;
+};
+
+inline std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter, std::array<std::uint32_t, 2> key) {
+  for (int round = 0; round < 10; ++round) {
+    const std::uint64_t p0 = std::uint64_t{0xD2511F53u} * counter[0];
+    const std::uint64_t p1 = std::uint64_t{0xCD9E8D57u} * counter[2];
+    counter = {static_cast<std::uint32_t>(p1 >> 32) ^ counter[1] ^ key[0], static_cast<std::uint32_t>(p1),
+               static_cast<std::uint32_t>(p0 >> 32) ^ counter[3] ^ key[1], static_cast<std::uint32_t>(p0)};
+    key[0] += 0x9E3779B9u;
+    key[1] += 0xBB67AE85u;
+  }
+  return counter;
+}
+
+/// The numbers of one sample: keyed by stream, `index` (pixel or block) and `sample`.
+class Rng {
+ public:
+  Rng(const Stream& stream, std::uint64_t index, std::uint32_t sample) {
+    // One extra Philox call folds (seed, iteration, pass) into the 64-bit key of the sample's numbers.
+    const auto mixed = philox({stream.iteration, stream.pass, static_cast<std::uint32_t>(index >> 32), 0x6973u},
+                              {static_cast<std::uint32_t>(stream.seed), static_cast<std::uint32_t>(stream.seed >> 32)});
+    key_ = {mixed[0], mixed[1]};
+    counter_ = {0, static_cast<std::uint32_t>(index), sample, mixed[2]};
+  }
+
+  /// Uniform in the open interval (0, 1), with 32 random bits.
+  double uniform() {
+    if (used_ == 4) {
+      block_ = philox(counter_, key_);
+      ++counter_[0];
+      used_ = 0;
+    }
+    return (block_[used_++] + 0.5) * 0x1p-32;
+  }
+
+ private:
+  std::array<std::uint32_t, 2> key_;
+  std::array<std::uint32_t, 4> counter_;
+  std::array<std::uint32_t, 4> block_{};
+  int used_ = 4;
+};
+
+}  // namespace isochron

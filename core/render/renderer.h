@@ -1,0 +1,65 @@
+// The renderer's public face: gated images, their derivatives term by term, and loss gradients.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "core/gates/gate.h"
+#include "core/image/image.h"
+#include "core/math/random.h"
+#include "core/scene/scene.h"
+
+namespace isochron {
+
+enum class Sampling { automatic, standard, ellipsoidal };
+
+struct EstimatorOptions {
+  int max_bounces = 8;                       ///< scattering vertices on a path, >= 0
+  Sampling sampling = Sampling::automatic;   ///< automatic: by gate width
+  bool antithetic = true;                    ///< coupled pairs for the gate's derivative under ellipsoidal sampling
+};
+
+/// The terms of the derivative (paper Eq. 13).
+enum class Term { interior, visibility, path_length };
+inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_length};
+const char* name(Term term);
+
+/// Samples [begin, end) of each pixel. Disjoint ranges of one stream are independent.
+struct SampleRange {
+  int begin = 0, end = 0;
+  int count() const { return end - begin; }
+};
+
+/// A scene made ready for rendering at one value of the parameters. Immutable; safe to share between threads.
+class Renderer {
+ public:
+  /// `basis` says what moves (derivatives skip all else); null or empty: nothing does, only `render` makes sense.
+  /// The scene, gates and basis must outlive the renderer.
+  Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
+           const TangentBasis* basis = nullptr);
+  ~Renderer();
+
+  /// Unbiased estimate of the gated images: average over the samples of `range`.
+  GatedImage render(const Stream& stream, SampleRange range) const;
+
+  /// Unbiased estimate of one term of the images' derivative, one image per column of the basis.
+  std::vector<GatedImage> derive(Term term, const Stream& stream, SampleRange range) const;
+
+  /// Unbiased estimate of one term of sum(adjoint * dI), added to `dof_gradient` (size DofLayout::size()). Costs the
+  /// same for any number of columns.
+  void add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
+                    std::vector<double>& dof_gradient) const;
+
+  /// What `automatic` resolved to.
+  Sampling sampling() const;
+  /// Rays traced so far by this renderer (all threads).
+  long long rays() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Threads that renderers use; 0: all cores. Results do not depend on it.
+void set_thread_count(int threads);
+
+}  // namespace isochron

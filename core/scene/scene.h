@@ -1,0 +1,86 @@
+// The scene as the user describes it: what the loader fills, what parameters move, what the renderer prepares from.
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/materials/material.h"
+#include "core/math/vec.h"
+
+namespace isochron {
+
+/// Pinhole camera. `fov` is in degrees, across the image's width; rows count from the top, columns from the left.
+struct Camera {
+  Vec3 position, look_at, up{0, 1, 0};
+  double fov = 40;
+  int width = 64, height = 64;
+};
+
+/// Vertex indices into Scene::positions, counter-clockwise seen from the side the normal points to.
+struct Triangle {
+  std::array<int, 3> vertex;
+  int shape;
+};
+
+/// Mesh edge between welded vertices. `face[1]` is -1 on an open border.
+struct Edge {
+  std::array<int, 2> vertex;
+  std::array<int, 2> face;
+};
+
+/// One mesh: contiguous ranges of Scene::positions and Scene::triangles.
+struct Shape {
+  std::string name;
+  std::string file;
+  int material = 0;
+  Rgb emission;  ///< uniform radiance on the normal's side; black when the shape is no emitter
+  int first_vertex = 0, vertex_count = 0;
+  int first_triangle = 0, triangle_count = 0;
+};
+
+struct Scene {
+  Camera camera;
+  std::vector<Material> materials;
+  std::vector<Shape> shapes;
+  std::vector<Vec3> positions;  ///< welded per shape: vertices of one shape at one position are one vertex
+  std::vector<Triangle> triangles;
+  std::vector<Edge> edges;
+  bool grey = true;  ///< every albedo, reflectance and emission in the file was given as a single number
+
+  int find_shape(const std::string& name) const;     ///< -1 when there is none
+  int find_material(const std::string& name) const;  ///< -1 when there is none
+};
+
+/// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then five
+/// per material (albedo r g b, roughness, ior), then three per shape (emission r g b).
+struct DofLayout {
+  int vertices = 0, materials = 0, shapes = 0;
+  explicit DofLayout(const Scene& scene)
+      : vertices(static_cast<int>(scene.positions.size())),
+        materials(static_cast<int>(scene.materials.size())),
+        shapes(static_cast<int>(scene.shapes.size())) {}
+  int vertex(int v, int axis) const { return 3 * v + axis; }
+  int albedo(int m, int channel) const { return 3 * vertices + 5 * m + channel; }
+  int roughness(int m) const { return 3 * vertices + 5 * m + 3; }
+  int ior(int m) const { return 3 * vertices + 5 * m + 4; }
+  int emission(int s, int channel) const { return 3 * vertices + 5 * materials + 3 * s + channel; }
+  int size() const { return 3 * vertices + 5 * materials + 3 * shapes; }
+};
+
+/// Sparse matrix d(dof)/d(column) in compressed rows: how fast each degree of freedom moves per unit of each column.
+/// A column is one scalar unknown. Rows without entries are static. Entries of a row are sorted by column.
+struct TangentBasis {
+  struct Entry {
+    int column;
+    double coefficient;
+  };
+  int columns = 0;
+  std::vector<int> row_begin;  ///< size: dofs + 1
+  std::vector<Entry> entries;
+
+  bool moves(int dof) const { return row_begin[dof] != row_begin[dof + 1]; }
+  /// Transpose product: gradient over dofs -> gradient over columns.
+  std::vector<double> transpose_apply(const std::vector<double>& dof_gradient) const;
+};
+
+}  // namespace isochron
