@@ -1,0 +1,53 @@
+// The pinhole camera's mapping between image plane, measured in pixels, and directions.
+#pragma once
+#include "core/math/constants.h"
+#include "core/scene/scene.h"
+
+namespace isochron {
+
+/// Image coordinates (u, v) run over [0, width) x [0, height), v downwards; one pixel is a unit square.
+class CameraModel {
+ public:
+  explicit CameraModel(const Camera& camera)
+      : position(camera.position),
+        forward(normalize(camera.look_at - camera.position)),
+        width(camera.width),
+        height(camera.height) {
+    right_ = normalize(cross(forward, camera.up));
+    up_ = cross(right_, forward);
+    pixel_size_ = 2 * std::tan(0.5 * camera.fov * kPi / 180) / camera.width;
+  }
+
+  int pixels() const { return width * height; }
+
+  /// Unit direction through image point (u, v).
+  Vec3 direction(double u, double v) const {
+    return normalize(forward + right_ * ((u - 0.5 * width) * pixel_size_) + up_ * ((0.5 * height - v) * pixel_size_));
+  }
+
+  /// Pixel that sees the point p, or -1 when p is behind the camera or outside the image.
+  int project(const Vec3& p) const {
+    const Vec3 d = p - position;
+    const double depth = dot(d, forward);
+    if (!(depth > 0)) return -1;
+    const double u = 0.5 * width + dot(d, right_) / (depth * pixel_size_);
+    const double v = 0.5 * height - dot(d, up_) / (depth * pixel_size_);
+    if (!(u >= 0 && u < width && v >= 0 && v < height)) return -1;
+    return static_cast<int>(v) * width + static_cast<int>(u);
+  }
+
+  /// du/domega: image area (pixels) per solid angle along the unit direction d.
+  double image_area_per_solid_angle(const Vec3& d) const {
+    const double c = dot(d, forward);
+    return 1 / (pixel_size_ * pixel_size_ * c * c * c);
+  }
+
+  Vec3 position, forward;
+  int width, height;
+
+ private:
+  Vec3 right_, up_;
+  double pixel_size_;
+};
+
+}  // namespace isochron

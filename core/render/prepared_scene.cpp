@@ -1,0 +1,163 @@
+#include "core/render/prepared_scene.h"
+
+#include <limits>
+
+namespace isochron {
+
+DiscreteDistribution::DiscreteDistribution(const std::vector<double>& weights) {
+  cumulative_.reserve(weights.size());
+  double sum = 0;
+  for (double w : weights) cumulative_.push_back(sum += w);
+}
+
+int DiscreteDistribution::sample(double& u) const {
+  const double target = u * total();
+  auto it = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
+  // Rounding can carry the target to the very end, where trailing entries may have no weight.
+  if (it == cumulative_.end()) it = std::lower_bound(cumulative_.begin(), cumulative_.end(), total());
+  const int i = static_cast<int>(it - cumulative_.begin());
+  const double below = i ? cumulative_[i - 1] : 0;
+  u = std::clamp((target - below) / (cumulative_[i] - below), 0x1p-53, 1 - 0x1p-53);
+  return i;
+}
+
+MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
+    : vertex(scene.positions.size(), 0),
+      triangle(scene.triangles.size(), 0),
+      albedo(scene.materials.size(), 0),
+      roughness(scene.materials.size(), 0),
+      emission(scene.shapes.size(), 0),
+      scatters(scene.triangles.size(), 0) {
+  if (!basis || basis->columns == 0) return;
+  const DofLayout layout(scene);
+  for (int v = 0; v < layout.vertices; ++v)
+    for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->moves(layout.vertex(v, axis));
+  for (int m = 0; m < layout.materials; ++m) {
+    for (int c = 0; c < 3; ++c) albedo[m] |= basis->moves(layout.albedo(m, c));
+    roughness[m] = basis->moves(layout.roughness(m));
+  }
+  for (int s = 0; s < layout.shapes; ++s)
+    for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
+  for (std::size_t t = 0; t < triangle.size(); ++t) {
+    for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
+    const int m = scene.shapes[scene.triangles[t].shape].material;
+    scatters[t] = albedo[m] || roughness[m];
+    geometry |= triangle[t] != 0;
+  }
+  any = !basis->entries.empty();
+}
+
+PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis)
+    : scene(source), camera(source.camera), layout(source), moving(source, basis), caster(source) {
+  const std::size_t count = scene.triangles.size();
+  normal.resize(count);
+  area.resize(count);
+  emits_.assign(count, 0);
+  emitter_pdf_.assign(count, 0);
+  std::vector<EllipsoidBvh::Input> all, moved, emitting;
+  all.reserve(count);
+  std::vector<double> power;
+  for (std::size_t i = 0; i < count; ++i) {
+    const int t = static_cast<int>(i);
+    const Vec3 m = cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
+    const double doubled = length(m);
+    area[t] = 0.5 * doubled;
+    // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
+    normal[t] = doubled > 0 ? m / doubled : Vec3{};
+    const EllipsoidBvh::Input input{{corner(t, 0), corner(t, 1), corner(t, 2)}, t};
+    all.push_back(input);
+    if (moving.triangle[t] || moving.scatters[t]) moved.push_back(input);
+    if (!shape_of(t).emission.is_black() && area[t] > 0) {
+      emits_[t] = 1;
+      emitters.push_back(t);
+      emitting.push_back(input);
+      power.push_back(area[t] * shape_of(t).emission.max());
+    }
+  }
+  all_triangles = EllipsoidBvh(all);
+  moving_triangles = EllipsoidBvh(moved);
+  emitter_triangles = EllipsoidBvh(emitting);
+
+  emitter_distribution_ = DiscreteDistribution(power);
+  for (std::size_t i = 0; i < emitters.size(); ++i)
+    emitter_pdf_[emitters[i]] = emitter_distribution_.probability(static_cast<int>(i)) / area[emitters[i]];
+  const double inf = std::numeric_limits<double>::infinity();
+  for (const Shape& shape : scene.shapes) {
+    if (shape.emission.is_black()) continue;
+    Box box{{inf, inf, inf}, {-inf, -inf, -inf}};
+    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v)
+      for (int axis = 0; axis < 3; ++axis) {
+        box.low[axis] = std::min(box.low[axis], scene.positions[v][axis]);
+        box.high[axis] = std::max(box.high[axis], scene.positions[v][axis]);
+      }
+    emitter_boxes_.push_back(box);
+  }
+}
+
+SurfacePoint PreparedScene::sample_emitter(double u0, double u1, double u2, double& pdf) const {
+  const int t = emitters[emitter_distribution_.sample(u0)];
+  const double root = std::sqrt(u1);
+  SurfacePoint y;
+  y.triangle = t;
+  y.b[0] = 1 - root;
+  y.b[1] = root * (1 - u2);
+  y.b[2] = root * u2;
+  y.p = corner(t, 0) * y.b[0] + corner(t, 1) * y.b[1] + corner(t, 2) * y.b[2];
+  y.n = normal[t];
+  pdf = emitter_pdf_[t];
+  return y;
+}
+
+SurfacePoint PreparedScene::point_in_plane(int t, const Vec3& p) const {
+  const Vec3 e1 = corner(t, 1) - corner(t, 0), e2 = corner(t, 2) - corner(t, 0), d = p - corner(t, 0);
+  SurfacePoint x;
+  x.p = p;
+  x.n = normal[t];
+  x.triangle = t;
+  const double scale = 1 / (2 * area[t]);
+  x.b[1] = dot(cross(d, e2), x.n) * scale;
+  x.b[2] = dot(cross(e1, d), x.n) * scale;
+  x.b[0] = 1 - x.b[1] - x.b[2];
+  return x;
+}
+
+SurfacePoint PreparedScene::point_on_triangle(int t, const Vec3& origin, const Vec3& direction) const {
+  const double distance = dot(normal[t], corner(t, 0) - origin) / dot(normal[t], direction);
+  return point_in_plane(t, origin + direction * distance);
+}
+
+std::optional<SurfacePoint> PreparedScene::trace(const SurfacePoint& x, const Vec3& w) const {
+  const int t = caster.first_triangle(leave(x, w), w);
+  if (t < 0 || dot(normal[t], w) == 0) return std::nullopt;
+  return point_on_triangle(t, x.p, w);
+}
+
+std::optional<SurfacePoint> PreparedScene::trace_camera(const Vec3& direction) const {
+  const int t = caster.first_triangle(camera.position, direction);
+  if (t < 0 || dot(normal[t], direction) == 0) return std::nullopt;
+  return point_on_triangle(t, camera.position, direction);
+}
+
+bool PreparedScene::visible(const SurfacePoint& x, const SurfacePoint& y) const {
+  const Vec3 d = y.p - x.p;
+  return !caster.occluded(leave(x, d), leave(y, -d));
+}
+
+bool PreparedScene::visible_from_camera(const SurfacePoint& x) const {
+  return !caster.occluded(camera.position, leave(x, camera.position - x.p));
+}
+
+double PreparedScene::distance_to_emitters(const Vec3& p) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Box& box : emitter_boxes_) {
+    double squared = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double outside = std::max({box.low[axis] - p[axis], p[axis] - box.high[axis], 0.0});
+      squared += outside * outside;
+    }
+    nearest = std::min(nearest, squared);
+  }
+  return std::sqrt(nearest);
+}
+
+}  // namespace isochron

@@ -1,0 +1,87 @@
+#include "core/render/ray_caster.h"
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace isochron {
+namespace {
+
+/// One Embree device for the process. Default threading: it shares the TBB pool with the renderer.
+RTCDevice device() {
+  static const RTCDevice shared = [] {
+    RTCDevice created = rtcNewDevice("");
+    if (!created) throw std::runtime_error("Embree: no device could be made");
+    return created;
+  }();
+  return shared;
+}
+
+RTCRay make_ray(const Vec3& origin, const Vec3& direction, float far) {
+  RTCRay ray;
+  ray.org_x = static_cast<float>(origin.x);
+  ray.org_y = static_cast<float>(origin.y);
+  ray.org_z = static_cast<float>(origin.z);
+  ray.dir_x = static_cast<float>(direction.x);
+  ray.dir_y = static_cast<float>(direction.y);
+  ray.dir_z = static_cast<float>(direction.z);
+  ray.tnear = 0;
+  ray.tfar = far;
+  ray.time = 0;
+  ray.mask = ~0u;
+  ray.flags = 0;
+  return ray;
+}
+
+}  // namespace
+
+RayCaster::RayCaster(const Scene& scene) {
+  double largest = 0;
+  for (const Vec3& p : scene.positions) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+  const Vec3& c = scene.camera.position;
+  largest = std::max({largest, std::abs(c.x), std::abs(c.y), std::abs(c.z)});
+  offset_ = largest * 0x1p-20;
+
+  RTCGeometry mesh = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                               3 * sizeof(float), scene.positions.size()));
+  auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                 3 * sizeof(unsigned), scene.triangles.size()));
+  if (!vertices || !indices) throw std::runtime_error("Embree: out of memory for the scene's triangles");
+  for (std::size_t i = 0; i < scene.positions.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis) vertices[3 * i + axis] = static_cast<float>(scene.positions[i][axis]);
+  for (std::size_t i = 0; i < scene.triangles.size(); ++i)
+    for (int corner = 0; corner < 3; ++corner)
+      indices[3 * i + corner] = static_cast<unsigned>(scene.triangles[i].vertex[corner]);
+  rtcCommitGeometry(mesh);
+
+  scene_ = rtcNewScene(device());
+  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
+  rtcAttachGeometry(scene_, mesh);
+  rtcReleaseGeometry(mesh);
+  rtcCommitScene(scene_);
+}
+
+RayCaster::~RayCaster() { rtcReleaseScene(scene_); }
+
+int RayCaster::first_triangle(const Vec3& origin, const Vec3& direction) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRayHit query;
+  query.ray = make_ray(origin, direction, std::numeric_limits<float>::infinity());
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  rtcIntersect1(scene_, &context, &query);
+  return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(query.hit.primID);
+}
+
+bool RayCaster::occluded(const Vec3& from, const Vec3& to) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  RTCRay ray = make_ray(from, to - from, 1.0f);
+  rtcOccluded1(scene_, &context, &ray);
+  return ray.tfar < 0;
+}
+
+}  // namespace isochron
