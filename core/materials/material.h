@@ -1,9 +1,15 @@
 // Scattering of a surface, as a function of three cosines only (all our lobes are isotropic): cos_i = n.w_i towards
 // the light side, cos_o = n.w_o towards the camera side, cos_io = w_i.w_o. f = albedo * lobe.
+//
+// The rough conductor is a single-scattering GGX with Smith's height-correlated masking-shadowing (Heitz 2014) and a
+// constant reflectance: lobe = D G2 / (4 cos_i cos_o).
 #pragma once
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string>
 
+#include "core/math/constants.h"
 #include "core/math/vec.h"
 
 namespace isochron {
@@ -31,18 +37,65 @@ struct DirectionSample {
   double weight;   ///< lobe * |cos_i| / pdf
 };
 
+namespace detail {
+
+/// sqrt(cos^2 + alpha^2 sin^2): one plus Smith's Lambda is (1 + this / cos) / 2.
+inline double smith_root(double alpha_squared, double cosine) {
+  return std::sqrt(cosine * cosine + alpha_squared * (1 - cosine) * (1 + cosine));
+}
+
+/// GGX density of the half vector h, in 1/sr. With p = cos_i + cos_o and q = |w_i + w_o|^2 the squared cosine of h is
+/// p^2 / q; written in p and q, sin^2 = (q - p^2) / q keeps its accuracy next to the mirror direction.
+struct GgxDensity {
+  GgxDensity(double alpha_squared, double cos_i, double cos_o, double cos_io)
+      : p(cos_i + cos_o),
+        q(2 + 2 * cos_io),
+        excess(std::max(q - p * p, 0.0)),  // round-off may take it below zero
+        t(alpha_squared * p * p + excess),
+        value(q > 0 ? alpha_squared * kInvPi * (q / t) * (q / t) : 0) {}
+
+  double p, q, excess, t, value;
+};
+
+/// Turns a pair of negative cosines of a two-sided material into positive ones. False: nothing is scattered.
+inline bool face_forward(const Material& material, double& cos_i, double& cos_o) {
+  if (material.two_sided && cos_o < 0) {
+    cos_i = -cos_i;
+    cos_o = -cos_o;
+  }
+  return cos_i > 0 && cos_o > 0;
+}
+
+}  // namespace detail
+
 /// Lobe value in 1/sr, without cosine and albedo; zero where nothing is scattered (below the surface). For
 /// `two_sided` materials a pair of negative cosines counts as a pair of positive ones.
-double lobe(const Material& material, double cos_i, double cos_o, double cos_io);
+inline double lobe(const Material& material, double cos_i, double cos_o, double cos_io) {
+  if (!detail::face_forward(material, cos_i, cos_o)) return 0;
+  if (material.type == MaterialType::diffuse) return kInvPi;
+  const double a2 = material.roughness * material.roughness;
+  // G2 / (4 cos_i cos_o) = 1 / (2 (cos_o root_i + cos_i root_o)): no division by a grazing cosine.
+  const double shadowing = cos_o * detail::smith_root(a2, cos_i) + cos_i * detail::smith_root(a2, cos_o);
+  return detail::GgxDensity(a2, cos_i, cos_o, cos_io).value / (2 * shadowing);
+}
 
-/// As `lobe`, with the derivatives of its logarithm. Where value is 0 the derivatives are 0.
+/// As `lobe`, with the derivatives of its logarithm. Where value is 0 the derivatives are 0. The three cosines count
+/// as independent: the derivative of each is the formula's, continued off the set of cosines that directions can have.
 LobeDerivative lobe_derivative(const Material& material, double cos_i, double cos_o, double cos_io);
 
-/// Density per solid angle with which `sample_direction` draws w_i given w_o.
-double direction_pdf(const Material& material, double cos_i, double cos_o, double cos_io);
+/// Density per solid angle with which `sample_direction` draws w_i given w_o. Integrates to less than one where some
+/// draws end below the surface and are dropped.
+inline double direction_pdf(const Material& material, double cos_i, double cos_o, double cos_io) {
+  if (!detail::face_forward(material, cos_i, cos_o)) return 0;
+  if (material.type == MaterialType::diffuse) return cos_i * kInvPi;
+  // Visible normals: D G1(w_o) / (4 cos_o), G1 = 2 cos_o / (cos_o + root_o).
+  const double a2 = material.roughness * material.roughness;
+  return detail::GgxDensity(a2, cos_i, cos_o, cos_io).value / (2 * (cos_o + detail::smith_root(a2, cos_o)));
+}
 
 /// Draws w_i given w_o (both point away from the surface with unit normal n): cosine-weighted for diffuse, visible GGX
-/// normals (Heitz 2018) for rough conductors. Empty when nothing is scattered.
+/// normals (Heitz 2018, by the spherical caps of Dupuy and Benyoub 2023) for rough conductors. Empty when nothing is
+/// scattered. A two-sided material seen from behind scatters to the side of w_o.
 std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o, double u0,
                                                 double u1);
 
