@@ -1,10 +1,12 @@
 // Path-length importance of a time-gated camera (theory sections 1 and 3). All gates of an experiment share one
 // shape, shifted to their centres: W_g(l) = shape(l - centre_g).
 #pragma once
-#include <string>
+#include <algorithm>
+#include <array>
+#include <utility>
 #include <vector>
 
-#include "core/math/vec.h"
+#include "core/gates/normal.h"
 
 namespace isochron {
 
@@ -25,51 +27,116 @@ enum class PairPart {
   atoms    ///< every atom; continuous partners are dropped (the `path_length` pass of standard sampling)
 };
 
-/// One gate shape centred at zero, with the four operations of theory section 3.
+/// One gate shape centred at zero, with the four operations of theory section 3. Lengths in scene units, values in
+/// 1 / scene unit; any scale works. The factories throw InputError where an argument is not finite, a width is not
+/// positive or a table is not a gate.
 class GateShape {
  public:
+  /// 1 at every length.
   static GateShape steady();
   static GateShape gaussian(double sigma);
   static GateShape boxcar(double width);
+  /// The gaussian inside (-half_width, half_width), zero outside.
   static GateShape truncated_gaussian(double sigma, double half_width);
   /// Piecewise linear through (offset, value); a repeated offset is a jump; zero outside. Scaled to unit integral.
   static GateShape tabulated(std::vector<double> offsets, std::vector<double> values);
 
   GateKind kind() const { return kind_; }
   bool is_steady() const { return kind_ == GateKind::steady; }
+  /// Gaussian inside the support: the two kinds for which `gaussian_value` holds.
+  bool is_gaussian_inside() const {
+    return kind_ == GateKind::gaussian || kind_ == GateKind::truncated_gaussian;
+  }
   /// Support [lower, upper] beyond which the value is zero (gaussian: below double rounding of its peak).
   double lower() const { return lower_; }
   double upper() const { return upper_; }
-  /// Standard deviation of the gate seen as a density (the width that `auto` sampling looks at).
+  /// Standard deviation of the gate seen as a density (the width that `auto` sampling looks at); steady: infinity.
   double width() const { return width_; }
-  /// Integral over the real line: 1, less what truncation took away.
+  /// Integral over the real line: 1, less what truncation took away. Steady: 1 by convention.
   double mass() const { return mass_; }
 
-  double value(double x) const;
-  double derivative(double x) const;  ///< smooth part W'
-  double sample(double u) const;      ///< offset with density value / mass; u in (0, 1)
-  double pair_mass(PairPart part) const;
+  double value(double x) const {
+    if (!(x >= lower_ && x <= upper_)) return 0;
+    if (is_gaussian_inside()) return gaussian_value(x);
+    return kind_ == GateKind::tabulated ? table_value(x) : peak_;
+  }
+  /// Smooth part W'; at a kink of a table the slope to the right.
+  double derivative(double x) const {
+    if (!(x >= lower_ && x <= upper_)) return 0;
+    if (is_gaussian_inside()) return gaussian_slope_factor() * x * gaussian_value(x);
+    return kind_ == GateKind::tabulated ? table_slope(x) : 0;
+  }
+  /// Offset with density value / mass; u in (0, 1). Not for the steady gate, which is no density.
+  double sample(double u) const;
+  /// Mass of dW+ (and of dW-) in the given part; zero for the steady gate.
+  double pair_mass(PairPart part) const { return parts_[static_cast<int>(part)].mass; }
+  /// Draws from a part of positive mass; u in (0, 1).
   CoupledPair sample_pair(PairPart part, double u) const;
 
+  /// The gaussian without its truncation, unchecked: x within a few supports.
+  double gaussian_value(double x) const { return peak_ * fast_exp2(exponent_ * x * x); }
+  /// W'(x) = factor * x * W(x) for the gaussian kinds.
+  double gaussian_slope_factor() const { return slope_factor_; }
+
  private:
-  /// A stretch of the quantile axis on which both sides of dW are of one simple form.
+  /// One sign of dW on a stretch of the quantile axis.
   struct Side {
-    enum class Form { none, atom, rising_gaussian, falling_gaussian, uniform } form = Form::none;
-    double from = 0, to = 0;  ///< atom: offset in `from`; uniform: from -> to as the quantile runs 0 -> 1
+    /// atom: all at `from`. uniform: from -> to as the quantile runs 0 -> 1. rayleigh: from * rho, where rho follows
+    /// the Rayleigh law cut where its distribution function is `to`.
+    enum class Form { atom, uniform, rayleigh } form = Form::atom;
+    double from = 0, to = 0;
   };
   struct Segment {
     double mass = 0;
     Side plus, minus;
   };
-  double quantile(const Side& side, double u) const;
-  void add_segment(const Segment& segment);
+  /// The segments a PairPart draws from, with the running sum of their masses as fractions of `mass`.
+  struct Part {
+    double mass = 0;
+    std::vector<int> segments;
+    std::vector<double> cumulative;
+  };
+  struct Piece {
+    double mass;
+    Side side;
+  };
+
+  static double quantile(const Side& side, double u);
+  void set_gaussian(double sigma, double cut);
+  void index_table();
+  void couple_table();
+  void couple_quantiles(const std::vector<Piece>& plus, const std::vector<Piece>& minus);
+  void finish_parts();
+
+  /// Interval [i, i+1] of the table that holds x in [lower, upper]; never one of zero length.
+  int table_interval(double x) const {
+    const int bucket = std::min(static_cast<int>((x - lower_) * bucket_scale_), static_cast<int>(guide_.size()) - 2);
+    // The guide narrows the search to the knots of one bucket: one or two for evenly spaced tables.
+    const auto first = offsets_.begin();
+    const int i = static_cast<int>(std::upper_bound(first + guide_[bucket], first + guide_[bucket + 1], x) - first);
+    return std::min(i - 1, last_interval_);
+  }
+  double table_slope(double x) const {
+    const int i = table_interval(x);
+    return (values_[i + 1] - values_[i]) / (offsets_[i + 1] - offsets_[i]);
+  }
+  double table_value(double x) const {
+    const int i = table_interval(x);
+    const double f = (x - offsets_[i]) / (offsets_[i + 1] - offsets_[i]);
+    return values_[i] + f * (values_[i + 1] - values_[i]);
+  }
 
   GateKind kind_ = GateKind::steady;
   double lower_ = 0, upper_ = 0, width_ = 0, mass_ = 1;
-  double sigma_ = 0, peak_ = 1;
-  std::vector<double> offsets_, values_, cumulative_;
+  double peak_ = 1;
+  double sigma_ = 0, exponent_ = 0, slope_factor_ = 0;  ///< gaussian kinds: W = peak * 2^(exponent x^2)
+  double outside_ = 0;                                  ///< gaussian kinds: mass cut off on either side
+  std::vector<double> offsets_, values_, cumulative_;   ///< table: knots, values, integral up to the knot
+  std::vector<int> guide_;                              ///< bucket -> number of knots in the buckets before it
+  double bucket_scale_ = 0;
+  int last_interval_ = 0;
   std::vector<Segment> segments_;
-  double part_mass_[3] = {0, 0, 0};
+  std::array<Part, 3> parts_;
 };
 
 /// All gates of an experiment: one shape at sorted or unsorted centres, scene units.
@@ -87,26 +154,53 @@ class GateSet {
   /// Calls f(gate, W_g(l)) for every gate whose support holds l.
   template <class F>
   void for_each_value(double l, F&& f) const {
-    for (int i = first_reaching(l); i < size() && sorted_[i] + shape_.lower() <= l; ++i)
-      f(order_[i], shape_.value(l - sorted_[i]));
+    const auto [begin, end] = reaching(l);
+    if (shape_.is_gaussian_inside()) {
+      for_each_gaussian(l, begin, end, [&](int gate, double, double w) { f(gate, w); });
+    } else {
+      for (int i = begin; i < end; ++i) f(order_[i], shape_.value(l - sorted_[i]));
+    }
   }
   /// Calls f(gate, W_g(l), W_g'(l)) for every gate whose support holds l.
   template <class F>
   void for_each_derivative(double l, F&& f) const {
-    for (int i = first_reaching(l); i < size() && sorted_[i] + shape_.lower() <= l; ++i) {
-      const double x = l - sorted_[i];
-      f(order_[i], shape_.value(x), shape_.derivative(x));
+    const auto [begin, end] = reaching(l);
+    if (shape_.is_gaussian_inside()) {
+      const double factor = shape_.gaussian_slope_factor();
+      for_each_gaussian(l, begin, end, [&](int gate, double x, double w) { f(gate, w, factor * x * w); });
+    } else {
+      for (int i = begin; i < end; ++i) {
+        const double x = l - sorted_[i];
+        f(order_[i], shape_.value(x), shape_.derivative(x));
+      }
     }
   }
-  /// Density of a length drawn by choosing a gate uniformly and then a length from it.
+  /// Density of a length drawn by choosing a gate uniformly and then a length from it. Zero for the steady gate.
   double mixture_pdf(double l) const;
 
  private:
-  /// Position in `sorted_` of the first gate whose upper end is at or beyond l.
-  int first_reaching(double l) const;
+  static constexpr int kBlock = 8;
+
+  /// Range in `sorted_` of the gates whose support holds l.
+  std::pair<int, int> reaching(double l) const;
+
+  /// Calls f(gate, x, W) over a range of gaussian gates, a block at a time so that the exponentials vectorise.
+  template <class F>
+  void for_each_gaussian(double l, int begin, int end, F&& f) const {
+    for (int i = begin; i < end; i += kBlock) {
+      double x[kBlock], w[kBlock];
+      for (int k = 0; k < kBlock; ++k) {
+        x[k] = l - sorted_[i + k];
+        w[k] = shape_.gaussian_value(x[k]);
+      }
+      const int count = std::min(kBlock, end - i);
+      for (int k = 0; k < count; ++k) f(order_[i + k], x[k], w[k]);
+    }
+  }
 
   GateShape shape_;
-  std::vector<double> centers_, sorted_;
+  std::vector<double> centers_;
+  std::vector<double> sorted_;  ///< padded by a block, so that blocks may run past the end
   std::vector<int> order_;
   double lower_ = 0, upper_ = 0;
 };
