@@ -1,0 +1,79 @@
+#include "core/render/boundary_edges.h"
+
+namespace isochron {
+namespace {
+
+/// Faces whose normals differ by less than this angle are one plane: a mesh read in single precision cannot tell.
+constexpr double kCoplanarAngle = 1e-6;
+
+/// Unit direction in the plane of face t, perpendicular to the edge, towards the face's third vertex.
+Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const Vec3& tangent) {
+  for (int v : scene.scene.triangles[t].vertex) {
+    if (v == edge.vertex[0] || v == edge.vertex[1]) continue;
+    const Vec3 d = scene.scene.positions[v] - scene.scene.positions[edge.vertex[0]];
+    return normalize(d - tangent * dot(d, tangent));
+  }
+  return {};
+}
+
+}  // namespace
+
+BoundaryEdges::BoundaryEdges(const PreparedScene& scene) {
+  std::vector<double> primary_weight, secondary_weight;
+  std::vector<char> secondary_moves;
+  double moving_sum = 0, static_sum = 0;
+  for (const Edge& e : scene.scene.edges) {
+    BoundaryEdge b;
+    for (int i = 0; i < 2; ++i) b.vertex[i] = e.vertex[i], b.face[i] = e.face[i];
+    b.origin = scene.scene.positions[e.vertex[0]];
+    b.end = scene.scene.positions[e.vertex[1]];
+    b.length = isochron::length(b.end - b.origin);
+    bool degenerate = !(b.length > 0);
+    for (int i = 0; i < b.faces(); ++i) degenerate |= !(scene.area[b.face[i]] > 0);
+    if (degenerate) continue;
+    b.tangent = (b.end - b.origin) / b.length;
+    for (int i = 0; i < b.faces(); ++i) b.inward[i] = inward_direction(scene, b.face[i], e, b.tangent);
+    if (b.faces() == 2) {
+      b.opening = std::atan2(isochron::length(cross(b.inward[0], b.inward[1])), dot(b.inward[0], b.inward[1]));
+      if (b.wedge() < kCoplanarAngle) continue;
+    }
+    const bool moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
+    if (moves) {
+      const double squared = length_squared(b.point(0.5) - scene.camera.position) + b.length * b.length;
+      primary_.push_back(b);
+      primary_weight.push_back(b.length / squared);
+    }
+    const double weight = b.length * b.wedge();
+    (moves ? moving_sum : static_sum) += weight;
+    secondary_.push_back(b);
+    secondary_weight.push_back(weight);
+    secondary_moves.push_back(moves);
+  }
+  if (moving_sum > 0 && static_sum > 0)
+    for (std::size_t i = 0; i < secondary_.size(); ++i)
+      secondary_weight[i] /= secondary_moves[i] ? moving_sum : static_sum;
+  primary_distribution_ = DiscreteDistribution(primary_weight);
+  secondary_distribution_ = DiscreteDistribution(secondary_weight);
+}
+
+BoundaryEdges::Sample BoundaryEdges::sample(const std::vector<BoundaryEdge>& edges,
+                                            const DiscreteDistribution& distribution, double u) {
+  Sample result;
+  const int i = distribution.sample(u);
+  result.edge = &edges[i];
+  result.s = u;
+  result.y = result.edge->point(u);
+  result.pdf = distribution.probability(i) / result.edge->length;
+  return result;
+}
+
+int BoundaryEdges::occluder_side(const BoundaryEdge& edge, const Vec3& n_b) {
+  const double first = dot(edge.inward[0], n_b);
+  if (edge.faces() == 1) return first > 0 ? 1 : first < 0 ? -1 : 0;
+  const double second = dot(edge.inward[1], n_b);
+  if (first > 0 && second > 0) return 1;
+  if (first < 0 && second < 0) return -1;
+  return 0;
+}
+
+}  // namespace isochron

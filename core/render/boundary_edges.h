@@ -1,0 +1,50 @@
+// Mesh edges as visibility boundaries: their geometry and how they are picked (theory section 5).
+#pragma once
+#include "core/render/prepared_scene.h"
+
+namespace isochron {
+
+/// An edge at the current parameters.
+struct BoundaryEdge {
+  int vertex[2];
+  int face[2];       ///< face[1] is -1 on an open border
+  Vec3 origin, end;
+  Vec3 tangent;      ///< unit, from origin to end
+  double length = 0;
+  Vec3 inward[2];    ///< unit, in the plane of face i, perpendicular to the edge, pointing into the face
+  double opening = 0;  ///< angle between the two inward directions; 0 on an open border
+  int faces() const { return face[1] < 0 ? 1 : 2; }
+  Vec3 point(double s) const { return origin + (end - origin) * s; }
+  /// Angle of the wedge of grazing directions on either side: pi less the opening.
+  double wedge() const { return kPi - opening; }
+};
+
+class BoundaryEdges {
+ public:
+  explicit BoundaryEdges(const PreparedScene& scene);
+
+  struct Sample {
+    const BoundaryEdge* edge = nullptr;
+    double s = 0;    ///< fraction along the edge
+    Vec3 y;
+    double pdf = 0;  ///< per length
+  };
+  /// Edges that the camera may see moving, by length over squared distance. `u` in (0, 1).
+  bool has_primary() const { return !primary_distribution_.empty(); }
+  Sample sample_primary(double u) const { return sample(primary_, primary_distribution_, u); }
+  /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
+  /// where what lies behind or before them moves) get equal shares.
+  bool has_secondary() const { return !secondary_distribution_.empty(); }
+  Sample sample_secondary(double u) const { return sample(secondary_, secondary_distribution_, u); }
+
+  /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
+  /// both (no boundary) or the plane holds a face.
+  static int occluder_side(const BoundaryEdge& edge, const Vec3& n_b);
+
+ private:
+  static Sample sample(const std::vector<BoundaryEdge>& edges, const DiscreteDistribution& distribution, double u);
+  std::vector<BoundaryEdge> primary_, secondary_;
+  DiscreteDistribution primary_distribution_, secondary_distribution_;
+};
+
+}  // namespace isochron

@@ -1,0 +1,121 @@
+#include "core/render/path_differential.h"
+
+#include <array>
+
+namespace isochron {
+namespace {
+
+/// What the segments that meet at a vertex say about it.
+struct Accumulated {
+  Vec3 position;  ///< d ln F / d x_k, normals held
+  Vec3 normal;    ///< d ln F / d n_k, as if n_k were free
+  Vec3 length;    ///< d l / d x_k
+};
+
+/// d (unit direction of d) contracted with g: (g - (g.w) w) / |d|.
+Vec3 through_normalize(const Vec3& g, const Vec3& w, double distance) { return (g - w * dot(g, w)) / distance; }
+
+/// Adds the scattering lobe's part at vertex x between its neighbours.
+void add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s, Accumulated& before,
+              Accumulated& here, Accumulated& after, double& d_roughness) {
+  d_roughness = 0;
+  if (material.type == MaterialType::diffuse) return;
+  const LobeDerivative lobe = lobe_derivative(material, s.cos_i, s.cos_o, s.cos_io);
+  const Vec3 to_after = through_normalize(x.n * lobe.d_cos_i + s.w_o * lobe.d_cos_io, s.w_i, s.distance_i);
+  const Vec3 to_before = through_normalize(x.n * lobe.d_cos_o + s.w_i * lobe.d_cos_io, s.w_o, s.distance_o);
+  after.position += to_after;
+  before.position += to_before;
+  here.position -= to_after + to_before;
+  here.normal += s.w_i * lobe.d_cos_i + s.w_o * lobe.d_cos_o;
+  d_roughness = lobe.d_roughness;
+}
+
+/// Carries position and normal gradients of vertex k to its triangle's vertices.
+void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, const Vec3* pixel_ray,
+                 bool length_only, LocalDifferential& out) {
+  if (!scene.moving.triangle[x.triangle]) return;
+  const auto& vertex = scene.scene.triangles[x.triangle].vertex;
+  // The flow of x itself: with its material point, or sliding along the pixel's ray.
+  Vec3 log_f = g.position, length = g.length;
+  if (pixel_ray) {
+    const double inverse = 1 / dot(x.n, *pixel_ray);
+    log_f = x.n * (dot(*pixel_ray, g.position) * inverse);
+    length = x.n * (dot(*pixel_ray, g.length) * inverse);
+  }
+  // Rotation of the face normal, and d ln A of material points (paper Eq. 11).
+  Vec3 through_cross = g.normal - x.n * dot(g.normal, x.n);
+  if (!pixel_ray) through_cross += x.n;
+  through_cross = through_cross / (2 * scene.area[x.triangle]);
+  for (int i = 0; i < 3; ++i) {
+    const int v = vertex[i];
+    if (!scene.moving.vertex[v]) continue;
+    VertexGradient entry{v, log_f * x.b[i], length * x.b[i]};
+    if (!length_only) {
+      const Vec3 opposite = scene.scene.positions[vertex[(i + 1) % 3]] - scene.scene.positions[vertex[(i + 2) % 3]];
+      entry.log_f += cross(opposite, through_cross);
+    }
+    out.vertices.push_back(entry);
+  }
+}
+
+}  // namespace
+
+void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int count, bool length_only,
+                        LocalDifferential& out) {
+  out.clear();
+  thread_local std::vector<Accumulated> g;
+  g.assign(count, {});
+  for (int k = 0; k + 1 < count; ++k) {
+    const Vec3 d = x[k + 1].p - x[k].p;
+    const double squared = length_squared(d);
+    const double inverse = 1 / std::sqrt(squared);
+    const Vec3 w = d * inverse;
+    g[k].length -= w;
+    g[k + 1].length += w;
+    if (length_only || k == 0) continue;
+    const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
+    const Vec3 g_d = x[k].n / cos_near + x[k + 1].n / cos_far - d * (4 / squared);
+    g[k].position -= g_d;
+    g[k + 1].position += g_d;
+    g[k].normal += d / cos_near;
+    g[k + 1].normal += d / cos_far;
+  }
+  if (!length_only) {
+    for (int k = 1; k + 1 < count; ++k) {
+      const int m = scene.shape_of(x[k].triangle).material;
+      const Material& material = scene.scene.materials[m];
+      double d_roughness;
+      if (material.type != MaterialType::diffuse) {
+        const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
+        add_lobe(material, x[k], s, g[k - 1], g[k], g[k + 1], d_roughness);
+        if (scene.moving.roughness[m]) out.scalars.push_back({scene.layout.roughness(m), -1, d_roughness});
+      }
+      if (scene.moving.albedo[m])
+        for (int c = 0; c < 3; ++c)
+          if (material.albedo[c] > 0) out.scalars.push_back({scene.layout.albedo(m, c), c, 1 / material.albedo[c]});
+    }
+    const int s = scene.scene.triangles[x[count - 1].triangle].shape;
+    if (scene.moving.emission[s])
+      for (int c = 0; c < 3; ++c)
+        if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
+          out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
+  }
+  for (int k = 1; k < count; ++k) {
+    const Vec3 ray = k == 1 ? x[1].p - x[0].p : Vec3{};
+    to_triangle(scene, x[k], g[k], k == 1 ? &ray : nullptr, length_only, out);
+  }
+}
+
+void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
+  if (!scene.moving.triangle[x.triangle]) return;
+  const auto& vertex = scene.scene.triangles[x.triangle].vertex;
+  for (int i = 0; i < 3; ++i)
+    if (scene.moving.vertex[vertex[i]]) out.vertices.push_back({vertex[i], g * x.b[i], {}});
+}
+
+void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
+  const Vec3 ray = x.p - scene.camera.position;
+  add_material_flow(scene, x, x.n * (dot(ray, g) / dot(x.n, ray)), out);
+}
+
+}  // namespace isochron

@@ -1,0 +1,47 @@
+// The one local differential of a path, by hand in reverse (theory section 2): how ln F (contribution) and l (length)
+// change with everything the path touches. Tangent, adjoint and Jacobian are sinks of what this writes.
+#pragma once
+#include <vector>
+
+#include "core/render/path.h"
+
+namespace isochron {
+
+/// Gradients with respect to one mesh vertex.
+struct VertexGradient {
+  int vertex;
+  Vec3 log_f;   ///< of ln F
+  Vec3 length;  ///< of the path length
+};
+
+/// Gradient of ln F with respect to a scalar degree of freedom; `channel` -1: of every channel.
+struct ScalarGradient {
+  int dof;
+  int channel;
+  double log_f;
+};
+
+/// Sparse gradient of one path (or boundary segment). A vertex may appear more than once; entries add up.
+struct LocalDifferential {
+  std::vector<VertexGradient> vertices;
+  std::vector<ScalarGradient> scalars;
+  void clear() {
+    vertices.clear();
+    scalars.clear();
+  }
+  bool empty() const { return vertices.empty() && scalars.empty(); }
+};
+
+/// Differentiates the path vertex[0..count-1], vertex[0] the camera and vertex[count-1] on an emitter (or, where
+/// `length_only`, only its length). vertex[1] flows along its pixel ray, the others with their material points, whose
+/// area factors count in F. Static vertices are left out.
+void differentiate_path(const PreparedScene& scene, const SurfacePoint* vertex, int count, bool length_only,
+                        LocalDifferential& out);
+
+/// Adds g . (velocity of the material point x) to `out`: entries on the triangle's three vertices.
+void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out);
+
+/// Adds g . (velocity of x kept on the camera's ray through it) to `out`.
+void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out);
+
+}  // namespace isochron

@@ -1,0 +1,165 @@
+// Where path contributions end up. A sink takes, for each path: the pixel, the path's value (contribution over
+// density, per channel, without the gate), its length, and its local differential.
+//   PrimalSink    gated images;
+//   TangentSink   derivative images, one per column of the basis (one column: a tangent; all: the Jacobian);
+//   AdjointSink   gradient over the degrees of freedom, weighted by dLoss/dImage.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "core/gates/gate.h"
+#include "core/image/image.h"
+#include "core/render/path_differential.h"
+
+namespace isochron {
+
+/// How the gate enters a contribution.
+enum class GateUse {
+  value,            ///< W d ln F
+  value_and_slope,  ///< W d ln F + W' dl
+  slope             ///< W' dl alone
+};
+
+class PrimalSink {
+ public:
+  static constexpr bool kDifferential = false;
+  PrimalSink(const GateSet& gates, GatedImage& film) : gates_(gates), film_(film) {}
+
+  void add(int pixel, const Rgb& value, double length) {
+    gates_.for_each_value(length, [&](int g, double w) {
+      double* out = &film_.data[film_.index(pixel, g)];
+      for (int c = 0; c < film_.channels; ++c) out[c] += w * value[c];
+    });
+  }
+
+ private:
+  const GateSet& gates_;
+  GatedImage& film_;
+};
+
+class TangentSink {
+ public:
+  static constexpr bool kDifferential = true;
+  /// One film per column.
+  TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<GatedImage> films)
+      : gates_(gates), layout_(layout), basis_(basis), films_(films), rates_(basis.columns) {}
+
+  /// The differential that the following contributions share.
+  void bind(const LocalDifferential& differential) {
+    for (int column : touched_) rates_[column] = {};
+    touched_.clear();
+    for (const VertexGradient& v : differential.vertices)
+      for (int axis = 0; axis < 3; ++axis)
+        for_each_column(layout_.vertex(v.vertex, axis), [&](Rates& rates, double velocity) {
+          for (double& f : rates.log_f) f += v.log_f[axis] * velocity;
+          rates.length += v.length[axis] * velocity;
+        });
+    for (const ScalarGradient& s : differential.scalars)
+      for_each_column(s.dof, [&](Rates& rates, double velocity) {
+        for (int c = 0; c < 3; ++c)
+          if (s.channel < 0 || s.channel == c) rates.log_f[c] += s.log_f * velocity;
+      });
+  }
+
+  void add(int pixel, const Rgb& value, double length, GateUse use) {
+    const double f = use == GateUse::slope ? 0 : 1, l = use == GateUse::value ? 0 : 1;
+    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+      for (int column : touched_) {
+        const Rates& rates = rates_[column];
+        splat(column, pixel, g, value, w * f, slope * l * rates.length, rates);
+      }
+    });
+  }
+
+  /// value * dl for one gate: a member of a coupled pair.
+  void add_length_rate(int pixel, int gate, const Rgb& value) {
+    for (int column : touched_) splat(column, pixel, gate, value, 0, rates_[column].length, rates_[column]);
+  }
+
+ private:
+  struct Rates {
+    double log_f[3] = {0, 0, 0};
+    double length = 0;
+    bool touched = false;
+  };
+
+  template <class F>
+  void for_each_column(int dof, F&& f) {
+    for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i) {
+      const auto [column, coefficient] = basis_.entries[i];
+      if (!rates_[column].touched) {
+        rates_[column].touched = true;
+        touched_.push_back(column);
+      }
+      f(rates_[column], coefficient);
+    }
+  }
+
+  void splat(int column, int pixel, int g, const Rgb& value, double w, double length_part, const Rates& rates) {
+    GatedImage& film = films_[column];
+    double* out = &film.data[film.index(pixel, g)];
+    for (int c = 0; c < film.channels; ++c) out[c] += value[c] * (w * rates.log_f[c] + length_part);
+  }
+
+  const GateSet& gates_;
+  const DofLayout layout_;
+  const TangentBasis& basis_;
+  std::span<GatedImage> films_;
+  std::vector<Rates> rates_;
+  std::vector<int> touched_;
+};
+
+class AdjointSink {
+ public:
+  static constexpr bool kDifferential = true;
+  /// `active[dof]` is the dof's place in `gradient`, or -1 where it does not move. `adjoint` is dLoss/dImage.
+  AdjointSink(const GateSet& gates, const DofLayout& layout, const std::vector<int>& active, const GatedImage& adjoint,
+              std::span<double> gradient)
+      : gates_(gates), layout_(layout), active_(active), adjoint_(adjoint), gradient_(gradient) {}
+
+  void bind(const LocalDifferential& differential) { differential_ = &differential; }
+
+  void add(int pixel, const Rgb& value, double length, GateUse use) {
+    // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
+    Rgb weight;
+    double slope_weight = 0;
+    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+      const double* a = &adjoint_.data[adjoint_.index(pixel, g)];
+      for (int c = 0; c < adjoint_.channels; ++c) {
+        weight[c] += a[c] * w * value[c];
+        slope_weight += a[c] * slope * value[c];
+      }
+    });
+    if (use == GateUse::slope) weight = {};
+    if (use == GateUse::value) slope_weight = 0;
+    scatter(weight, slope_weight);
+  }
+
+  void add_length_rate(int pixel, int gate, const Rgb& value) {
+    const double* a = &adjoint_.data[adjoint_.index(pixel, gate)];
+    double slope_weight = 0;
+    for (int c = 0; c < adjoint_.channels; ++c) slope_weight += a[c] * value[c];
+    scatter({}, slope_weight);
+  }
+
+ private:
+  void scatter(const Rgb& weight, double slope_weight) {
+    const double sum = weight.r + weight.g + weight.b;
+    if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
+    for (const VertexGradient& v : differential_->vertices)
+      for (int axis = 0; axis < 3; ++axis)
+        if (const int i = active_[layout_.vertex(v.vertex, axis)]; i >= 0)
+          gradient_[i] += sum * v.log_f[axis] + slope_weight * v.length[axis];
+    for (const ScalarGradient& s : differential_->scalars)
+      if (const int i = active_[s.dof]; i >= 0) gradient_[i] += (s.channel < 0 ? sum : weight[s.channel]) * s.log_f;
+  }
+
+  const GateSet& gates_;
+  const DofLayout layout_;
+  const std::vector<int>& active_;
+  const GatedImage& adjoint_;
+  std::span<double> gradient_;
+  const LocalDifferential* differential_ = nullptr;
+};
+
+}  // namespace isochron

@@ -1,0 +1,71 @@
+// What one strand of work carries from sample to sample, and how complete paths reach a sink.
+#pragma once
+#include "core/math/random.h"
+#include "core/render/renderer.h"
+#include "core/render/sinks.h"
+
+namespace isochron {
+
+template <class Sink>
+struct Worker {
+  const PreparedScene& scene;
+  const GateSet& gates;
+  const EstimatorOptions& options;
+  Sink sink;
+  Path path;
+  LocalDifferential differential;
+  std::vector<int> candidates;
+  long long rays = 0;
+
+  Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator, Sink target)
+      : scene(prepared), gates(gate_set), options(estimator), sink(std::move(target)), path(estimator.max_bounces) {}
+
+  bool visible(const SurfacePoint& x, const SurfacePoint& y) {
+    ++rays;
+    return scene.visible(x, y);
+  }
+  bool visible_from_camera(const SurfacePoint& x) {
+    ++rays;
+    return scene.visible_from_camera(x);
+  }
+  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) {
+    ++rays;
+    return scene.trace(x, w);
+  }
+  std::optional<SurfacePoint> trace_camera(const Vec3& direction) {
+    ++rays;
+    return scene.trace_camera(direction);
+  }
+
+  /// Whether the path, the last vertex on an emitter, matters to the sink.
+  bool matters(const Path& p) const {
+    if constexpr (Sink::kDifferential) return can_move(scene, p, p.size() - 1, p.back().triangle);
+    return true;
+  }
+
+  /// Hands the complete path p (last vertex on an emitter) to the sink.
+  void emit(const Path& p, int pixel, const Rgb& value, double length, GateUse use) {
+    if constexpr (Sink::kDifferential) {
+      differentiate_path(scene, p.vertex.data(), p.size(), use == GateUse::slope, differential);
+      if (differential.empty()) return;
+      sink.bind(differential);
+      sink.add(pixel, value, length, use);
+    } else {
+      sink.add(pixel, value, length);
+    }
+  }
+};
+
+/// Counts towards Russian roulette from this bounce on.
+inline constexpr int kRouletteBounce = 3;
+
+/// Russian roulette on `throughput`, which started at one: true to go on, with the throughput raised accordingly.
+inline bool survives(Rgb& throughput, int bounce, Rng& rng) {
+  if (bounce < kRouletteBounce) return true;
+  const double survival = std::min(throughput.max(), 0.95);
+  if (!(rng.uniform() < survival)) return false;
+  throughput *= 1 / survival;
+  return true;
+}
+
+}  // namespace isochron
