@@ -1,0 +1,65 @@
+"""Triangle meshes for the scenes of this repository: small solids, transforms and an OBJ writer.
+
+A mesh is a pair (vertices: float array n x 3, triangles: int array m x 3); triangles are counter-clockwise seen from
+the side that the normal points to. y is up.
+"""
+
+import numpy as np
+
+
+def quad(corners):
+    """A rectangle from its four corners, counter-clockwise seen from the normal's side."""
+    return np.asarray(corners, dtype=float), np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def box(size):
+    """An axis-aligned box around the origin with edges of length size (a number or three), normals outwards."""
+    half = 0.5 * np.broadcast_to(np.asarray(size, dtype=float), 3)
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+    return corners * half, np.array(triangles)
+
+
+def translate(mesh, offset):
+    vertices, triangles = mesh
+    return vertices + np.asarray(offset, dtype=float), triangles
+
+
+def rotate_y(mesh, degrees):
+    """Turned about the vertical through the origin, by the right-hand rule."""
+    vertices, triangles = mesh
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T, triangles
+
+
+def join(*meshes):
+    """One mesh of several; vertices at the same position become one."""
+    offsets = np.cumsum([0] + [len(v) for v, _ in meshes[:-1]])
+    vertices = np.concatenate([v for v, _ in meshes])
+    triangles = np.concatenate([t + o for (_, t), o in zip(meshes, offsets)])
+    index, kept = {}, []
+    renumbered = np.empty(len(vertices), dtype=int)
+    for i, vertex in enumerate(map(tuple, vertices)):
+        if vertex not in index:
+            index[vertex] = len(kept)
+            kept.append(vertex)
+        renumbered[i] = index[vertex]
+    return np.array(kept), renumbered[triangles]
+
+
+def normals(mesh):
+    """Unit normals of the triangles."""
+    vertices, triangles = mesh
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    n = np.cross(b - a, c - a)
+    return n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
+def write_obj(path, mesh, comment):
+    vertices, triangles = mesh
+    lines = [f"# {comment}"]
+    # Nine digits hold single precision, in which meshes are read. Adding zero turns -0 into 0.
+    lines += ["v " + " ".join(f"{np.round(x, 9) + 0.0:.9g}" for x in v) for v in vertices]
+    lines += ["f " + " ".join(str(i + 1) for i in t) for t in triangles]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
