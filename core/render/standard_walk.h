@@ -5,28 +5,32 @@
 
 namespace isochron {
 
-/// Extends the worker's path, whose vertex 0 is what looks and vertex 1 the first surface point, by up to
-/// `max_bounces` scattering vertices. Calls emit(value) for every complete path: at that time the path ends on an
-/// emitter, and value is contribution over density from vertex 1 on (seen from vertex 0, without the gate). Leaves
-/// the path with its walk vertices removed beyond vertex 1.
-template <class W, class Emit>
-void walk_standard(W& worker, Path& path, int max_bounces, Rng& rng, Emit&& emit) {
+/// Path lengths outside of which a complete path meets no gate.
+struct LengthRange {
+  double lower, upper;
+  bool holds(double length) const { return length >= lower && length <= upper; }
+};
+
+/// Extends `path`, whose vertex 0 is what looks and vertex 1 the first surface point, by up to `max_bounces`
+/// scattering vertices. Visits every complete path whose length is in `reach`: visitor.wants() is asked first, while
+/// the path ends on the emitter; then visitor.take(value) gets contribution over density from vertex 1 on (seen from
+/// vertex 0, without the gate). Leaves the path as it was.
+template <class W, class Visitor>
+void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rng& rng, Visitor&& visitor) {
   const PreparedScene& scene = worker.scene;
-  const double upper = worker.gates.upper(), lower = worker.gates.lower();
   const int base = path.size();
   Rgb throughput(1.0);
 
-  const auto in_reach = [&](double length) { return length >= lower && length <= upper; };
   const auto seen_emission = [&](double weight) {
     const SurfacePoint& x = path.back();
-    if (!scene.emits(x.triangle) || !in_reach(path.length.back())) return;
+    if (!reach.holds(path.length.back()) || !visitor.wants()) return;
     const Rgb radiance = scene.emitted(x, path.vertex[path.size() - 2].p - x.p);
-    if (!radiance.is_black()) emit(throughput * radiance * weight);
+    if (!radiance.is_black()) visitor.take(throughput * radiance * weight);
   };
 
-  seen_emission(1);
+  if (scene.emits(path.back().triangle)) seen_emission(1);
   for (int bounce = 1; bounce <= max_bounces; ++bounce) {
-    if (path.length.back() + scene.distance_to_emitters(path.back().p) > upper) break;
+    if (path.length.back() + scene.distance_to_emitters(path.back().p) > reach.upper) break;
     const SurfacePoint x = path.back();
     const Vec3 before = path.vertex[path.size() - 2].p;
     const Material& material = scene.material_of(x.triangle);
@@ -38,13 +42,13 @@ void walk_standard(W& worker, Path& path, int max_bounces, Rng& rng, Emit&& emit
     const Scattering s(before, x, y.p);
     const double scattered = s.lobe(material) * std::abs(s.cos_i);
     const double cos_y = -dot(y.n, s.w_i);
-    if (scattered > 0 && cos_y > 0 && in_reach(path.length.back() + s.distance_i)) {
+    if (scattered > 0 && cos_y > 0 && reach.holds(path.length.back() + s.distance_i)) {
       const double to_area = cos_y / (s.distance_i * s.distance_i);
       const double pdf_bsdf = s.pdf_towards_light(material) * to_area;
       path.push(scene, y);
-      if (worker.matters(path) && worker.visible(x, y))
-        emit(throughput * material.albedo * scene.shape_of(y.triangle).emission *
-             (scattered * to_area / (pdf_area + pdf_bsdf)));
+      if (visitor.wants() && worker.visible(x, y))
+        visitor.take(throughput * material.albedo * scene.shape_of(y.triangle).emission *
+                     (scattered * to_area / (pdf_area + pdf_bsdf)));
       path.pop();
     }
 
@@ -57,7 +61,7 @@ void walk_standard(W& worker, Path& path, int max_bounces, Rng& rng, Emit&& emit
     const auto hit = worker.trace(x, next->direction);
     if (!hit) break;
     path.push(scene, *hit);
-    if (scene.emits(hit->triangle) && worker.matters(path)) {
+    if (scene.emits(hit->triangle)) {
       const double pdf_bsdf = next->pdf * solid_angle_to_area(x.p, *hit);
       seen_emission(pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(hit->triangle)));
     }
@@ -69,17 +73,18 @@ void walk_standard(W& worker, Path& path, int max_bounces, Rng& rng, Emit&& emit
 /// One camera path through `pixel`; contributions are scaled by `scale`.
 template <class Sink>
 void sample_standard(Worker<Sink>& worker, int pixel, double scale, Rng& rng) {
-  const CameraModel& camera = worker.scene.camera;
-  const double u = pixel % camera.width + rng.uniform(), v = pixel / camera.width + rng.uniform();
-  const auto hit = worker.trace_camera(camera.direction(u, v));
-  if (!hit) return;
-  SurfacePoint eye;
-  eye.p = camera.position;
-  worker.path.start(eye, 0);
-  worker.path.push(worker.scene, *hit);
-  walk_standard(worker, worker.path, worker.options.max_bounces, rng, [&](const Rgb& value) {
-    worker.emit(worker.path, pixel, value * scale, worker.path.length.back(), GateUse::value_and_slope);
-  });
+  struct Visitor {
+    Worker<Sink>& worker;
+    int pixel;
+    double scale;
+    bool wants() const { return worker.matters(worker.path); }
+    void take(const Rgb& value) {
+      worker.emit(worker.path, pixel, value * scale, worker.path.length.back(), GateUse::value_and_slope);
+    }
+  };
+  if (!worker.start_camera_path(pixel, rng)) return;
+  walk_standard(worker, worker.path, worker.options.max_bounces, {worker.gates.lower(), worker.gates.upper()}, rng,
+                Visitor{worker, pixel, scale});
 }
 
 }  // namespace isochron

@@ -37,6 +37,21 @@ struct Worker {
     return scene.trace_camera(direction);
   }
 
+  /// Starts `path` with the camera and the surface point seen through a random point of the pixel.
+  bool start_camera_path(int pixel, Rng& rng) {
+    const CameraModel& camera = scene.camera;
+    const double u = pixel % camera.width + rng.uniform(), v = pixel / camera.width + rng.uniform();
+    start_path_at_camera();
+    const auto hit = trace_camera(camera.direction(u, v));
+    if (hit) path.push(scene, *hit);
+    return hit.has_value();
+  }
+  void start_path_at_camera() {
+    SurfacePoint eye;
+    eye.p = scene.camera.position;
+    path.start(eye, 0);
+  }
+
   /// Whether the path, the last vertex on an emitter, matters to the sink.
   bool matters(const Path& p) const {
     if constexpr (Sink::kDifferential) return can_move(scene, p, p.size() - 1, p.back().triangle);

@@ -1,0 +1,81 @@
+// Primary visibility boundary: a camera ray grazes a moving edge (theory section 5, "Primary").
+#pragma once
+#include "core/render/boundary_edges.h"
+#include "core/render/standard_walk.h"
+
+namespace isochron {
+
+/// The surface point that the camera sees just beside the edge point y, on the side of the unit vector `side` (in the
+/// image, across the edge): on the edge's face that is in front on that side, else on whatever lies beyond.
+template <class Sink>
+std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge& edge, const Vec3& y, const Vec3& d,
+                                        const Vec3& side) {
+  const PreparedScene& scene = worker.scene;
+  int front = -1;
+  double front_slope = 0;
+  for (int i = 0; i < edge.faces(); ++i) {
+    const double across = dot(edge.inward[i], side);
+    if (!(across > 0)) continue;
+    const double slope = dot(edge.inward[i], d) / across;  // depth gained per distance beside the edge
+    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope;
+  }
+  if (front >= 0) return scene.point_in_plane(front, y);
+  ++worker.rays;
+  const int t = scene.caster.first_triangle(y + side * scene.caster.offset(), d);
+  if (t < 0 || dot(scene.normal[t], d) == 0) return std::nullopt;
+  return scene.point_on_triangle(t, scene.camera.position, d);
+}
+
+/// One edge point; contributions are scaled by `scale` (one over the number of edge points).
+template <class Sink>
+void sample_primary_boundary(Worker<Sink>& worker, const BoundaryEdges& edges, double scale, Rng& rng) {
+  const PreparedScene& scene = worker.scene;
+  const auto [edge, s, y, pdf] = edges.sample_primary(rng.uniform());
+  const int pixel = scene.camera.project(y);
+  if (pixel < 0) return;
+  const Vec3 to_y = y - scene.camera.position;
+  const double r = length(to_y);
+  const Vec3 d = to_y / r;
+  const Vec3 normal = cross(edge->tangent, d);
+  const double sine = length(normal);
+  if (!(sine > 0)) return;
+  const Vec3 n_b = normal / sine;
+
+  // Off the faces, to the camera's side of each, so that the edge does not hide itself.
+  Vec3 off = -d;
+  for (int i = 0; i < edge->faces(); ++i)
+    off += scene.normal[edge->face[i]] * std::copysign(1.0, -dot(scene.normal[edge->face[i]], d));
+  ++worker.rays;
+  if (scene.caster.occluded(scene.camera.position, y + off * scene.caster.offset())) return;
+
+  LocalDifferential& differential = worker.differential;
+  differential.clear();
+  const double share[2] = {1 - s, s};
+  for (int i = 0; i < 2; ++i)
+    if (scene.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
+  worker.sink.bind(differential);
+
+  struct Visitor {
+    Worker<Sink>& worker;
+    int pixel;
+    double scale;
+    bool wants() const { return true; }
+    void take(const Rgb& value) {
+      worker.sink.add(pixel, value * scale, worker.path.length.back(), GateUse::value);
+    }
+  };
+  const double factor = scale * sine * scene.camera.image_area_per_solid_angle(d) / (r * r * pdf);
+  // The two sides share their random numbers: what they have in common cancels.
+  const Rng shared = rng;
+  for (const double sign : {-1.0, 1.0}) {
+    const auto x1 = seen_beside(worker, *edge, y, d, n_b * sign);
+    if (!x1) continue;
+    worker.start_path_at_camera();
+    worker.path.push(scene, *x1);
+    Rng walk_rng = shared;
+    walk_standard(worker, worker.path, worker.options.max_bounces, {worker.gates.lower(), worker.gates.upper()},
+                  walk_rng, Visitor{worker, pixel, -sign * factor});
+  }
+}
+
+}  // namespace isochron

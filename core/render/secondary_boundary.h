@@ -1,0 +1,284 @@
+// Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Three ways
+// to find such segments, combined by multiple importance sampling (balance heuristic):
+//   - from the edge, direction within the wedge of grazing directions;
+//   - from the edge, aimed at a point on an emitter;
+//   - from the camera: D is a vertex of a camera path, y a point of a random edge. Finds what a narrow field of view
+//     or a glossy surface sees.
+// From the edge, the D side walks on and connects to the camera at every vertex.
+#pragma once
+#include "core/render/boundary_edges.h"
+#include "core/render/standard_walk.h"
+
+namespace isochron {
+
+template <class Sink>
+class SecondaryBoundary {
+ public:
+  SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges)
+      : worker_(worker), scene_(worker.scene), edges_(edges), light_path_(worker.options.max_bounces) {}
+
+  /// One segment from an edge; contributions are scaled by `scale` (one over the number of such segments).
+  void sample_from_edge(double scale, Rng& rng) {
+    if (!edges_.has_secondary()) return;
+    Segment g;
+    g.y = edges_.sample_secondary(rng.uniform());
+    const double pick = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+    int aimed_at = -1;
+    if (pick < kAimedShare) {
+      double pdf;
+      const SurfacePoint target = scene_.sample_emitter(u0, u1, u2, pdf);
+      g.w = normalize(target.p - g.y.y);
+      aimed_at = target.triangle;
+    } else {
+      g.w = direction_in_wedge(*g.y.edge, u0, u1);
+    }
+    if (!g.orient() || !find_light_end(g)) return;
+    if (aimed_at >= 0 && g.light.triangle != aimed_at) return;
+    ++worker_.rays;
+    const int t = scene_.caster.first_triangle(g.lifted(scene_.caster.offset()), -g.w);
+    if (t < 0 || !faces(t, g.w)) return;
+    g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
+    g.r_d = length(g.camera_end.p - g.y.y);
+    if (!differentiate(g)) return;
+
+    connections_.clear();
+    walk_to_camera(g, scale * g.sine / (g.y.pdf * direction_pdf(g)), rng);
+    finish(g, rng);
+  }
+
+  /// One camera path through `pixel`, with a random edge point at each of its vertices.
+  void sample_from_camera(int pixel, double scale, Rng& rng) {
+    if (!edges_.has_secondary() || !worker_.start_camera_path(pixel, rng)) return;
+    Path& path = worker_.path;
+    Rgb throughput(1.0);
+    for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
+      if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
+      connect_edge(pixel, throughput * scale, rng);
+      const SurfacePoint x = path.back();
+      const Material& material = scene_.material_of(x.triangle);
+      const Vec3 w_o = normalize(path.vertex[path.size() - 2].p - x.p);
+      const double v0 = rng.uniform(), v1 = rng.uniform();
+      const auto next = sample_direction(material, x.n, w_o, v0, v1);
+      if (!next || bounce == worker_.options.max_bounces) return;
+      throughput *= material.albedo * next->weight;
+      if (throughput.is_black() || !survives(throughput, bounce, rng)) return;
+      const auto hit = worker_.trace(x, next->direction);
+      if (!hit) return;
+      path.push(scene_, *hit);
+    }
+  }
+
+ private:
+  static constexpr double kAimedShare = 0.5;
+
+  /// The boundary segment: from D (camera side) through the edge point along the unit direction w to S (light side).
+  struct Segment {
+    BoundaryEdges::Sample y;
+    Vec3 w, n_b;
+    double sine = 0;
+    int side = 0;  ///< of n_b on which the occluder lies
+    SurfacePoint camera_end, light;
+    double r_d = 0, r_s = 0;
+
+    bool orient() {
+      const Vec3 normal = cross(y.edge->tangent, w);
+      sine = length(normal);
+      if (!(sine > 0)) return false;
+      n_b = normal / sine;
+      side = BoundaryEdges::occluder_side(*y.edge, n_b);
+      return side != 0;
+    }
+    /// The edge point moved off the occluder.
+    Vec3 lifted(double offset) const { return y.y - n_b * (side * offset); }
+  };
+
+  /// A way from D to the camera.
+  struct Connection {
+    int pixel;
+    int bounces;    ///< scattering vertices on the camera side, D included
+    Rgb value;
+    double length;  ///< camera to D
+  };
+  /// Light that leaves S towards D.
+  struct Emission {
+    Rgb value;
+    double length;  ///< D to emitter
+    int bounces;    ///< scattering vertices on the light side
+  };
+
+  bool faces(int triangle, const Vec3& w) const {
+    return dot(scene_.normal[triangle], w) > 0 || scene_.material_of(triangle).two_sided;
+  }
+
+  /// Uniform in azimuth over the grazing wedge and in the cosine to the edge.
+  static Vec3 direction_in_wedge(const BoundaryEdge& edge, double u0, double u1) {
+    const Vec3& f0 = edge.inward[0];
+    Vec3 across = cross(edge.tangent, f0);
+    if (edge.faces() == 2 && dot(across, edge.inward[1]) < 0) across = -across;
+    const double half = u0 < 0.5 ? 0 : 1;
+    const double beta = edge.opening + (2 * u0 - half) * edge.wedge() + half * kPi;
+    const double cosine = 2 * u1 - 1, sine = std::sqrt(1 - cosine * cosine);
+    return edge.tangent * cosine + (f0 * std::cos(beta) + across * std::sin(beta)) * sine;
+  }
+
+  /// Density per solid angle of w from the edge: wedge and aimed together. `g.light` is known.
+  double direction_pdf(const Segment& g) const {
+    const double wedge = 1 / (4 * g.y.edge->wedge());
+    double aimed = 0;
+    if (scene_.emits(g.light.triangle) && dot(g.light.n, g.w) < 0)
+      aimed = scene_.emitter_pdf(g.light.triangle) / solid_angle_to_area(g.y.y, g.light);
+    return (1 - kAimedShare) * wedge + kAimedShare * aimed;
+  }
+
+  bool find_light_end(Segment& g) {
+    ++worker_.rays;
+    const int t = scene_.caster.first_triangle(g.lifted(scene_.caster.offset()), g.w);
+    if (t < 0 || !faces(t, -g.w)) return false;
+    g.light = scene_.point_on_triangle(t, g.y.y, g.w);
+    g.r_s = length(g.light.p - g.y.y);
+    return true;
+  }
+
+  /// The speed of the edge relative to the line that grazes it, as a linear form in vertex velocities; once with D
+  /// kept on its pixel ray, once as a material point. False when nothing moves.
+  bool differentiate(const Segment& g) {
+    const Vec3 b = g.n_b * g.side;
+    LocalDifferential& common = pixel_flow_;
+    common.clear();
+    const double share[2] = {1 - g.y.s, g.y.s};
+    for (int i = 0; i < 2; ++i)
+      if (scene_.moving.vertex[g.y.edge->vertex[i]]) common.vertices.push_back({g.y.edge->vertex[i], b * share[i], {}});
+    const double whole = g.r_s + g.r_d;
+    add_material_flow(scene_, g.light, b * (-g.r_d / whole), common);
+    material_flow_ = common;
+    add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), pixel_flow_);
+    add_material_flow(scene_, g.camera_end, b * (-g.r_s / whole), material_flow_);
+    return !pixel_flow_.empty() || !material_flow_.empty();
+  }
+
+  /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
+  double camera_over_edge(const Segment& g, const std::vector<SurfacePoint>& x, int k) const {
+    double ratio = scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
+                   solid_angle_to_area(x[0].p, x[1]) / scene_.camera.pixels();
+    for (int j = 1; j < k; ++j)
+      ratio *= Scattering(x[j - 1].p, x[j], x[j + 1].p).pdf_towards_light(scene_.material_of(x[j].triangle)) *
+               solid_angle_to_area(x[j].p, x[j + 1]);
+    double from_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, x[k]);
+    for (int j = k; j > 1; --j) {
+      const Vec3& after = j == k ? g.y.y : x[j + 1].p;
+      from_edge *= Scattering(x[j - 1].p, x[j], after).pdf_towards_camera(scene_.material_of(x[j].triangle)) *
+                   solid_angle_to_area(x[j].p, x[j - 1]);
+    }
+    return ratio / from_edge;
+  }
+
+  /// Walks on from D, away from the light, and collects a connection to the camera at every vertex.
+  void walk_to_camera(const Segment& g, double scale, Rng& rng) {
+    const CameraModel& camera = scene_.camera;
+    SurfacePoint eye;
+    eye.p = camera.position;
+    Rgb throughput(1.0);
+    walk_.assign(1, g.camera_end);
+    Vec3 from = g.w;  // unit, towards where the light comes from
+    double walked = 0;
+    for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
+      const SurfacePoint x = walk_.back();
+      const Material& material = scene_.material_of(x.triangle);
+      const Vec3 to_camera = camera.position - x.p;
+      const double distance = length(to_camera);
+      if (const int pixel = camera.project(x.p); pixel >= 0) {
+        const Vec3 w_o = to_camera / distance;
+        const double scattered = lobe(material, dot(x.n, from), dot(x.n, w_o), dot(from, w_o));
+        if (scattered > 0 && worker_.visible_from_camera(x)) {
+          camera_side_.assign(1, eye);
+          camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
+          const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
+          const double weight = 1 / (1 + camera_over_edge(g, camera_side_, bounce));
+          connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale * weight),
+                                  walked + distance});
+        }
+      }
+      if (bounce == worker_.options.max_bounces) return;
+      const double v0 = rng.uniform(), v1 = rng.uniform();
+      const auto next = sample_direction(material, x.n, from, v0, v1);
+      if (!next) return;
+      throughput *= material.albedo * next->weight;
+      if (throughput.is_black() || !survives(throughput, bounce, rng)) return;
+      const auto hit = worker_.trace(x, next->direction);
+      if (!hit) return;
+      from = -next->direction;
+      walked += length(hit->p - x.p);
+      if (walked + g.r_d + g.r_s + length(hit->p - camera.position) > worker_.gates.upper()) return;
+      walk_.push_back(*hit);
+    }
+  }
+
+  /// D is the last vertex of the worker's path: tries a random edge point.
+  void connect_edge(int pixel, const Rgb& throughput, Rng& rng) {
+    const Path& path = worker_.path;
+    Segment g;
+    g.y = edges_.sample_secondary(rng.uniform());
+    g.camera_end = path.back();
+    const Vec3 d = g.y.y - g.camera_end.p;
+    g.r_d = length(d);
+    if (!(g.r_d > 0)) return;
+    g.w = d / g.r_d;
+    const int k = path.size() - 1;
+    const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
+    const Material& material = scene_.material_of(g.camera_end.triangle);
+    const double scattered = s.lobe(material);
+    if (!(scattered > 0) || !g.orient() || !find_light_end(g) || !differentiate(g)) return;
+    ++worker_.rays;
+    if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return;
+    const double ratio = camera_over_edge(g, path.vertex, k);
+    const double weight = std::isinf(ratio) ? 1 : ratio / (1 + ratio);
+    const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf) * scattered * weight;
+    connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back()});
+    finish(g, rng);
+  }
+
+  /// Gathers the light that S sends towards D and joins it with every connection.
+  void finish(const Segment& g, Rng& rng) {
+    if (connections_.empty()) return;
+    double shortest = connections_[0].length, longest = shortest;
+    int fewest = connections_[0].bounces;
+    for (const Connection& c : connections_) {
+      shortest = std::min(shortest, c.length);
+      longest = std::max(longest, c.length);
+      fewest = std::min(fewest, c.bounces);
+    }
+    struct Visitor {
+      std::vector<Emission>& emissions;
+      const Path& path;
+      bool wants() const { return true; }
+      void take(const Rgb& value) { emissions.push_back({value, path.length.back(), path.size() - 2}); }
+    };
+    emissions_.clear();
+    light_path_.start(g.camera_end, 0);
+    light_path_.push(scene_, g.light);
+    walk_standard(worker_, light_path_, worker_.options.max_bounces - fewest,
+                  {worker_.gates.lower() - longest, worker_.gates.upper() - shortest}, rng,
+                  Visitor{emissions_, light_path_});
+    if (emissions_.empty()) return;
+    const LocalDifferential* bound = nullptr;
+    for (const Connection& c : connections_) {
+      const LocalDifferential* differential = c.bounces == 1 ? &pixel_flow_ : &material_flow_;
+      if (differential->empty()) continue;
+      if (differential != bound) worker_.sink.bind(*(bound = differential));
+      for (const Emission& e : emissions_)
+        if (c.bounces + e.bounces <= worker_.options.max_bounces)
+          worker_.sink.add(c.pixel, c.value * e.value, c.length + e.length, GateUse::value);
+    }
+  }
+
+  Worker<Sink>& worker_;
+  const PreparedScene& scene_;
+  const BoundaryEdges& edges_;
+  Path light_path_;
+  LocalDifferential pixel_flow_, material_flow_;
+  std::vector<SurfacePoint> walk_, camera_side_;
+  std::vector<Connection> connections_;
+  std::vector<Emission> emissions_;
+};
+
+}  // namespace isochron
