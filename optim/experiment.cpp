@@ -1,0 +1,312 @@
+#include "optim/experiment.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <optional>
+
+#include "core/math/error.h"
+#include "core/scene/yaml_reader.h"
+#include "optim/number_file.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kSpeedOfLight = 299792458;  // m/s
+constexpr int kMostSamples = 1 << 30;
+constexpr int kMostGates = 100000;
+
+/// Names become file names and columns.
+std::string file_name(const YamlValue& value) {
+  const std::string name = value.text();
+  const bool valid = name[0] != '-' && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+                       return (c < 0x80 && std::isalnum(c)) || c == '_' || c == '-';
+                     });
+  if (!valid) value.fail(fmt::format("'{}' is not a usable name", name), "letters, digits, _ and -");
+  return name;
+}
+
+std::string existing_file(const YamlValue& value, const std::filesystem::path& folder) {
+  const std::string text = value.text();
+  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text);
+  if (!std::filesystem::is_regular_file(path))
+    value.fail(fmt::format("there is no file '{}'", text), "a path relative to the experiment file");
+  return path.string();
+}
+
+/// A number, a list of numbers or the name of a text file of numbers.
+std::vector<double> read_values(const YamlValue& value, const std::filesystem::path& folder) {
+  if (value.is_number()) return {value.number()};
+  if (value.is_map()) value.fail("is a map", "a number, a list of numbers or a text file");
+  std::vector<double> values;
+  if (value.is_list()) {
+    values = value.numbers();
+  } else {
+    for (const auto& row : read_number_file(existing_file(value, folder)))
+      values.insert(values.end(), row.begin(), row.end());
+  }
+  if (values.empty()) value.fail("holds no number", "at least one");
+  return values;
+}
+
+std::vector<double> read_centers(const YamlValue& value) {
+  std::vector<double> centers;
+  if (value.is_map()) {
+    YamlMap map = value.map();
+    const double start = map.require("start").number(NumberRange::non_negative());
+    const YamlValue stop_value = map.require("stop");
+    const double stop = stop_value.number(NumberRange::non_negative());
+    const int count = static_cast<int>(map.require("count").integer(1, kMostGates));
+    map.reject_unknown();
+    if (stop < start) stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
+    for (int i = 0; i < count; ++i) centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
+    return centers;
+  }
+  if (!value.is_list()) value.fail("is neither", "a list of numbers, or {start, stop, count}");
+  centers = value.numbers(NumberRange::non_negative());
+  if (centers.empty()) value.fail("holds no gate", "at least one number");
+  return centers;
+}
+
+GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder) {
+  YamlMap map = value.map();
+  GateSpec gates;
+  constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar, GateKind::truncated_gaussian,
+                                 GateKind::tabulated};
+  gates.kind =
+      kKinds[map.require("kind").choice({"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"})];
+  if (const auto unit = map.find("unit"))
+    gates.unit = static_cast<LengthUnit>(unit->choice({"scene", "ns", "ps"}));
+  if (gates.unit != LengthUnit::scene)
+    gates.scene_unit_m = map.require("scene_unit_m").number(NumberRange::positive());
+  else if (const auto metres = map.find("scene_unit_m"))
+    gates.scene_unit_m = metres->number(NumberRange::positive());
+  if (gates.kind != GateKind::steady) gates.centers = read_centers(map.require("centers"));
+  const auto positive = [&](const char* key) { return map.require(key).number(NumberRange::positive()); };
+  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian) gates.sigma = positive("sigma");
+  if (gates.kind == GateKind::boxcar) gates.width = positive("width");
+  if (gates.kind == GateKind::truncated_gaussian) gates.half_width = positive("half_width");
+  if (gates.kind == GateKind::tabulated) {
+    if (const auto file = map.find("file")) {
+      const std::string path = existing_file(*file, folder);
+      for (const auto& row : read_number_file(path, 2)) {
+        gates.offsets.push_back(row[0]);
+        gates.values.push_back(row[1]);
+      }
+    } else {
+      gates.offsets = map.require("offsets").numbers();
+      const YamlValue values = map.require("values");
+      gates.values = values.numbers();
+      if (gates.values.size() != gates.offsets.size())
+        values.fail(fmt::format("{} values are given", gates.values.size()),
+                    fmt::format("one for each of the {} offsets", gates.offsets.size()));
+    }
+    const bool sorted = std::is_sorted(gates.offsets.begin(), gates.offsets.end());
+    const bool positive_values =
+        std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
+        std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
+    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive_values)
+      value.fail("the table is no gate",
+                 "two rows or more, offsets in rising order, values at least 0 and one of them above");
+  }
+  map.reject_unknown();
+  try {
+    make_gates(gates);
+  } catch (const std::exception& error) {
+    value.fail(error.what());
+  }
+  return gates;
+}
+
+Selection read_selection(const YamlValue& value) {
+  Selection selection;
+  if (value.is_list()) {
+    selection.kind = Selection::Kind::list;
+    for (const YamlValue& entry : value.list())
+      selection.indices.push_back(static_cast<int>(entry.integer(0, std::numeric_limits<int>::max())));
+    return selection;
+  }
+  if (!value.is_map()) value.fail("is neither", "a list of vertex indices, or {box: {min, max}}");
+  selection.kind = Selection::Kind::box;
+  YamlMap map = value.map();
+  YamlMap box = map.require("box").map();
+  selection.min = box.require("min").vec3();
+  selection.max = box.require("max").vec3();
+  box.reject_unknown();
+  map.reject_unknown();
+  return selection;
+}
+
+ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder, bool target_required) {
+  YamlMap map = value.map();
+  ParameterSpec spec;
+  spec.where.emplace("", value);
+  const auto find = [&](const char* key) {
+    const auto found = map.find(key);
+    if (found) spec.where.emplace(key, *found);
+    return found;
+  };
+  const auto require = [&](const char* key) {
+    const YamlValue found = map.require(key);
+    spec.where.emplace(key, found);
+    return found;
+  };
+  spec.name = file_name(require("name"));
+  constexpr const char* kReserved[] = {"render", "target", "initial", "final", "norm"};
+  if (std::find(std::begin(kReserved), std::end(kReserved), spec.name) != std::end(kReserved))
+    spec.fail("name", fmt::format("'{}' is the name of another output", spec.name));
+  spec.type = static_cast<ParameterType>(
+      require("type").choice({"translation", "rotation", "vertices", "albedo", "roughness", "emission"}));
+  const bool of_material = spec.type == ParameterType::albedo || spec.type == ParameterType::roughness;
+  (of_material ? spec.material : spec.shape) = require(of_material ? "material" : "shape").text();
+  if (!of_material && spec.type != ParameterType::emission)
+    if (const auto selection = find("selection")) spec.selection = read_selection(*selection);
+  if (spec.type == ParameterType::translation) spec.direction = require("direction").direction();
+  if (spec.type == ParameterType::rotation) {
+    spec.axis = require("axis").direction();
+    if (const auto pivot = find("pivot")) spec.pivot = pivot->vec3();
+  }
+  if (spec.type == ParameterType::vertices) {
+    const YamlValue direction = require("direction");
+    if (direction.is_list())
+      spec.direction = direction.direction();
+    else if (direction.is_scalar())
+      spec.direction_kind =
+          direction.choice({"normal", "free"}) == 0 ? VertexDirection::normal : VertexDirection::free;
+    else
+      direction.fail("is neither", "[x, y, z], normal or free");
+  }
+  spec.initial = read_values(require("initial"), folder);
+  if (target_required)
+    spec.target = read_values(require("target"), folder);
+  else if (const auto target = find("target"))
+    spec.target = read_values(*target, folder);
+  if (const auto lower = find("lower")) spec.lower = read_values(*lower, folder);
+  if (const auto upper = find("upper")) spec.upper = read_values(*upper, folder);
+  map.reject_unknown();
+  return spec;
+}
+
+TargetSpec read_target(const YamlValue& value, const std::filesystem::path& folder) {
+  YamlMap map = value.map();
+  TargetSpec target;
+  if (const auto images = map.find("images")) {
+    target.images = existing_file(*images, folder);
+  } else {
+    if (const auto samples = map.find("samples")) target.samples = static_cast<int>(samples->integer(1, kMostSamples));
+    if (const auto seed = map.find("seed"))
+      target.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
+  }
+  map.reject_unknown();
+  return target;
+}
+
+void read_settings(YamlMap& map, Experiment& experiment) {
+  if (const auto bounces = map.find("max_bounces"))
+    experiment.estimator.max_bounces = static_cast<int>(bounces->integer(0, 10000));
+  if (const auto value = map.find("samples")) {
+    YamlMap samples = value->map();
+    const auto count = [&](const char* key, int least, int& into) {
+      if (const auto n = samples.find(key)) into = static_cast<int>(n->integer(least, kMostSamples));
+    };
+    count("primal", 1, experiment.samples.primal);
+    count("interior", 0, experiment.samples.interior);
+    count("visibility", 0, experiment.samples.visibility);
+    count("path_length", 0, experiment.samples.path_length);
+    samples.reject_unknown();
+  }
+  if (const auto value = map.find("estimator")) {
+    YamlMap estimator = value->map();
+    if (const auto sampling = estimator.find("sampling"))
+      experiment.estimator.sampling = static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
+    if (const auto antithetic = estimator.find("antithetic")) experiment.estimator.antithetic = antithetic->boolean();
+    estimator.reject_unknown();
+  }
+  if (const auto value = map.find("gradient")) {
+    YamlMap gradient = value->map();
+    if (const auto method = gradient.find("method"))
+      experiment.gradient.method = static_cast<GradientMethod>(method->choice({"analytic", "finite_difference"}));
+    if (const auto step = gradient.find("step")) experiment.gradient.step = step->number(NumberRange::positive());
+    gradient.reject_unknown();
+  }
+  if (const auto value = map.find("optimizer")) {
+    YamlMap optimizer = value->map();
+    if (const auto method = optimizer.find("method"))
+      if (method->choice({"adam", "lbfgs", "levenberg_marquardt"}) != 0)
+        method->fail(fmt::format("'{}' is not available yet", method->text()), "allowed: adam");
+    if (const auto rate = optimizer.find("learning_rate"))
+      experiment.optimizer.learning_rate = rate->number(NumberRange::positive());
+    if (const auto iterations = optimizer.find("iterations"))
+      experiment.optimizer.iterations = static_cast<int>(iterations->integer(0, std::numeric_limits<int>::max() - 1));
+    if (const auto tolerance = optimizer.find("tolerance"))
+      experiment.optimizer.tolerance = tolerance->number(NumberRange::non_negative());
+    optimizer.reject_unknown();
+  }
+  if (const auto seed = map.find("seed"))
+    experiment.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
+}
+
+}  // namespace
+
+GateSet make_gates(const GateSpec& spec) {
+  if (spec.kind == GateKind::steady) return GateSet(GateShape::steady(), {0.0});
+  double scale = 1;
+  if (spec.unit != LengthUnit::scene)
+    scale = kSpeedOfLight * (spec.unit == LengthUnit::ns ? 1e-9 : 1e-12) / spec.scene_unit_m;
+  const auto scaled = [&](std::vector<double> lengths) {
+    for (double& length : lengths) length *= scale;
+    return lengths;
+  };
+  const GateShape shape = [&] {
+    switch (spec.kind) {
+      case GateKind::gaussian: return GateShape::gaussian(scale * spec.sigma);
+      case GateKind::boxcar: return GateShape::boxcar(scale * spec.width);
+      case GateKind::truncated_gaussian:
+        return GateShape::truncated_gaussian(scale * spec.sigma, scale * spec.half_width);
+      default: return GateShape::tabulated(scaled(spec.offsets), spec.values);
+    }
+  }();
+  return GateSet(shape, scaled(spec.centers));
+}
+
+void ParameterSpec::fail(const std::string& key, const std::string& wrong, const std::string& allowed) const {
+  for (const std::string& place : {key, std::string()})
+    if (const auto found = where.find(place); found != where.end()) found->second.fail(wrong, allowed);
+  throw InputError(fmt::format("parameter {}: {}: {}{}", name, key, wrong,
+                               allowed.empty() ? "" : " (" + allowed + ")"));
+}
+
+void SampleSpec::set_all(int n) {
+  primal = n;
+  for (int* count : {&interior, &visibility, &path_length})
+    if (*count > 0) *count = n;
+}
+
+Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides) {
+  const YamlValue root = open_yaml(file, overrides);
+  YamlMap map = root.map();
+  Experiment experiment;
+  experiment.file = std::filesystem::absolute(file).string();
+  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  experiment.name = file_name(map.require("name"));
+  experiment.scene = existing_file(map.require("scene"), folder);
+  experiment.gates = read_gates(map.require("gates"), folder);
+  if (const auto target = map.find("target")) experiment.target = read_target(*target, folder);
+  if (const auto parameters = map.find("parameters")) {
+    for (const YamlValue& entry : parameters->list()) {
+      ParameterSpec spec = read_parameter(entry, folder, experiment.target.images.empty());
+      for (const ParameterSpec& other : experiment.parameters)
+        if (other.name == spec.name) spec.fail("name", fmt::format("'{}' stands here twice", spec.name));
+      experiment.parameters.push_back(std::move(spec));
+    }
+  }
+  read_settings(map, experiment);
+  if (const auto version = map.find("version")) version->text();
+  map.reject_unknown();
+  return experiment;
+}
+
+}  // namespace isochron

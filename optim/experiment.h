@@ -1,0 +1,127 @@
+// The experiment file: what a user writes, checked and with every default filled in.
+//
+// Defaults (the only place where they are listed; a key without one here is required):
+//   max_bounces 8                      parameters: none
+//   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0]
+//   samples: 64 for each of primal, interior, visibility, path_length
+//   estimator: sampling auto, antithetic true
+//   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter)
+//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0
+//   target: samples 4096, seed 7       seed 1
+#pragma once
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/gates/gate.h"
+#include "core/render/renderer.h"
+#include "core/scene/yaml_reader.h"
+
+namespace isochron {
+
+enum class LengthUnit { scene, ns, ps };
+
+/// Gates as written. All lengths are in `unit`; a time t is the length c t / scene_unit_m in scene units.
+struct GateSpec {
+  GateKind kind = GateKind::steady;
+  LengthUnit unit = LengthUnit::scene;
+  double scene_unit_m = 0;      ///< metres per scene unit; > 0 where unit is a time, else unused
+  std::vector<double> centers;  ///< steady: empty
+  double sigma = 0;             ///< gaussian, truncated_gaussian
+  double width = 0;             ///< boxcar
+  double half_width = 0;        ///< truncated_gaussian
+  std::vector<double> offsets, values;  ///< tabulated: relative to the centre; read from `file` or given inline
+};
+
+/// Gates in scene units. Throws std::invalid_argument when the shape cannot be made (for example a table of zeros).
+GateSet make_gates(const GateSpec& spec);
+
+enum class ParameterType { translation, rotation, vertices, albedo, roughness, emission };
+enum class VertexDirection { fixed, normal, free };
+const char* name(ParameterType type);
+
+/// Which vertices of a shape a parameter moves: all, a list of indices, or those inside a box.
+struct Selection {
+  enum class Kind { all, list, box } kind = Kind::all;
+  std::vector<int> indices;  ///< within the shape, after vertices at one position were welded; counted from 0
+  Vec3 min, max;             ///< world space of the scene file, borders included
+};
+
+/// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene file;
+/// those of albedo, roughness and emission replace what the scene file says.
+struct ParameterSpec {
+  std::string name;
+  ParameterType type = ParameterType::translation;
+  std::string shape;     ///< translation, rotation, vertices, emission
+  std::string material;  ///< albedo, roughness
+  Selection selection;
+  VertexDirection direction_kind = VertexDirection::fixed;
+  Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
+  Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
+  Vec3 pivot;      ///< rotation; a fixed point of the world that no other parameter moves
+  std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be empty
+                                                      ///< (all but initial)
+
+  /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
+  std::map<std::string, YamlValue> where;
+  /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
+  [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
+};
+
+struct TargetSpec {
+  std::string images;          ///< absolute path of an EXR; empty: render at the target values
+  int samples = 4096;
+  std::uint64_t seed = 7;
+};
+
+/// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1.
+struct SampleSpec {
+  int primal = 64, interior = 64, visibility = 64, path_length = 64;
+  int term(Term t) const {
+    return t == Term::interior ? interior : t == Term::visibility ? visibility : path_length;
+  }
+  /// Sets every term to n, but leaves out what is left out already.
+  void set_all(int n);
+};
+
+enum class GradientMethod { analytic, finite_difference };
+
+struct GradientSpec {
+  GradientMethod method = GradientMethod::analytic;
+  double step = 0.01;  ///< finite_difference: half the distance of the two images, in units of the parameter
+};
+
+struct OptimizerSpec {
+  double learning_rate = 0.02;  ///< units of the parameter per iteration
+  int iterations = 100;
+  double tolerance = 0;  ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
+};
+
+struct Experiment {
+  std::string file;  ///< absolute path, for messages
+  std::string name;
+  std::string scene;  ///< absolute path
+  GateSpec gates;
+  EstimatorOptions estimator;
+  std::vector<ParameterSpec> parameters;
+  TargetSpec target;
+  SampleSpec samples;
+  GradientSpec gradient;
+  OptimizerSpec optimizer;
+  std::uint64_t seed = 1;
+};
+
+/// Reads and checks an experiment file, all that can be checked without the scene. `overrides` are KEY.PATH=VALUE
+/// strings, applied before the checks (see open_yaml).
+/// Throws InputError: one line that names file, line, column, key and what is allowed.
+Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides = {});
+
+/// The experiment with everything resolved, as YAML that load_experiment reads back to the same values when it lies in
+/// `folder`: paths are written relative to it, tables and value files inline, numbers with all their digits.
+std::string resolved_yaml(const Experiment& experiment, const std::string& folder);
+
+/// Version of this program, as written into experiment.yaml and checkpoints.
+const char* program_version();
+
+}  // namespace isochron

@@ -1,0 +1,109 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <iterator>
+
+#include "optim/experiment.h"
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+std::string quote(const std::string& text) {
+  std::string quoted = "\"";
+  for (char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+std::string list(const std::vector<double>& values) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) text += (i ? ", " : "") + exact(values[i]);
+  return text + "]";
+}
+
+std::string number_or_list(const std::vector<double>& values) {
+  return values.size() == 1 ? exact(values[0]) : list(values);
+}
+
+std::string vector(const Vec3& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
+
+std::string gates_yaml(const GateSpec& gates) {
+  constexpr const char* kKinds[] = {"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"};
+  constexpr const char* kUnits[] = {"scene", "ns", "ps"};
+  std::string text = fmt::format("  kind: {}\n  unit: {}\n", kKinds[static_cast<int>(gates.kind)],
+                                 kUnits[static_cast<int>(gates.unit)]);
+  auto out = std::back_inserter(text);
+  if (gates.scene_unit_m > 0) fmt::format_to(out, "  scene_unit_m: {}\n", gates.scene_unit_m);
+  if (gates.kind != GateKind::steady) fmt::format_to(out, "  centers: {}\n", list(gates.centers));
+  if (gates.sigma > 0) fmt::format_to(out, "  sigma: {}\n", gates.sigma);
+  if (gates.width > 0) fmt::format_to(out, "  width: {}\n", gates.width);
+  if (gates.half_width > 0) fmt::format_to(out, "  half_width: {}\n", gates.half_width);
+  if (gates.kind == GateKind::tabulated)
+    fmt::format_to(out, "  offsets: {}\n  values: {}\n", list(gates.offsets), list(gates.values));
+  return text;
+}
+
+std::string parameter_yaml(const ParameterSpec& spec) {
+  std::string text = fmt::format("  - name: {}\n    type: {}\n", quote(spec.name), name(spec.type));
+  auto out = std::back_inserter(text);
+  if (!spec.shape.empty()) fmt::format_to(out, "    shape: {}\n", quote(spec.shape));
+  if (!spec.material.empty()) fmt::format_to(out, "    material: {}\n", quote(spec.material));
+  const Selection& selection = spec.selection;
+  if (selection.kind == Selection::Kind::list)
+    fmt::format_to(out, "    selection: [{}]\n", fmt::join(selection.indices, ", "));
+  if (selection.kind == Selection::Kind::box)
+    fmt::format_to(out, "    selection: {{box: {{min: {}, max: {}}}}}\n", vector(selection.min), vector(selection.max));
+  if (spec.type == ParameterType::rotation)
+    fmt::format_to(out, "    axis: {}\n    pivot: {}\n", vector(spec.axis), vector(spec.pivot));
+  if (spec.direction_kind != VertexDirection::fixed)
+    fmt::format_to(out, "    direction: {}\n", spec.direction_kind == VertexDirection::normal ? "normal" : "free");
+  else if (spec.type == ParameterType::translation || spec.type == ParameterType::vertices)
+    fmt::format_to(out, "    direction: {}\n", vector(spec.direction));
+  fmt::format_to(out, "    initial: {}\n", number_or_list(spec.initial));
+  if (!spec.target.empty()) fmt::format_to(out, "    target: {}\n", number_or_list(spec.target));
+  if (!spec.lower.empty()) fmt::format_to(out, "    lower: {}\n", number_or_list(spec.lower));
+  if (!spec.upper.empty()) fmt::format_to(out, "    upper: {}\n", number_or_list(spec.upper));
+  return text;
+}
+
+}  // namespace
+
+const char* program_version() { return ISOCHRON_VERSION; }
+
+const char* name(ParameterType type) {
+  constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo", "roughness", "emission"};
+  return kNames[static_cast<int>(type)];
+}
+
+std::string resolved_yaml(const Experiment& e, const std::string& folder) {
+  const std::filesystem::path base = std::filesystem::weakly_canonical(std::filesystem::absolute(folder));
+  const auto relative = [&](const std::string& file) {
+    return quote(std::filesystem::path(file).lexically_proximate(base).string());
+  };
+  constexpr const char* kSampling[] = {"auto", "standard", "ellipsoidal"};
+  std::string text = fmt::format("version: {}\nname: {}\nscene: {}\nmax_bounces: {}\ngates:\n{}",
+                                 quote(program_version()), quote(e.name), relative(e.scene), e.estimator.max_bounces,
+                                 gates_yaml(e.gates));
+  auto out = std::back_inserter(text);
+  text += e.parameters.empty() ? "parameters: []\n" : "parameters:\n";
+  for (const ParameterSpec& spec : e.parameters) text += parameter_yaml(spec);
+  if (e.target.images.empty())
+    fmt::format_to(out, "target:\n  samples: {}\n  seed: {}\n", e.target.samples, e.target.seed);
+  else
+    fmt::format_to(out, "target:\n  images: {}\n", relative(e.target.images));
+  fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
+                 e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
+  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n",
+                 kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic);
+  fmt::format_to(out, "gradient:\n  method: {}\n  step: {}\n",
+                 e.gradient.method == GradientMethod::analytic ? "analytic" : "finite_difference", e.gradient.step);
+  fmt::format_to(out, "optimizer:\n  method: adam\n  learning_rate: {}\n  iterations: {}\n  tolerance: {}\n",
+                 e.optimizer.learning_rate, e.optimizer.iterations, e.optimizer.tolerance);
+  fmt::format_to(out, "seed: {}\n", e.seed);
+  return text;
+}
+
+}  // namespace isochron

@@ -1,0 +1,302 @@
+#include "optim/parameters.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+
+#include "core/math/constants.h"
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kDegree = kPi / 180;
+constexpr double kLeastAlbedo = 1e-4, kLeastRoughness = 1e-3, kLeastRelativeEmission = 1e-6;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+template <class Item>
+std::string names_of(const std::vector<Item>& items) {
+  std::string list;
+  for (const Item& item : items) list += (list.empty() ? "" : ", ") + item.name;
+  return list.empty() ? "none" : list;
+}
+
+/// Rodrigues' formula.
+Vec3 rotate(const Vec3& p, const Vec3& axis, double radians) {
+  const double c = std::cos(radians), s = std::sin(radians);
+  return c * p + s * cross(axis, p) + (1 - c) * dot(axis, p) * axis;
+}
+
+/// Area-weighted sums of face normals at the vertices of a shape; zero where no face of positive area meets.
+std::vector<Vec3> vertex_normals(const Scene& scene, const Shape& shape) {
+  std::vector<Vec3> sum(shape.vertex_count);
+  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
+    const auto& v = scene.triangles[t].vertex;
+    const Vec3& a = scene.positions[v[0]];
+    const Vec3 area = cross(scene.positions[v[1]] - a, scene.positions[v[2]] - a);
+    for (int k : v) sum[k - shape.first_vertex] += area;
+  }
+  return sum;
+}
+
+int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, std::vector<int>& slot) {
+  const Selection& selection = spec.selection;
+  slot.assign(shape.vertex_count, -1);
+  int count = 0;
+  if (selection.kind == Selection::Kind::list) {
+    for (int v : selection.indices) {
+      if (v < 0 || v >= shape.vertex_count)
+        spec.fail("selection", fmt::format("there is no vertex {} in shape '{}'", v, shape.name),
+                  fmt::format("0 to {}", shape.vertex_count - 1));
+      if (slot[v] >= 0) spec.fail("selection", fmt::format("vertex {} is listed twice", v));
+      slot[v] = count++;
+    }
+  } else {
+    const Vec3 &lo = selection.min, &hi = selection.max;
+    for (int v = 0; v < shape.vertex_count; ++v) {
+      const Vec3& p = scene.positions[shape.first_vertex + v];
+      const bool inside = selection.kind == Selection::Kind::all ||
+                          (p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y && p.z >= lo.z && p.z <= hi.z);
+      if (inside) slot[v] = count++;
+    }
+  }
+  if (count == 0) spec.fail("selection", fmt::format("selects no vertex of shape '{}'", shape.name));
+  return count;
+}
+
+}  // namespace
+
+Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs)
+    : scene_(scene), motions_(scene.shapes.size()) {
+  for (const ParameterSpec& spec : specs) {
+    int count = 1;
+    int shape = -1, material = -1;
+    if (spec.type == ParameterType::albedo || spec.type == ParameterType::roughness) {
+      material = scene.find_material(spec.material);
+      if (material < 0)
+        spec.fail("material", fmt::format("there is no material '{}' in the scene", spec.material),
+                  "allowed: " + names_of(scene.materials));
+      if (spec.type == ParameterType::roughness && scene.materials[material].type == MaterialType::diffuse)
+        spec.fail("material", fmt::format("material '{}' is diffuse and has no roughness", spec.material));
+    } else {
+      shape = scene.find_shape(spec.shape);
+      if (shape < 0)
+        spec.fail("shape", fmt::format("there is no shape '{}' in the scene", spec.shape),
+                  "allowed: " + names_of(scene.shapes));
+    }
+    const int first = size();
+    if (spec.type == ParameterType::translation || spec.type == ParameterType::rotation ||
+        spec.type == ParameterType::vertices) {
+      Motion motion;
+      motion.first_component = first;
+      bind_motion(spec, motion, shape, count);
+      motions_[shape].push_back(std::move(motion));
+    } else {
+      if (spec.type != ParameterType::roughness && !scene.grey) count = 3;
+      const int index = spec.type == ParameterType::emission ? shape : material;
+      for (const MaterialValue& other : material_values_)
+        if (other.type == spec.type && other.index == index)
+          spec.fail("type", fmt::format("another parameter sets the same {} already", isochron::name(spec.type)));
+      material_values_.push_back({spec.type, index, first, count});
+    }
+    bind_values(spec, count);
+    blocks_.push_back({spec.name, first, count});
+    for (int i = 0; i < count; ++i)
+      component_names_.push_back(count == 1 ? spec.name : fmt::format("{}[{}]", spec.name, i));
+  }
+}
+
+void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shape_index, int& count) {
+  const Shape& shape = scene_.shapes[shape_index];
+  motion.type = spec.type;
+  motion.direction_kind = spec.direction_kind;
+  motion.direction = spec.type == ParameterType::rotation ? normalize(spec.axis) : spec.direction;
+  motion.pivot = spec.pivot;
+  const int selected = select(spec, scene_, shape, motion.slot);
+  if (spec.type != ParameterType::vertices) return;
+  count = spec.direction_kind == VertexDirection::free ? 3 * selected : selected;
+  if (spec.direction_kind != VertexDirection::normal) return;
+  const std::vector<Vec3> sums = vertex_normals(scene_, shape);
+  motion.normals.resize(selected);
+  for (int v = 0; v < shape.vertex_count; ++v) {
+    if (motion.slot[v] < 0) continue;
+    const double norm = length(sums[v]);
+    if (!(norm > 0))
+      spec.fail("direction", fmt::format("vertex {} of shape '{}' has no normal", v, shape.name),
+                "leave it out by selection");
+    motion.normals[motion.slot[v]] = sums[v] / norm;
+  }
+}
+
+void Parameters::bind_values(const ParameterSpec& spec, int count) {
+  const auto expand = [&](const std::vector<double>& values, const char* key, double missing, auto& into) {
+    if (values.size() > 1 && static_cast<int>(values.size()) != count)
+      spec.fail(key, fmt::format("{} values are given", values.size()), count == 1 ? "1" : fmt::format("1 or {}", count));
+    for (int i = 0; i < count; ++i)
+      into.push_back(values.empty() ? missing : values.size() == 1 ? values[0] : values[i]);
+  };
+  double lowest = -kInfinity, highest = kInfinity;
+  if (spec.type == ParameterType::albedo) lowest = kLeastAlbedo, highest = 1;
+  if (spec.type == ParameterType::roughness) lowest = kLeastRoughness, highest = 1;
+  if (spec.type == ParameterType::emission) {
+    const double largest = *std::max_element(spec.initial.begin(), spec.initial.end());
+    if (!(largest > 0)) spec.fail("initial", "is no emission", "a number above 0");
+    lowest = kLeastRelativeEmission * largest;
+  }
+  const std::size_t first = initial_.size();
+  expand(spec.initial, "initial", kUnknown, initial_);
+  expand(spec.target, "target", kUnknown, target_);
+  expand(spec.lower, "lower", lowest, lower_);
+  expand(spec.upper, "upper", highest, upper_);
+  for (std::size_t i = first; i < initial_.size(); ++i) {
+    lower_[i] = std::max(lower_[i], lowest);
+    upper_[i] = std::min(upper_[i], highest);
+    if (!(lower_[i] < upper_[i]))
+      spec.fail(spec.where.contains("lower") ? "lower" : "upper", "leaves no value to choose",
+                fmt::format("lower below upper, within {} to {}", lowest, highest));
+    const auto check = [&](double value, const char* key) {
+      if (value < lower_[i] || value > upper_[i])
+        spec.fail(key, fmt::format("{} is out of bounds", value), fmt::format("{} to {}", lower_[i], upper_[i]));
+    };
+    check(initial_[i], "initial");
+    check(target_[i], "target");  // NaN, where unknown, passes
+  }
+}
+
+bool Parameters::target_known() const {
+  return std::none_of(target_.begin(), target_.end(), [](double value) { return std::isnan(value); });
+}
+
+Vec3 Parameters::move(int shape_index, int v, const std::vector<double>& theta, std::vector<Moved>* tangent) const {
+  Vec3 p = scene_.positions[scene_.shapes[shape_index].first_vertex + v];
+  for (const Motion& motion : motions_[shape_index]) {
+    const int slot = motion.slot[v];
+    if (slot < 0) continue;
+    const auto add = [&](int column, const Vec3& direction) {
+      p += theta[column] * direction;
+      if (tangent) tangent->push_back({column, direction});
+    };
+    if (motion.type == ParameterType::translation) {
+      add(motion.first_component, motion.direction);
+    } else if (motion.type == ParameterType::rotation) {
+      const double radians = theta[motion.first_component] * kDegree;
+      p = motion.pivot + rotate(p - motion.pivot, motion.direction, radians);
+      if (tangent) {
+        for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, motion.direction, radians);
+        tangent->push_back({motion.first_component, kDegree * cross(motion.direction, p - motion.pivot)});
+      }
+    } else if (motion.direction_kind == VertexDirection::free) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3 unit;
+        unit[axis] = 1;
+        add(motion.first_component + 3 * slot + axis, unit);
+      }
+    } else {
+      const bool normal = motion.direction_kind == VertexDirection::normal;
+      add(motion.first_component + slot, normal ? motion.normals[slot] : motion.direction);
+    }
+  }
+  return p;
+}
+
+Scene Parameters::apply(const std::vector<double>& theta) const {
+  Scene scene = scene_;
+  for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
+    if (motions_[s].empty()) continue;
+    const Shape& shape = scene.shapes[s];
+    for (int v = 0; v < shape.vertex_count; ++v)
+      scene.positions[shape.first_vertex + v] = move(static_cast<int>(s), v, theta, nullptr);
+  }
+  for (const MaterialValue& value : material_values_) {
+    const double* t = theta.data() + value.first_component;
+    const Rgb colour = value.count == 1 ? Rgb(t[0]) : Rgb(t[0], t[1], t[2]);
+    if (value.type == ParameterType::albedo) scene.materials[value.index].albedo = colour;
+    if (value.type == ParameterType::roughness) scene.materials[value.index].roughness = t[0];
+    if (value.type == ParameterType::emission) scene.shapes[value.index].emission = colour;
+  }
+  return scene;
+}
+
+TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
+  const DofLayout layout(scene_);
+  TangentBasis basis;
+  basis.columns = size();
+  basis.row_begin.assign(layout.size() + 1, 0);
+  // Rows come in the order of DofLayout: vertices shape by shape, then materials, then emissions.
+  const auto end_row = [&](int dof) { basis.row_begin[dof + 1] = static_cast<int>(basis.entries.size()); };
+  std::vector<int> shape_of(layout.vertices, -1);
+  for (std::size_t s = 0; s < scene_.shapes.size(); ++s) {
+    const Shape& shape = scene_.shapes[s];
+    std::fill_n(shape_of.begin() + shape.first_vertex, shape.vertex_count, static_cast<int>(s));
+  }
+  std::vector<Moved> moved;
+  for (int v = 0; v < layout.vertices; ++v) {
+    moved.clear();
+    const int s = shape_of[v];
+    if (s >= 0 && !motions_[s].empty()) move(s, v - scene_.shapes[s].first_vertex, theta, &moved);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const Moved& entry : moved)
+        if (entry.velocity[axis] != 0) basis.entries.push_back({entry.column, entry.velocity[axis]});
+      end_row(layout.vertex(v, axis));
+    }
+  }
+  std::vector<int> column_of(layout.size() - 3 * layout.vertices, -1);
+  const auto set = [&](int dof, int column) { column_of[dof - 3 * layout.vertices] = column; };
+  for (const MaterialValue& value : material_values_) {
+    for (int channel = 0; channel < 3; ++channel) {
+      const int column = value.first_component + (value.count == 3 ? channel : 0);
+      if (value.type == ParameterType::albedo) set(layout.albedo(value.index, channel), column);
+      if (value.type == ParameterType::emission) set(layout.emission(value.index, channel), column);
+    }
+    if (value.type == ParameterType::roughness) set(layout.roughness(value.index), value.first_component);
+  }
+  for (std::size_t i = 0; i < column_of.size(); ++i) {
+    if (column_of[i] >= 0) basis.entries.push_back({column_of[i], 1.0});
+    end_row(3 * layout.vertices + static_cast<int>(i));
+  }
+  return basis;
+}
+
+std::vector<double> Parameters::parse_point(const std::string& text) const {
+  std::vector<double> theta = initial_;
+  std::size_t begin = 0;
+  for (bool first = true; begin <= text.size(); first = false) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const std::string item = text.substr(begin, end - begin);
+    begin = end + 1;
+    if (first && item == "initial") continue;
+    if (first && item == "target") {
+      if (!target_known()) throw InputError("--at target: the experiment gives no target values for its parameters");
+      theta = target_;
+      continue;
+    }
+    const std::size_t equals = item.find('=');
+    const std::string key = item.substr(0, equals);
+    if (equals == std::string::npos)
+      throw InputError(fmt::format("--at {}: allowed: initial, target or NAME=VALUE[,NAME=VALUE...]", item));
+    const std::string number = item.substr(equals + 1);
+    char* stop = nullptr;
+    const double value = std::strtod(number.c_str(), &stop);
+    if (number.empty() || *stop != '\0' || !std::isfinite(value))
+      throw InputError(fmt::format("--at {}: '{}' is not a finite number", key, number));
+    int from = -1, count = 1;
+    for (const Block& block : blocks_)
+      if (block.name == key) from = block.begin, count = block.count;
+    const auto component = std::find(component_names_.begin(), component_names_.end(), key);
+    if (component != component_names_.end()) from = static_cast<int>(component - component_names_.begin());
+    if (from < 0) throw InputError(fmt::format("--at {}: no such parameter; allowed: {}", key, names_of(blocks_)));
+    for (int i = from; i < from + count; ++i) {
+      if (value < lower_[i] || value > upper_[i])
+        throw InputError(
+            fmt::format("--at {}: {} is out of bounds; allowed: {} to {}", key, value, lower_[i], upper_[i]));
+      theta[i] = value;
+    }
+  }
+  return theta;
+}
+
+}  // namespace isochron

@@ -1,0 +1,100 @@
+// An experiment made ready: scene, gates and parameters, and what the optimiser asks of them.
+#pragma once
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "core/gates/gate.h"
+#include "core/image/image.h"
+#include "core/render/renderer.h"
+#include "core/scene/scene.h"
+#include "optim/experiment.h"
+#include "optim/parameters.h"
+
+namespace isochron {
+
+/// Random streams (Stream::pass). Each estimate has its own, so that residual and derivative are independent.
+enum class Pass : std::uint32_t {
+  primal = 0,
+  interior = 1,
+  visibility = 2,
+  path_length = 3,
+  target = 4,
+  finite_difference = 5
+};
+
+/// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.
+struct Share {
+  int index = 0, parts = 1;
+  SampleRange of(int samples) const {
+    const auto cut = [&](int i) { return static_cast<int>(static_cast<long long>(samples) * i / parts); };
+    return {cut(index), cut(index + 1)};
+  }
+};
+
+/// Called between the passes of an estimate. May throw to abandon it (see Interrupted).
+using Poll = std::function<void()>;
+
+/// Thrown by a Poll after the user asked to stop.
+struct Interrupted {};
+
+struct Evaluation {
+  GatedImage image;
+  double loss = 0;               ///< mean squared error
+  std::vector<double> gradient;  ///< of the loss, one per scalar unknown
+};
+
+class Problem {
+ public:
+  /// Loads the scene and binds the parameters. Throws InputError.
+  explicit Problem(Experiment experiment);
+
+  const Experiment& experiment() const { return experiment_; }
+  const Scene& scene() const { return scene_; }
+  const GateSet& gates() const { return gates_; }
+  const Parameters& parameters() const { return *parameters_; }
+
+  Stream stream(Pass pass, std::uint32_t iteration = 0) const { return {experiment_.seed, iteration, pass_number(pass)}; }
+
+  /// Gated images at theta.
+  GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
+
+  /// The images that the optimisation aims at: rendered at the target values or read from a file. Throws InputError
+  /// when the file's shape is not that of this experiment's images.
+  GatedImage make_target(const Poll& poll) const;
+  /// Reads a target image and checks its shape against this experiment's.
+  GatedImage read_target(const std::string& file) const;
+
+  /// Image, loss and gradient at theta from the random numbers of one iteration. Unbiased for image and gradient (the
+  /// loss has the variance of the image added to it).
+  Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
+                      const Poll& poll, Share share = {}) const;
+
+  /// Central difference of the images along one unknown with common random numbers. Where theta +- step leaves the
+  /// bounds, the difference is taken between the bound and the other side.
+  GatedImage finite_difference(const std::vector<double>& theta, int component, const Stream& stream,
+                               SampleRange range) const;
+
+ private:
+  static std::uint32_t pass_number(Pass pass) { return static_cast<std::uint32_t>(pass); }
+
+  Experiment experiment_;
+  Scene scene_;
+  GateSet gates_;
+  std::unique_ptr<Parameters> parameters_;
+};
+
+Pass pass_of(Term term);
+
+/// Average of images weighted by their samples.
+class ImageMean {
+ public:
+  void add(const GatedImage& image, int samples);
+  GatedImage mean() const;
+
+ private:
+  GatedImage sum_;
+  long long samples_ = 0;
+};
+
+}  // namespace isochron
