@@ -1,0 +1,124 @@
+#include "core/scene/mesh.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+#include <tuple>
+
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+std::string show(const Vec3& p) { return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z); }
+
+/// For each vertex the first one at the same position.
+std::vector<int> first_at_position(const std::vector<Vec3>& positions) {
+  std::vector<int> order(positions.size());
+  std::iota(order.begin(), order.end(), 0);
+  // Comparing doubles takes 0 and -0 for equal, as wanted.
+  const auto key = [&](int v) { return std::tie(positions[v].x, positions[v].y, positions[v].z); };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b) || (key(a) == key(b) && a < b); });
+  std::vector<int> first(positions.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool repeated = i > 0 && key(order[i]) == key(order[i - 1]);
+    first[order[i]] = repeated ? first[order[i - 1]] : order[i];
+  }
+  return first;
+}
+
+/// Marks repetitions of earlier faces.
+std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces, const std::vector<Vec3>& positions) {
+  struct Key {
+    std::array<int, 3> corners;  // ascending
+    int face;
+    bool even;  // the face runs through its corners in ascending cyclic order
+  };
+  std::vector<Key> keys(faces.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    std::array<int, 3> c = faces[f];
+    std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
+    const bool even = c[1] < c[2];
+    if (!even) std::swap(c[1], c[2]);
+    keys[f] = {c, static_cast<int>(f), even};
+  }
+  std::sort(keys.begin(), keys.end(),
+            [](const Key& a, const Key& b) { return std::tie(a.corners, a.face) < std::tie(b.corners, b.face); });
+  std::vector<bool> repeated(faces.size(), false);
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].corners != keys[i - 1].corners) continue;
+    if (keys[i].even != keys[i - 1].even)
+      throw InputError(fmt::format("two faces with corners {} {} {} lie back to back (one face, and two_sided in its "
+                                   "material, is allowed)", show(positions[keys[i].corners[0]]),
+                                   show(positions[keys[i].corners[1]]), show(positions[keys[i].corners[2]])));
+    repeated[keys[i].face] = true;
+  }
+  return repeated;
+}
+
+}  // namespace
+
+Mesh clean_mesh(const Mesh& mesh) {
+  const std::vector<int> first = first_at_position(mesh.positions);
+  std::vector<std::array<int, 3>> faces;
+  faces.reserve(mesh.faces.size());
+  for (const auto& face : mesh.faces) {
+    const std::array<int, 3> f{first[face[0]], first[face[1]], first[face[2]]};
+    if (f[0] == f[1] || f[1] == f[2] || f[2] == f[0]) continue;
+    const Vec3& a = mesh.positions[f[0]];
+    if (cross(mesh.positions[f[1]] - a, mesh.positions[f[2]] - a) == Vec3{}) continue;
+    faces.push_back(f);
+  }
+  const std::vector<bool> repeated = repeated_faces(faces, mesh.positions);
+
+  Mesh clean;
+  std::vector<int> number(mesh.positions.size(), -1);
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    if (repeated[f]) continue;
+    clean.faces.push_back(faces[f]);
+    for (const int v : faces[f]) number[v] = 0;
+  }
+  if (clean.faces.empty()) throw InputError("has no face with an area");
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (number[v] < 0) continue;
+    number[v] = static_cast<int>(clean.positions.size());
+    clean.positions.push_back(mesh.positions[v] + Vec3{});  // -0 + 0 = 0
+  }
+  for (auto& face : clean.faces) {
+    for (int& v : face) v = number[v];
+  }
+  return clean;
+}
+
+std::vector<Edge> build_edges(const Mesh& mesh) {
+  struct Side {
+    std::uint64_t edge;  // smaller vertex in the upper half
+    int face;
+  };
+  std::vector<Side> sides;
+  sides.reserve(3 * mesh.faces.size());
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax({mesh.faces[f][k], mesh.faces[f][(k + 1) % 3]});
+      sides.push_back({static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint64_t>(high), static_cast<int>(f)});
+    }
+  }
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return std::tie(a.edge, a.face) < std::tie(b.edge, b.face); });
+
+  std::vector<Edge> edges;
+  edges.reserve(sides.size() / 2);
+  for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
+    while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
+    const int low = static_cast<int>(sides[i].edge >> 32), high = static_cast<int>(sides[i].edge & 0xffffffffu);
+    if (end - i > 2)
+      throw InputError(fmt::format("the edge from {} to {} has {} faces (at most two are allowed)",
+                                   show(mesh.positions[low]), show(mesh.positions[high]), end - i));
+    edges.push_back({{low, high}, {sides[i].face, end - i == 2 ? sides[i + 1].face : -1}});
+  }
+  return edges;
+}
+
+}  // namespace isochron

@@ -1,0 +1,28 @@
+#include "core/scene/scene.h"
+
+namespace isochron {
+namespace {
+
+template <class T>
+int find_name(const std::vector<T>& items, const std::string& name) {
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (items[i].name == name) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+}  // namespace
+
+int Scene::find_shape(const std::string& name) const { return find_name(shapes, name); }
+int Scene::find_material(const std::string& name) const { return find_name(materials, name); }
+
+std::vector<double> TangentBasis::transpose_apply(const std::vector<double>& dof_gradient) const {
+  std::vector<double> gradient(columns, 0.0);
+  for (std::size_t row = 0; row < dof_gradient.size(); ++row) {
+    for (int e = row_begin[row]; e < row_begin[row + 1]; ++e)
+      gradient[entries[e].column] += entries[e].coefficient * dof_gradient[row];
+  }
+  return gradient;
+}
+
+}  // namespace isochron
