@@ -1,0 +1,231 @@
+#include "core/render/renderer.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <atomic>
+#include <stdexcept>
+
+#include "core/render/ellipsoidal.h"
+#include "core/render/primary_boundary.h"
+#include "core/render/secondary_boundary.h"
+
+namespace isochron {
+namespace {
+
+int thread_count = 0;
+
+/// Work is cut into strands, each worked through in order with accumulators of its own, and merged in order: results
+/// do not depend on which thread takes which strand. Their number depends on the accumulators' size alone.
+constexpr int kMostStrands = 32, kFewestStrands = 8;
+constexpr std::size_t kStrandBudget = std::size_t{512} << 20;  // bytes, all strands together
+constexpr int kPixelsPerBlock = 8;
+
+int strand_count(std::size_t accumulator_doubles) {
+  const std::size_t fitting = kStrandBudget / (sizeof(double) * std::max<std::size_t>(accumulator_doubles, 1));
+  return static_cast<int>(std::clamp<std::size_t>(fitting, kFewestStrands, kMostStrands));
+}
+
+template <class F>
+void parallel(int count, F&& f) {
+  tbb::task_arena arena(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, count, 1),
+        [&](const tbb::blocked_range<int>& range) {
+          for (int i = range.begin(); i < range.end(); ++i) f(i);
+        },
+        tbb::simple_partitioner());
+  });
+}
+
+/// sum[i] += parts[0][i] + parts[1][i] + ... in that order.
+void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum) {
+  constexpr int kChunk = 1 << 14;
+  const int size = static_cast<int>(sum.size());
+  parallel((size + kChunk - 1) / kChunk, [&](int chunk) {
+    const int end = std::min(size, (chunk + 1) * kChunk);
+    for (const auto& part : parts)
+      for (int i = chunk * kChunk; i < end; ++i) sum[i] += part[i];
+  });
+}
+
+}  // namespace
+
+void set_thread_count(int threads) { thread_count = threads; }
+
+const char* name(Term term) {
+  switch (term) {
+    case Term::interior: return "interior";
+    case Term::visibility: return "visibility";
+    case Term::path_length: return "path_length";
+  }
+  return "";
+}
+
+struct Renderer::Impl {
+  const GateSet& gates;
+  EstimatorOptions options;
+  const TangentBasis* basis;
+  PreparedScene scene;
+  BoundaryEdges edges;
+  bool ellipsoidal = false;
+  mutable std::atomic<long long> rays{0};
+
+  Impl(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent)
+      : gates(gate_set), options(estimator), basis(tangent), scene(source, tangent), edges(scene) {
+    ellipsoidal = options.sampling == Sampling::ellipsoidal;
+    if (options.sampling == Sampling::automatic) {
+      // Narrow gates: below this share of the path length, standard sampling throws too many paths away.
+      constexpr double kNarrow = 0.02;
+      double sum = 0;
+      for (int g = 0; g < gates.size(); ++g) sum += gates.center(g);
+      ellipsoidal = gates.shape().width() < kNarrow * sum / gates.size();
+    }
+    if (gates.shape().is_steady()) ellipsoidal = false;
+  }
+
+  GatedImage blank() const {
+    return GatedImage(scene.camera.width, scene.camera.height, gates.size(), scene.scene.grey ? 1 : 3);
+  }
+
+  /// Runs sample(pixel, rng) for the pixels of one strand and all samples of the range, in a fixed order.
+  template <class F>
+  void for_each_sample(int strand, int strands, const Stream& stream, SampleRange range, F&& sample) const {
+    const int pixels = scene.camera.pixels();
+    for (int block = strand * kPixelsPerBlock; block < pixels; block += strands * kPixelsPerBlock)
+      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel)
+        for (int s = range.begin; s < range.end; ++s) {
+          Rng rng(stream, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(s));
+          sample(pixel, rng);
+        }
+  }
+
+  void run_primal(Worker<PrimalSink>& worker, int strand, int strands, const Stream& stream, SampleRange range) const {
+    const double scale = 1.0 / range.count();
+    if (ellipsoidal) {
+      GatePass pass;
+      pass.value = true;
+      EllipsoidalConnections connections(worker, pass);
+      for_each_sample(strand, strands, stream, range,
+                      [&](int pixel, Rng& rng) { connections.sample(pixel, scale, rng); });
+    } else {
+      for_each_sample(strand, strands, stream, range,
+                      [&](int pixel, Rng& rng) { sample_standard(worker, pixel, scale, rng); });
+    }
+    rays += worker.rays;
+  }
+
+  /// Whether the term can be other than zero, so that a pass over it is worth while.
+  bool has(Term term) const {
+    if (!scene.moving.any) return false;
+    if (term == Term::interior) return true;
+    if (term == Term::visibility) return scene.moving.geometry;
+    return scene.moving.geometry && gates.shape().pair_mass(jump_part()) > 0;
+  }
+  PairPart jump_part() const { return ellipsoidal ? PairPart::jumps : PairPart::atoms; }
+
+  template <class Sink>
+  void run_term(Term term, Worker<Sink>& worker, int strand, int strands, const Stream& stream,
+                SampleRange range) const {
+    const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
+    if (term == Term::interior && !ellipsoidal) {
+      for_each_sample(strand, strands, stream, range,
+                      [&](int pixel, Rng& rng) { sample_standard(worker, pixel, scale, rng); });
+    } else if (term == Term::visibility) {
+      SecondaryBoundary secondary(worker, edges);
+      for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
+        if (edges.has_primary()) sample_primary_boundary(worker, edges, splat_scale, rng);
+        secondary.sample_from_edge(splat_scale, rng);
+        secondary.sample_from_camera(pixel, scale, rng);
+      });
+    } else {
+      GatePass pass;
+      pass.coupled = options.antithetic;
+      if (term == Term::interior) {
+        pass.value = true;
+        pass.use = options.antithetic ? GateUse::value : GateUse::value_and_slope;
+        pass.pairs = options.antithetic && scene.moving.geometry;
+        pass.part = PairPart::smooth;
+      } else {
+        pass.pairs = true;
+        pass.part = jump_part();
+      }
+      EllipsoidalConnections connections(worker, pass);
+      for_each_sample(strand, strands, stream, range,
+                      [&](int pixel, Rng& rng) { connections.sample(pixel, scale, rng); });
+    }
+    rays += worker.rays;
+  }
+};
+
+Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
+                   const TangentBasis* basis)
+    : impl_(std::make_unique<Impl>(scene, gates, options, basis)) {}
+Renderer::~Renderer() = default;
+
+Sampling Renderer::sampling() const { return impl_->ellipsoidal ? Sampling::ellipsoidal : Sampling::standard; }
+long long Renderer::rays() const { return impl_->rays; }
+
+GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
+  GatedImage image = impl_->blank();
+  // Standard sampling adds to a path's own pixel alone, so that strands can share the image.
+  const bool shared = !impl_->ellipsoidal;
+  const int strands = shared ? kMostStrands : strand_count(image.data.size());
+  std::vector<std::vector<double>> films(shared ? 0 : strands);
+  parallel(strands, [&](int strand) {
+    GatedImage own;
+    if (!shared) own = impl_->blank();
+    Worker worker(impl_->scene, impl_->gates, impl_->options, PrimalSink(impl_->gates, shared ? image : own));
+    impl_->run_primal(worker, strand, strands, stream, range);
+    if (!shared) films[strand] = std::move(own.data);
+  });
+  if (!shared) merge(films, image.data);
+  return image;
+}
+
+std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, SampleRange range) const {
+  if (!impl_->basis) throw std::logic_error("derive: the renderer was made without a tangent basis");
+  const int columns = impl_->basis->columns;
+  std::vector<GatedImage> images(columns, impl_->blank());
+  if (!impl_->has(term) || columns == 0) return images;
+  const int strands = strand_count(images[0].data.size() * columns);
+  std::vector<std::vector<std::vector<double>>> films(columns, std::vector<std::vector<double>>(strands));
+  parallel(strands, [&](int strand) {
+    std::vector<GatedImage> own(columns, impl_->blank());
+    Worker worker(impl_->scene, impl_->gates, impl_->options,
+                  TangentSink(impl_->gates, impl_->scene.layout, *impl_->basis, own));
+    impl_->run_term(term, worker, strand, strands, stream, range);
+    for (int column = 0; column < columns; ++column) films[column][strand] = std::move(own[column].data);
+  });
+  for (int column = 0; column < columns; ++column) merge(films[column], images[column].data);
+  return images;
+}
+
+void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
+                            std::vector<double>& dof_gradient) const {
+  if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
+  if (!impl_->has(term)) return;
+  std::vector<int> active(impl_->scene.layout.size(), -1);
+  std::vector<int> dofs;
+  for (int dof = 0; dof < impl_->scene.layout.size(); ++dof)
+    if (impl_->basis->moves(dof)) {
+      active[dof] = static_cast<int>(dofs.size());
+      dofs.push_back(dof);
+    }
+  const int strands = strand_count(dofs.size());
+  std::vector<std::vector<double>> gradients(strands);
+  parallel(strands, [&](int strand) {
+    std::vector<double> own(dofs.size(), 0.0);
+    Worker worker(impl_->scene, impl_->gates, impl_->options,
+                  AdjointSink(impl_->gates, impl_->scene.layout, active, adjoint, own));
+    impl_->run_term(term, worker, strand, strands, stream, range);
+    gradients[strand] = std::move(own);
+  });
+  std::vector<double> sum(dofs.size(), 0.0);
+  merge(gradients, sum);
+  for (std::size_t i = 0; i < dofs.size(); ++i) dof_gradient[dofs[i]] += sum[i];
+}
+
+}  // namespace isochron
