@@ -1,7 +1,7 @@
 """Triangle meshes for the scenes of this repository: small solids, transforms and an OBJ writer.
 
-A mesh is a pair (vertices: float array n x 3, triangles: int array m x 3); triangles are counter-clockwise seen from
-the side that the normal points to. y is up.
+A mesh is a pair (vertices: float array n x 3, triangles: int array m x 3); triangles are counter-clockwise seen
+from the side that the normal points to. y is up.
 """
 
 import numpy as np

@@ -1,0 +1,143 @@
+"""A small reader and writer of OpenEXR files: single-part scanline images, NO, ZIPS or ZIP compression.
+
+Follows the file layout of the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit floats; halves and
+32-bit integers are read too.
+"""
+
+import struct
+import zlib
+
+import numpy as np
+
+MAGIC = 20000630
+SAMPLE_TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+LINES_PER_BLOCK = {0: 1, 2: 1, 3: 16}  # by compression: none, ZIPS, ZIP
+
+
+class ExrError(Exception):
+    """The file is no EXR, is damaged, or uses what this reader leaves out."""
+
+
+def _text(data, position):
+    end = data.index(b"\0", position)
+    return data[position:end].decode("utf-8"), end + 1
+
+
+def _header(data):
+    """Attributes by name, as bytes, and the position after them."""
+    if len(data) < 8 or struct.unpack_from("<I", data)[0] != MAGIC:
+        raise ExrError("not an OpenEXR file")
+    version = struct.unpack_from("<I", data, 4)[0]
+    if version & 0x1A00:
+        raise ExrError("tiled, deep and multi-part files are not supported")
+    attributes, position = {}, 8
+    while data[position] != 0:
+        name, position = _text(data, position)
+        _, position = _text(data, position)
+        size = struct.unpack_from("<i", data, position)[0]
+        attributes[name] = data[position + 4 : position + 4 + size]
+        position += 4 + size
+    return attributes, position + 1
+
+
+def _channels(attribute):
+    """(name, sample type) of every channel, in the order in which they are stored."""
+    channels, position = [], 0
+    while attribute[position] != 0:
+        name, position = _text(attribute, position)
+        kind, _, sampling_x, sampling_y = struct.unpack_from("<iiii", attribute, position)
+        if kind not in SAMPLE_TYPES or (sampling_x, sampling_y) != (1, 1):
+            raise ExrError(f"channel {name}: unsupported sample type or subsampling")
+        channels.append((name, SAMPLE_TYPES[kind]))
+        position += 16
+    return channels
+
+
+def _inflate(block, size):
+    """Undoes zlib, then the byte differences, then the split into even and odd bytes."""
+    raw = np.frombuffer(zlib.decompress(block), dtype=np.uint8)
+    if len(raw) != size:
+        raise ExrError("a block of pixels has the wrong size")
+    # Each byte is stored as its difference from the one before, plus 128.
+    raw = np.cumsum(raw, dtype=np.uint8)
+    raw[1::2] += 128
+    half = (size + 1) // 2
+    out = np.empty(size, dtype=np.uint8)
+    out[0::2], out[1::2] = raw[:half], raw[half:]
+    return out.tobytes()
+
+
+def _parse(data):
+    attributes, position = _header(data)
+    channels = _channels(attributes["channels"])
+    compression = attributes["compression"][0]
+    if compression not in LINES_PER_BLOCK:
+        raise ExrError(f"compression {compression} is not supported; allowed: none, ZIPS, ZIP")
+    x0, y0, x1, y1 = struct.unpack("<iiii", attributes["dataWindow"])
+    width, height = x1 - x0 + 1, y1 - y0 + 1
+    step = LINES_PER_BLOCK[compression]
+    blocks = -(-height // step)
+    bytes_per_line = width * sum(kind.itemsize for _, kind in channels)
+    images = {name: np.empty((height, width), dtype=kind.newbyteorder("=")) for name, kind in channels}
+    for start in struct.unpack_from(f"<{blocks}Q", data, position):
+        y, size = struct.unpack_from("<ii", data, start)
+        row = y - y0
+        if not 0 <= row < height:
+            raise ExrError("a block of pixels lies outside the image")
+        lines = min(step, height - row)
+        block = data[start + 8 : start + 8 + size]
+        # A block that compression would have made larger is stored as it is.
+        if compression and size < lines * bytes_per_line:
+            block = _inflate(block, lines * bytes_per_line)
+        at = 0
+        for line in range(lines):
+            for name, kind in channels:
+                images[name][row + line] = np.frombuffer(block, kind, width, at)
+                at += width * kind.itemsize
+    return images
+
+
+def read(path):
+    """All channels of the file: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
+    with open(path, "rb") as file:
+        data = file.read()
+    try:
+        return _parse(data)
+    except (IndexError, KeyError, ValueError, struct.error, zlib.error) as error:
+        raise ExrError(f"damaged file ({error})") from error
+
+
+def write(path, images):
+    """Writes name -> array of height x width as 32-bit floats with ZIPS compression."""
+    names = sorted(images)
+    height, width = np.shape(images[names[0]])
+    window = struct.pack("<iiii", 0, 0, width - 1, height - 1)
+    channels = b"".join(n.encode() + b"\0" + struct.pack("<iiii", 2, 0, 1, 1) for n in names) + b"\0"
+    attributes = [
+        ("channels", "chlist", channels),
+        ("compression", "compression", b"\2"),
+        ("dataWindow", "box2i", window),
+        ("displayWindow", "box2i", window),
+        ("lineOrder", "lineOrder", b"\0"),
+        ("pixelAspectRatio", "float", struct.pack("<f", 1)),
+        ("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0)),
+        ("screenWindowWidth", "float", struct.pack("<f", 1)),
+    ]
+    # Version 2; the flag allows names longer than 31 characters.
+    out = bytearray(struct.pack("<II", MAGIC, 2 | (0x400 if max(map(len, names)) > 31 else 0)))
+    for name, kind, value in attributes:
+        out += name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(value)) + value
+    out += b"\0"
+    stack = np.stack([np.asarray(images[n], dtype="<f4") for n in names])
+    blocks = []
+    for y in range(height):
+        raw = np.frombuffer(np.ascontiguousarray(stack[:, y]).tobytes(), dtype=np.uint8)
+        split = np.concatenate([raw[0::2], raw[1::2]])
+        split[1:] = np.diff(split) + np.uint8(128)
+        packed = zlib.compress(split.tobytes())
+        packed = packed if len(packed) < len(raw) else raw.tobytes()
+        blocks.append(struct.pack("<ii", y, len(packed)) + packed)
+    starts = len(out) + 8 * height + np.cumsum([0] + [len(b) for b in blocks[:-1]])
+    out += starts.astype("<u8").tobytes() + b"".join(blocks)
+    with open(path, "wb") as file:
+        file.write(out)

@@ -1,0 +1,75 @@
+#!/usr/bin/python3
+"""scripts/exr.py against files written by OpenEXR, and its writer against its reader.
+
+usage: exr_test.py PROGRAM     PROGRAM: the built write_exr_samples
+"""
+
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
+import exr
+import numpy as np
+
+NAMES = ["gate000.Y", "interior.gate001.Y", "path_length.gate010.with.a.long.name.Y"]
+WIDTH, HEIGHT = 21, 37
+
+
+def pixels(smooth, channel):
+    """The same formulas stand in write_exr_samples.cpp."""
+    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
+    if smooth:
+        return ((channel + 1) * (x / 4 - y)).astype(np.float32)
+    index = ((channel * HEIGHT + y) * WIDTH + x).astype(np.uint64)
+    bits = (index * 2654435761 & 0xBF7FFFFF).astype(np.uint32)
+    return bits.view(np.float32)
+
+
+class ExrTest(unittest.TestCase):
+    program = ""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def assert_same_bits(self, actual, expected):
+        np.testing.assert_array_equal(actual.view(np.uint32), expected.view(np.uint32))
+
+    def test_reads_what_openexr_writes(self):
+        subprocess.run([self.program, str(self.folder)], check=True)
+        for compression in ("none", "zips", "zip"):
+            for kind in ("smooth", "rough"):
+                with self.subTest(compression=compression, kind=kind):
+                    images = exr.read(self.folder / f"{compression}_{kind}.exr")
+                    self.assertEqual(sorted(images), NAMES)
+                    for channel, name in enumerate(NAMES):
+                        self.assert_same_bits(images[name], pixels(kind == "smooth", channel))
+
+    def test_reads_what_it_writes(self):
+        for smooth in (True, False):
+            images = {name: pixels(smooth, channel) for channel, name in enumerate(NAMES)}
+            exr.write(self.folder / "own.exr", images)
+            back = exr.read(self.folder / "own.exr")
+            for name in NAMES:
+                self.assert_same_bits(back[name], images[name])
+
+    def test_says_what_is_wrong(self):
+        path = self.folder / "bad.exr"
+        path.write_bytes(b"no image at all")
+        with self.assertRaisesRegex(exr.ExrError, "not an OpenEXR file"):
+            exr.read(path)
+        exr.write(path, {"gate000.Y": pixels(False, 0)})
+        whole = path.read_bytes()
+        for length in range(8, len(whole), 97):
+            path.write_bytes(whole[:length])
+            with self.assertRaisesRegex(exr.ExrError, "damaged"):
+                exr.read(path)
+
+
+if __name__ == "__main__":
+    ExrTest.program = sys.argv.pop(1)
+    unittest.main()
