@@ -1,7 +1,7 @@
 """A small reader and writer of OpenEXR files: single-part scanline images, NO, ZIPS or ZIP compression.
 
-Follows the file layout of the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit floats; halves and
-32-bit integers are read too.
+Follows the file layout of the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit floats; halves
+and 32-bit integers are read too.
 """
 
 import struct
@@ -98,7 +98,7 @@ def _parse(data):
 
 
 def read(path):
-    """All channels of the file: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
+    """All channels: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
     with open(path, "rb") as file:
         data = file.read()
     try:

@@ -24,7 +24,7 @@ import exr
 CHANNEL = re.compile(r"(?:(?P<component>.+)\.)?gate(?P<gate>\d+)\.(?P<channel>[RGBY])")
 COMPONENTS = ["total", "interior", "visibility", "path_length"]
 RUN_IMAGES = ["target", "initial", "final"]  # share one scale, to be compared
-PERCENTILE = 99.5  # of the non-zero values: the end of the colour scale; a few outliers must not darken all else
+PERCENTILE = 99.5  # of the non-zero values: the end of the colour scale; outliers must not darken the rest
 NON_FINITE = "magenta"
 
 
@@ -85,7 +85,8 @@ def read_stack(path):
             raise PlotError(f"{path}: incomplete gates or channels")
         if len({len(l) for l in layers}) != 1:
             raise PlotError(f"{path}: grey and colour gates in one file")
-        out[component] = np.stack([l["Y"] if "Y" in l else np.stack([l[c] for c in "RGB"], -1) for l in layers])
+        grey = "Y" in layers[0]
+        out[component] = np.stack([l["Y"] if grey else np.stack([l[c] for c in "RGB"], -1) for l in layers])
     return out
 
 
@@ -110,8 +111,8 @@ def srgb(x):
 
 
 class Grid:
-    """A figure of equal cells below a title, with room at the left for row names and at the right for a colour bar.
-    All lengths in inches."""
+    """A figure of equal cells below a title, with room at the left for row names and at the right for a colour
+    bar. All lengths in inches."""
 
     TOP, BOTTOM, RIGHT, TITLE, GAP = 0.5, 0.15, 1.05, 0.24, 0.08
 
@@ -153,11 +154,12 @@ class Grid:
 
 def label_cell(axes, text, image):
     bad = np.count_nonzero(~np.isfinite(image))
-    axes.set_title(text + (f" ({bad} not finite)" if bad else ""), fontsize=8, pad=3, color="red" if bad else "black")
+    text += f" ({bad} not finite)" if bad else ""
+    axes.set_title(text, fontsize=8, pad=3, color="red" if bad else "black")
 
 
 def plot_images(path, stack, scale, labels):
-    """The gated images of one file: false colour for grey scenes; for RGB scenes, colours under one exposure."""
+    """The gated images of one file: grey scenes in false colour, RGB scenes in their own, under one exposure."""
     gates, height, width = stack.shape[:3]
     columns = gates if gates <= 6 else int(np.ceil(np.sqrt(1.4 * gates)))
     grid = Grid(-(-gates // columns), columns, width / height, 0.15)
@@ -181,7 +183,7 @@ def plot_images(path, stack, scale, labels):
 
 
 def plot_derivatives(path, stacks, labels):
-    """Derivative images: red above zero, blue below. One row per component, more rows where there are many gates."""
+    """Derivative images: red above zero, blue below. A row per component, more where there are many gates."""
     order = [c for c in COMPONENTS if c in stacks] + sorted(c for c in stacks if c not in COMPONENTS)
     gates = max(len(s) for s in stacks.values())
     height, width = next(iter(stacks.values())).shape[1:3]
@@ -211,7 +213,7 @@ def plot_derivatives(path, stacks, labels):
 
 
 def read_log(path):
-    """Column name -> array; empty and unreadable entries are NaN. A last line that is still being written is left."""
+    """Column name -> array; empty and unreadable entries are NaN. A last line still being written is left out."""
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
     if not rows or "iteration" not in rows[0]:
@@ -231,19 +233,22 @@ def read_log(path):
 def plot_log(path, labels):
     """Image and parameter RMSE against iteration."""
     log = read_log(path)
+    image_unit = f"RMSE ({labels.quantity})"
     panels = [
-        ("image_rmse", "Image RMSE", f"RMSE ({labels.quantity})", "image, against the target images", "tab:blue"),
-        ("param_rmse", "Parameter RMSE", "RMSE (unit of the parameter)", "parameters, against their targets", "tab:red"),
+        ("image_rmse", "Image RMSE", image_unit, "images, against the target images", "tab:blue"),
+        ("param_rmse", "Parameter RMSE", "RMSE (unit of the parameter)", "against the target values", "tab:red"),
     ]
     panels = [p for p in panels if np.any(np.nan_to_num(log.get(p[0], np.zeros(1))) > 0)]
     if not panels:
         return
-    figure, axes = plt.subplots(1, len(panels), figsize=(5 * len(panels), 3.8), squeeze=False, layout="constrained")
+    size = (5 * len(panels), 3.8)
+    figure, axes = plt.subplots(1, len(panels), figsize=size, squeeze=False, layout="constrained")
     for ax, (column, title, unit, label, color) in zip(axes[0], panels):
         shown = log[column] > 0
-        marker = "." if np.count_nonzero(shown) <= 100 else None
-        ax.semilogy(log["iteration"][shown], log[column][shown], color=color, marker=marker, lw=1.2, label=label)
-        ax.set(title=title, xlabel="iteration", ylabel=unit)
+        x, y = log["iteration"][shown], log[column][shown]
+        ax.semilogy(x, y, color=color, marker="." if len(x) <= 100 else None, lw=1.2, label=label)
+        ax.set(title=title, xlabel="iteration")
+        ax.set_ylabel(unit, fontsize=9)
         ax.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
         ax.grid(True, which="both", lw=0.4, alpha=0.4)
         ax.legend(fontsize=8)

@@ -1,9 +1,9 @@
-"""A glossy cube floating above a diffuse floor before a back wall, under a rectangular area light (after Figures
-9 and 11 of the paper). Its height is what the experiments look for.
+"""A glossy cube floating above a diffuse floor before a back wall, under a rectangular area light (after the
+paper's Figures 9 and 11). Its height is what the experiments look for.
 
-The cube is turned about the vertical so that none of its sides is parallel to the wall or to an edge of the light.
-From the camera, the light's broad reflection shows on the cube's top and its shadow on the floor; the two other
-visible sides get light from the floor and the wall alone.
+The cube is turned about the vertical so that none of its sides is parallel to the wall or to an edge of the
+light. From the camera, the light's broad reflection shows on the cube's top and its shadow on the floor; the
+two other visible sides get light from the floor and the wall alone.
 """
 
 from . import mesh

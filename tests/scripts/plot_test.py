@@ -18,7 +18,8 @@ HEADER = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,height\n"
 
 def images(gates, channels="Y", component="", value=1.0):
     prefix = f"{component}." if component else ""
-    return {f"{prefix}gate{g:03d}.{c}": np.full((6, 8), value * (g + 1)) for g in range(gates) for c in channels}
+    names = [(g, f"{prefix}gate{g:03d}.{c}") for g in range(gates) for c in channels]
+    return {name: np.full((6, 8), value * (g + 1)) for g, name in names}
 
 
 class PlotTest(unittest.TestCase):
@@ -28,9 +29,8 @@ class PlotTest(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def plot(self):
-        return subprocess.run(
-            [sys.executable, str(SCRIPTS / "plot.py"), str(self.folder)], capture_output=True, text=True, check=False
-        )
+        command = [sys.executable, str(SCRIPTS / "plot.py"), str(self.folder)]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
 
     def assert_drawn(self, *names):
         result = self.plot()
@@ -47,7 +47,8 @@ class PlotTest(unittest.TestCase):
             exr.write(self.folder / f"{name}.exr", images(4))
         components = {**images(4, component="interior"), **images(4, component="visibility", value=-1.0)}
         exr.write(self.folder / "height.exr", components)
-        (self.folder / "experiment.yaml").write_text("name: cube\ngates: {kind: gaussian, centers: [5, 6, 7, 8]}\n")
+        experiment = "name: cube\ngates: {kind: gaussian, centers: [5, 6, 7, 8]}\n"
+        (self.folder / "experiment.yaml").write_text(experiment)
         (self.folder / "log.csv").write_text(HEADER + "0,0.5,1,1,0.3,2,0.3\n1,1.0,0.5,0.7,0.2,1,0.2\n")
         self.assert_drawn("target.png", "initial.png", "final.png", "height.png", "rmse.png")
 

@@ -1,4 +1,4 @@
-// Writes small EXR files with OpenEXR itself, for exr_test.py to compare its own reader with: one per compression,
+// Writes small EXR files with OpenEXR itself, for exr_test.py to try the scripts' reader on: one per compression,
 // once with smooth and once with incompressible pixels.
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
@@ -26,7 +26,8 @@ float pixel(bool smooth, int channel, int x, int y) {
 }
 
 void write(const std::string& file, Imf::Compression compression, bool smooth) {
-  const std::vector<std::string> names = {"gate000.Y", "interior.gate001.Y", "path_length.gate010.with.a.long.name.Y"};
+  const std::vector<std::string> names = {"gate000.Y", "interior.gate001.Y",
+                                          "path_length.gate010.with.a.long.name.Y"};
   Imf::Header header(kWidth, kHeight);
   header.compression() = compression;
   Imf::FrameBuffer buffer;
