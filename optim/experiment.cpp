@@ -155,7 +155,7 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
     return found;
   };
   spec.name = file_name(require("name"));
-  constexpr const char* kReserved[] = {"render", "target", "initial", "final", "norm"};
+  constexpr const char* kReserved[] = {"render", "target", "initial", "final"};
   if (std::find(std::begin(kReserved), std::end(kReserved), spec.name) != std::end(kReserved))
     spec.fail("name", fmt::format("'{}' is the name of another output", spec.name));
   spec.type = static_cast<ParameterType>(

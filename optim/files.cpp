@@ -28,9 +28,9 @@ struct Descriptor {
   }
 };
 
-void sync_path(const std::string& path, int flags) {
-  const Descriptor file{open(path.c_str(), flags)};
-  if (file.fd < 0 || fsync(file.fd) != 0) fail("cannot flush", path);
+void sync_folder(const std::string& folder) {
+  const Descriptor file{open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (file.fd < 0 || fsync(file.fd) != 0) fail("cannot flush", folder);
 }
 
 }  // namespace
@@ -50,10 +50,8 @@ void write_file_atomically(const std::string& file, const std::string& text) {
   }
   if (rename(temporary.c_str(), file.c_str()) != 0) fail("cannot rename", temporary);
   const std::string folder = std::filesystem::path(file).parent_path().string();
-  sync_path(folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
+  sync_folder(folder.empty() ? "." : folder);
 }
-
-void sync_file(const std::string& file) { sync_path(file, O_RDONLY); }
 
 std::optional<std::string> read_file(const std::string& file) {
   std::ifstream in(file, std::ios::binary);

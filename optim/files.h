@@ -9,9 +9,6 @@ namespace isochron {
 /// fsync, rename, fsync of the folder. Throws std::runtime_error.
 void write_file_atomically(const std::string& file, const std::string& text);
 
-/// Flushes what was written to `file` down to the disk. Throws std::runtime_error.
-void sync_file(const std::string& file);
-
 /// Whole content of a file; empty when it cannot be read.
 std::optional<std::string> read_file(const std::string& file);
 

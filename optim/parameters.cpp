@@ -299,4 +299,19 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
   return theta;
 }
 
+TangentBasis select_columns(const TangentBasis& basis, int first, int count) {
+  TangentBasis selected;
+  selected.columns = count;
+  selected.row_begin.assign(basis.row_begin.size(), 0);
+  for (std::size_t row = 0; row + 1 < basis.row_begin.size(); ++row) {
+    for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e) {
+      const TangentBasis::Entry& entry = basis.entries[e];
+      if (entry.column >= first && entry.column < first + count)
+        selected.entries.push_back({entry.column - first, entry.coefficient});
+    }
+    selected.row_begin[row + 1] = static_cast<int>(selected.entries.size());
+  }
+  return selected;
+}
+
 }  // namespace isochron

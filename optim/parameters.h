@@ -83,4 +83,7 @@ class Parameters {
   std::vector<double> initial_, target_, lower_, upper_;
 };
 
+/// The columns [first, first + count) of a basis, renumbered from 0.
+TangentBasis select_columns(const TangentBasis& basis, int first, int count);
+
 }  // namespace isochron

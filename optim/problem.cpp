@@ -38,6 +38,11 @@ Problem::Problem(Experiment experiment)
       gates_(make_gates(experiment_.gates)),
       parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)) {}
 
+void Problem::require_parameters() const {
+  if (experiment_.parameters.empty())
+    throw InputError(experiment_.file + ": parameters: there is none (at least one is needed here)");
+}
+
 GatedImage Problem::render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const {
   const Scene scene = parameters_->apply(theta);
   return Renderer(scene, gates_, experiment_.estimator).render(stream, range);

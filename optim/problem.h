@@ -54,6 +54,9 @@ class Problem {
   const GateSet& gates() const { return gates_; }
   const Parameters& parameters() const { return *parameters_; }
 
+  /// Throws InputError when the experiment has no parameters: nothing to differentiate.
+  void require_parameters() const;
+
   Stream stream(Pass pass, std::uint32_t iteration = 0) const { return {experiment_.seed, iteration, pass_number(pass)}; }
 
   /// Gated images at theta.

@@ -1,0 +1,145 @@
+#include "optim/estimates.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+int batches_for(const char* term, int samples) {
+  if (samples < 2)
+    throw InputError(fmt::format("samples.{}: {} is too few for a standard error (allowed: at least 2{})", term, samples,
+                                 std::string_view(term) == "primal" ? "" : ", or 0 to leave the term out"));
+  return std::min(kMostBatches, samples);
+}
+
+std::vector<double> gate_means(const GatedImage& image) {
+  std::vector<double> means;
+  for (int g = 0; g < image.gates; ++g) means.push_back(image.mean(g));
+  return means;
+}
+
+/// Means and batch statistics of the images that `estimate(range)` gives, `count` at a time.
+template <class Estimate>
+DerivativeEstimate collect(const std::string& component, int samples, int batches, int count, const Poll& poll,
+                           Estimate&& estimate) {
+  std::vector<ImageMean> means(count);
+  std::vector<BatchStatistics> statistics(count);
+  for (int b = 0; b < batches; ++b) {
+    const SampleRange range = Share{b, batches}.of(samples);
+    const std::vector<GatedImage> images = estimate(range);
+    for (int i = 0; i < count; ++i) {
+      means[i].add(images[i], range.count());
+      statistics[i].add(gate_means(images[i]), range.count());
+    }
+    poll();
+  }
+  DerivativeEstimate result{component, {}, {}};
+  for (int i = 0; i < count; ++i) {
+    result.images.push_back(means[i].mean());
+    result.gates.push_back(statistics[i].result());
+  }
+  return result;
+}
+
+/// Sum of the terms, whose random numbers are independent: variances add.
+DerivativeEstimate sum_of(const std::vector<DerivativeEstimate>& terms) {
+  DerivativeEstimate total = terms.front();
+  total.component = "total";
+  for (std::size_t i = 0; i < total.images.size(); ++i) {
+    for (std::size_t t = 1; t < terms.size(); ++t) {
+      const GatedImage& image = terms[t].images[i];
+      for (std::size_t k = 0; k < image.data.size(); ++k) total.images[i].data[k] += image.data[k];
+      for (std::size_t g = 0; g < total.gates[i].mean.size(); ++g) {
+        total.gates[i].mean[g] += terms[t].gates[i].mean[g];
+        double& error = total.gates[i].standard_error[g];
+        error = std::hypot(error, terms[t].gates[i].standard_error[g]);
+      }
+    }
+  }
+  return total;
+}
+
+}  // namespace
+
+void BatchStatistics::add(const std::vector<double>& batch, int samples) {
+  batches_.push_back(batch);
+  samples_.push_back(samples);
+}
+
+Statistics BatchStatistics::result() const {
+  const std::size_t count = batches_.size(), size = batches_.front().size();
+  double samples = 0;
+  for (double n : samples_) samples += n;
+  Statistics result{std::vector<double>(size, 0.0), std::vector<double>(size, 0.0)};
+  for (std::size_t i = 0; i < size; ++i) {
+    for (std::size_t b = 0; b < count; ++b) result.mean[i] += samples_[b] / samples * batches_[b][i];
+    double sum = 0;
+    for (std::size_t b = 0; b < count; ++b) {
+      const double deviation = samples_[b] / samples * (batches_[b][i] - result.mean[i]);
+      sum += deviation * deviation;
+    }
+    result.standard_error[i] = std::sqrt(sum * static_cast<double>(count) / static_cast<double>(count - 1));
+  }
+  return result;
+}
+
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll) {
+  const int samples = problem.experiment().samples.primal;
+  const int batches = batches_for("primal", samples);
+  const Scene scene = problem.parameters().apply(theta);
+  const Renderer renderer(scene, problem.gates(), problem.experiment().estimator);
+  const Stream stream = problem.stream(Pass::primal);
+  DerivativeEstimate result = collect("image", samples, batches, 1, poll, [&](SampleRange range) {
+    return std::vector<GatedImage>{renderer.render(stream, range)};
+  });
+  return {std::move(result.images[0]), std::move(result.gates[0])};
+}
+
+std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta, int first,
+                                                     int count, const Poll& poll) {
+  const SampleSpec& spec = problem.experiment().samples;
+  if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
+    const Stream stream = problem.stream(Pass::finite_difference);
+    return {collect("total", spec.primal, batches_for("primal", spec.primal), count, poll, [&](SampleRange range) {
+      std::vector<GatedImage> images;
+      for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
+      return images;
+    })};
+  }
+  const Scene scene = problem.parameters().apply(theta);
+  const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
+  const Renderer renderer(scene, problem.gates(), problem.experiment().estimator, &basis);
+  std::vector<DerivativeEstimate> components;
+  for (Term term : kTerms) {
+    const int samples = spec.term(term);
+    if (samples == 0) continue;
+    const Stream stream = problem.stream(pass_of(term));
+    components.push_back(collect(name(term), samples, batches_for(name(term), samples), count, poll,
+                                 [&](SampleRange range) { return renderer.derive(term, stream, range); }));
+  }
+  if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
+  components.insert(components.begin(), sum_of(components));
+  return components;
+}
+
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                   const Poll& poll) {
+  const SampleSpec& spec = problem.experiment().samples;
+  GradientEstimate result;
+  result.repeats = batches_for("primal", spec.primal);
+  if (problem.experiment().gradient.method == GradientMethod::analytic)
+    for (Term term : kTerms)
+      if (spec.term(term) > 0) result.repeats = std::min(result.repeats, batches_for(name(term), spec.term(term)));
+  BatchStatistics statistics;
+  for (int r = 0; r < result.repeats; ++r)
+    statistics.add(problem.evaluate(theta, target, 0, poll, {r, result.repeats}).gradient, 1);
+  result.gradient = statistics.result();
+  return result;
+}
+
+}  // namespace isochron

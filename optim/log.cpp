@@ -1,0 +1,65 @@
+#include "optim/log.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+#include <stdexcept>
+
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+constexpr int kMostColumns = 16;
+
+std::string header(const Parameters& parameters) {
+  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm";
+  for (const Parameters::Block& block : parameters.blocks()) {
+    if (block.count > kMostColumns) {
+      text += "," + block.name + ".norm";
+    } else {
+      for (int i = 0; i < block.count; ++i) text += "," + parameters.component_names()[block.begin + i];
+    }
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+Log::Log(const std::string& file, const Parameters& parameters, int next) : name_(file), parameters_(parameters) {
+  std::string kept = header(parameters);
+  if (const auto old = read_file(file)) {
+    std::istringstream lines(*old);
+    std::string line;
+    std::getline(lines, line);
+    while (std::getline(lines, line) && !lines.eof())
+      if (std::atoi(line.c_str()) < next) kept += line + "\n";
+  }
+  write_file_atomically(file, kept);
+  file_.reset(std::fopen(file.c_str(), "a"));
+  if (!file_) throw std::runtime_error(file + ": cannot be written");
+}
+
+void Log::append(const LogRow& row, const std::vector<double>& theta) {
+  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, row.loss, row.image_rmse,
+                                 std::isnan(row.param_rmse) ? "" : exact(row.param_rmse), row.gradient_norm);
+  for (const Parameters::Block& block : parameters_.blocks()) {
+    if (block.count > kMostColumns) {
+      double sum = 0;
+      for (int i = block.begin; i < block.begin + block.count; ++i) sum += theta[i] * theta[i];
+      text += "," + exact(std::sqrt(sum));
+    } else {
+      for (int i = block.begin; i < block.begin + block.count; ++i) text += "," + exact(theta[i]);
+    }
+  }
+  text += "\n";
+  // The row must be on the disk before the checkpoint that follows it: a resume never writes it again.
+  if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0 ||
+      fsync(fileno(file_.get())) != 0)
+    throw std::runtime_error(name_ + ": cannot be written");
+}
+
+}  // namespace isochron

@@ -1,0 +1,39 @@
+// DIR/log.csv. Row i is the state before step i (i counts from 0), as seen by the random numbers of iteration i; the
+// last row is the final state, after which no step was made.
+#pragma once
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "optim/parameters.h"
+
+namespace isochron {
+
+struct LogRow {
+  int iteration = 0;
+  double seconds = 0;  ///< spent in iterations so far, this one included
+  double loss = 0, image_rmse = 0;
+  double param_rmse = 0;  ///< NaN where target values are unknown: written as an empty field
+  double gradient_norm = 0;
+};
+
+class Log {
+ public:
+  /// Opens the log to go on at row `next`: rows from there on, and a torn last line, are cut off. Throws
+  /// std::runtime_error.
+  Log(const std::string& file, const Parameters& parameters, int next);
+  /// Writes one line and flushes it to the disk. Parameters of more than 16 components are written as one column
+  /// NAME.norm, the Euclidean norm.
+  void append(const LogRow& row, const std::vector<double>& theta);
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::string name_;
+  const Parameters& parameters_;
+  std::unique_ptr<std::FILE, Close> file_;
+};
+
+}  // namespace isochron
