@@ -1,7 +1,7 @@
 """A small reader and writer of OpenEXR files: single-part scanline images, NO, ZIPS or ZIP compression.
 
-Follows the file layout of the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit floats; halves
-and 32-bit integers are read too.
+Follows the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit floats; halves and 32-bit
+integers are read too.
 """
 
 import struct

@@ -111,8 +111,8 @@ def srgb(x):
 
 
 class Grid:
-    """A figure of equal cells below a title, with room at the left for row names and at the right for a colour
-    bar. All lengths in inches."""
+    """A figure of equal cells below a title, with room for row names at the left, for a colour bar at the right.
+    All lengths in inches."""
 
     TOP, BOTTOM, RIGHT, TITLE, GAP = 0.5, 0.15, 1.05, 0.24, 0.08
 
@@ -159,7 +159,7 @@ def label_cell(axes, text, image):
 
 
 def plot_images(path, stack, scale, labels):
-    """The gated images of one file: grey scenes in false colour, RGB scenes in their own, under one exposure."""
+    """The gated images of one file: grey scenes in false colour, RGB scenes in their own, equally exposed."""
     gates, height, width = stack.shape[:3]
     columns = gates if gates <= 6 else int(np.ceil(np.sqrt(1.4 * gates)))
     grid = Grid(-(-gates // columns), columns, width / height, 0.15)
@@ -213,7 +213,7 @@ def plot_derivatives(path, stacks, labels):
 
 
 def read_log(path):
-    """Column name -> array; empty and unreadable entries are NaN. A last line still being written is left out."""
+    """Column name -> array; empty and unreadable entries are NaN. A last line cut short is left out."""
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
     if not rows or "iteration" not in rows[0]:
@@ -235,8 +235,8 @@ def plot_log(path, labels):
     log = read_log(path)
     image_unit = f"RMSE ({labels.quantity})"
     panels = [
-        ("image_rmse", "Image RMSE", image_unit, "images, against the target images", "tab:blue"),
-        ("param_rmse", "Parameter RMSE", "RMSE (unit of the parameter)", "against the target values", "tab:red"),
+        ("image_rmse", "Image RMSE", image_unit, "against the target images", "tab:blue"),
+        ("param_rmse", "Parameter RMSE", "RMSE (unit of the parameter)", "against the targets", "tab:red"),
     ]
     panels = [p for p in panels if np.any(np.nan_to_num(log.get(p[0], np.zeros(1))) > 0)]
     if not panels:

@@ -13,7 +13,7 @@ def quad(corners):
 
 
 def box(size):
-    """An axis-aligned box around the origin; size: a number or three, the edges' lengths. Normals outwards."""
+    """An axis-aligned box around the origin, normals outwards; size: the edges' lengths, one or three."""
     half = 0.5 * np.broadcast_to(np.asarray(size, dtype=float), 3)
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

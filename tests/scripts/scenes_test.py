@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The scenes in the repository are what scripts/make_scenes.py writes, and their meshes face the right way."""
+"""The committed scenes are what scripts/make_scenes.py writes, and their meshes face the right way."""
 
 import pathlib
 import subprocess

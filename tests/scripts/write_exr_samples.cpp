@@ -1,5 +1,5 @@
-// Writes small EXR files with OpenEXR itself, for exr_test.py to try the scripts' reader on: one per compression,
-// once with smooth and once with incompressible pixels.
+// Writes small EXR files with OpenEXR itself, for exr_test.py to try the scripts' reader on: per compression,
+// one with smooth and one with incompressible pixels.
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
