@@ -111,6 +111,8 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
       return images;
     })};
   }
+  for (Term term : kTerms)
+    if (spec.term(term) > 0) batches_for(name(term), spec.term(term));  // before anything is rendered
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
   const Renderer renderer(scene, problem.gates(), problem.experiment().estimator, &basis);
@@ -127,14 +129,19 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
   return components;
 }
 
+int gradient_repeats(const Problem& problem) {
+  const SampleSpec& spec = problem.experiment().samples;
+  int repeats = batches_for("primal", spec.primal);
+  if (problem.experiment().gradient.method == GradientMethod::finite_difference) return repeats;
+  for (Term term : kTerms)
+    if (spec.term(term) > 0) repeats = std::min(repeats, batches_for(name(term), spec.term(term)));
+  return repeats;
+}
+
 GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
                                    const Poll& poll) {
-  const SampleSpec& spec = problem.experiment().samples;
   GradientEstimate result;
-  result.repeats = batches_for("primal", spec.primal);
-  if (problem.experiment().gradient.method == GradientMethod::analytic)
-    for (Term term : kTerms)
-      if (spec.term(term) > 0) result.repeats = std::min(result.repeats, batches_for(name(term), spec.term(term)));
+  result.repeats = gradient_repeats(problem);
   BatchStatistics statistics;
   for (int r = 0; r < result.repeats; ++r)
     statistics.add(problem.evaluate(theta, target, 0, poll, {r, result.repeats}).gradient, 1);

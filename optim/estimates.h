@@ -53,8 +53,10 @@ struct GradientEstimate {
   int repeats = 0;      ///< independent estimates of residual and derivative that the samples were split into
 };
 
-/// The gradient of the loss at theta. All repeats together use the experiment's samples once. Throws InputError when a
-/// term has one sample.
+/// Number of repeats that estimate_gradient makes. Throws InputError when a term has one sample.
+int gradient_repeats(const Problem& problem);
+
+/// The gradient of the loss at theta. All repeats together use the experiment's samples once. Throws as above.
 GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
                                    const Poll& poll);
 

@@ -1,0 +1,15 @@
+// One function per command: declares it on the command line and sets `action` when it is chosen.
+#pragma once
+#include <CLI/CLI.hpp>
+
+#include "app/options.h"
+
+namespace isochron {
+
+void add_run(CLI::App& app, Action& action);
+void add_resume(CLI::App& app, Action& action);
+void add_render(CLI::App& app, Action& action);
+void add_derive(CLI::App& app, Action& action);
+void add_gradient(CLI::App& app, Action& action);
+
+}  // namespace isochron

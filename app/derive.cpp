@@ -1,0 +1,95 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/plots.h"
+#include "core/image/image.h"
+#include "core/math/error.h"
+#include "optim/estimates.h"
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+struct DeriveCommand {
+  CommonOptions common;
+  std::string parameter;  ///< empty: all
+};
+
+/// Images held at a time; more unknowns are done in groups, each with the same random numbers.
+constexpr double kMostBytes = 1e9;
+
+/// Unknowns [begin, begin + count) that --parameter names.
+Parameters::Block chosen(const Parameters& parameters, const std::string& name) {
+  if (name.empty()) return {"", 0, parameters.size()};
+  std::string known;
+  for (const Parameters::Block& block : parameters.blocks()) {
+    if (block.name == name) return block;
+    known += (known.empty() ? "" : ", ") + block.name;
+  }
+  const auto& names = parameters.component_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError(fmt::format("--parameter {}: there is no such parameter (allowed: {})", name, known));
+  return {name, static_cast<int>(found - names.begin()), 1};
+}
+
+int derive(const DeriveCommand& command) {
+  begin_session(command.common);
+  const Problem problem(read_experiment(command.common));
+  problem.require_parameters();
+  const Parameters& parameters = problem.parameters();
+  const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
+  const Parameters::Block block = chosen(parameters, command.parameter);
+  const std::string folder = output_folder(command.common, problem.experiment());
+  make_output_folder(folder);
+  catch_interrupts();
+
+  const Camera& camera = problem.scene().camera;
+  const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
+  const double images_per_unknown = 6;  // total, three terms, a batch and its sum
+  const int group = std::max(1, static_cast<int>(std::min(kMostBytes / (bytes * images_per_unknown), 1e6)));
+  std::string table = "parameter,gate,component,mean,standard_error\n";
+  for (int first = block.begin; first < block.begin + block.count; first += group) {
+    const int count = std::min(group, block.begin + block.count - first);
+    const auto components = estimate_derivatives(problem, theta, first, count, poll_interrupt);
+    for (int i = 0; i < count; ++i) {
+      const std::string& name = parameters.component_names()[first + i];
+      std::vector<std::string> names;
+      std::vector<GatedImage> images;
+      for (const DerivativeEstimate& component : components) {
+        names.push_back(component.component);
+        images.push_back(component.images[i]);
+      }
+      write_exr_components(folder + "/" + name + ".exr", names, images);
+      for (int g = 0; g < problem.gates().size(); ++g)
+        for (const DerivativeEstimate& component : components)
+          table += fmt::format("{},{},{},{},{}\n", name, g, component.component, component.gates[i].mean[g],
+                               component.gates[i].standard_error[g]);
+    }
+  }
+  write_file_atomically(folder + "/derive.csv", table);
+  spdlog::info("wrote derivative images and {}/derive.csv", folder);
+  return command.common.no_plots || draw_plots(folder) ? 0 : 1;
+}
+
+}  // namespace
+
+void add_derive(CLI::App& app, Action& action) {
+  auto command = std::make_shared<DeriveCommand>();
+  CLI::App* sub = app.add_subcommand("derive", "Render derivative images, term by term");
+  add_experiment_options(*sub, command->common);
+  sub->add_option("--parameter", command->parameter, "only this parameter (NAME or NAME[INDEX]); default all")
+      ->type_name("NAME");
+  sub->footer(
+      "Examples:\n"
+      "  isochron derive cube.yaml --samples 256\n"
+      "  isochron derive cube.yaml --parameter height --at target -o derivative\n"
+      "  isochron derive cube.yaml --set gradient.method=finite_difference");
+  sub->callback([&action, command] { action = [command] { return derive(*command); }; });
+}
+
+}  // namespace isochron

@@ -1,0 +1,39 @@
+#include "app/execute_run.h"
+
+#include <spdlog/spdlog.h>
+
+#include "app/interrupt.h"
+#include "app/plots.h"
+#include "app/progress.h"
+
+namespace isochron {
+
+int execute_run(const std::string& folder, const CommonOptions& common, bool force,
+                const std::function<RunStatus(const RunOptions&)>& start) {
+  catch_interrupts();
+  ProgressLine line(common.quiet);
+  RunOptions options;
+  options.folder = folder;
+  options.force = force;
+  options.stop = interrupted;
+  options.progress = [&](const Progress& progress) { line.show(progress); };
+  options.warning = [&](const std::string& text) {
+    line.end();
+    spdlog::warn("{}", text);
+  };
+  const RunStatus status = start(options);
+  line.end();
+  if (status == RunStatus::interrupted) {
+    spdlog::warn("interrupted; go on with: isochron resume {}", folder);
+    return 1;
+  }
+  const bool plotted = common.no_plots || draw_plots(folder);
+  if (status == RunStatus::diverged) {
+    spdlog::error("{}: the run diverged; see log.csv and summary.yaml there", folder);
+    return 1;
+  }
+  spdlog::info("{}: {}", folder, name(status));
+  return plotted ? 0 : 1;
+}
+
+}  // namespace isochron

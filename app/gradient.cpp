@@ -1,0 +1,55 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "optim/estimates.h"
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+int gradient(const CommonOptions& options) {
+  begin_session(options);
+  const Problem problem(read_experiment(options));
+  problem.require_parameters();
+  const Parameters& parameters = problem.parameters();
+  const std::vector<double> theta = parameters.parse_point(options.at.empty() ? "initial" : options.at);
+  const std::string folder = output_folder(options, problem.experiment());
+  make_output_folder(folder);
+  catch_interrupts();
+  gradient_repeats(problem);  // too few samples must show before the target is rendered
+  const GatedImage target = problem.make_target(poll_interrupt);
+  const auto start = std::chrono::steady_clock::now();
+  const GradientEstimate estimate = estimate_gradient(problem, theta, target, poll_interrupt);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+
+  std::string table = "parameter,value,gradient,standard_error\n";
+  for (int i = 0; i < parameters.size(); ++i)
+    table += fmt::format("{},{},{},{}\n", parameters.component_names()[i], theta[i], estimate.gradient.mean[i],
+                         estimate.gradient.standard_error[i]);
+  write_file_atomically(folder + "/gradient.csv", table);
+  write_file_atomically(folder + "/gradient.yaml",
+                        fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds, thread_count(options),
+                                    estimate.repeats));
+  spdlog::info("wrote {}/gradient.csv", folder);
+  return 0;
+}
+
+}  // namespace
+
+void add_gradient(CLI::App& app, Action& action) {
+  auto options = std::make_shared<CommonOptions>();
+  CLI::App* sub = app.add_subcommand("gradient", "Estimate the gradient of the loss, its standard error and cost");
+  add_experiment_options(*sub, *options);
+  sub->footer(
+      "Examples:\n"
+      "  isochron gradient cube.yaml --samples 64\n"
+      "  isochron gradient cube.yaml --at height=0.1 -o gradient --threads 2\n"
+      "  isochron gradient cube.yaml --set gradient.method=finite_difference");
+  sub->callback([&action, options] { action = [options] { return gradient(*options); }; });
+}
+
+}  // namespace isochron

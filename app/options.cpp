@@ -1,0 +1,65 @@
+#include "app/options.h"
+
+#include <spdlog/spdlog.h>
+
+#include <limits>
+#include <thread>
+
+#include "core/render/renderer.h"
+
+namespace isochron {
+
+void add_session_options(CLI::App& command, CommonOptions& options) {
+  command.add_option("--threads", options.threads, "threads; 0: all cores. Results do not depend on it")
+      ->check(CLI::Range(0, 4096))
+      ->type_name("N");
+  command.add_flag("--quiet", options.quiet, "only warnings and errors");
+  command.add_flag("--no-plots", options.no_plots, "write no PNG");
+}
+
+void add_experiment_options(CLI::App& command, CommonOptions& options) {
+  command.add_option("experiment", options.file, "experiment file")->required()->type_name("EXPERIMENT.yaml");
+  command.add_option("-o,--output", options.output, "output folder; default runs/NAME")->type_name("DIR");
+  command
+      .add_option("--at", options.at,
+                  "values of the parameters: initial (default), target, or NAME=VALUE[,NAME=VALUE...] with the others "
+                  "initial")
+      ->type_name("POINT");
+  command.add_option("--samples", options.samples, "samples per pixel, for every term that is not left out")
+      ->check(CLI::Range(1, 1 << 30))
+      ->type_name("N");
+  command.add_option("--seed", options.seed, "seed of the random numbers")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+  command
+      .add_option("--set", options.set,
+                  "replace a value of the experiment file, such as optimizer.iterations=10 or "
+                  "parameters[0].initial=0.2; may be repeated")
+      ->type_name("KEY.PATH=VALUE")
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
+  add_session_options(command, options);
+}
+
+void begin_session(const CommonOptions& options) {
+  if (options.quiet) spdlog::set_level(spdlog::level::warn);
+  set_thread_count(options.threads);
+}
+
+Experiment read_experiment(const CommonOptions& options) {
+  Experiment experiment = load_experiment(options.file, options.set);
+  if (options.samples) experiment.samples.set_all(*options.samples);
+  if (options.seed) experiment.seed = *options.seed;
+  return experiment;
+}
+
+std::string output_folder(const CommonOptions& options, const Experiment& experiment) {
+  return options.output.empty() ? "runs/" + experiment.name : options.output;
+}
+
+int thread_count(const CommonOptions& options) {
+  return options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
+}
+
+}  // namespace isochron

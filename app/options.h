@@ -1,0 +1,47 @@
+// What the commands have in common: options, reading the experiment, the output folder.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/experiment.h"
+#include "optim/problem.h"
+
+namespace isochron {
+
+/// What main does once the command line is parsed; returns the exit status.
+using Action = std::function<int()>;
+
+struct CommonOptions {
+  std::string file;             ///< experiment, or for resume the folder
+  std::string output;           ///< empty: runs/NAME
+  std::string at;               ///< empty: initial
+  std::optional<int> samples;   ///< per pixel, for every term that is not left out
+  int threads = 0;              ///< 0: all cores
+  std::optional<std::uint64_t> seed;
+  std::vector<std::string> set;
+  bool quiet = false;
+  bool no_plots = false;
+};
+
+/// Options of every command.
+void add_session_options(CLI::App& command, CommonOptions& options);
+/// Those, and what the commands that read an experiment share.
+void add_experiment_options(CLI::App& command, CommonOptions& options);
+
+/// Applies threads and verbosity. To be called first by every action.
+void begin_session(const CommonOptions& options);
+
+/// Reads the experiment with the command line's changes. Throws InputError.
+Experiment read_experiment(const CommonOptions& options);
+
+/// The -o folder or runs/NAME.
+std::string output_folder(const CommonOptions& options, const Experiment& experiment);
+
+/// Number of threads that renderers use.
+int thread_count(const CommonOptions& options);
+
+}  // namespace isochron

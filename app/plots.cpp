@@ -1,0 +1,64 @@
+#include "app/plots.h"
+
+#include <fcntl.h>
+#include <spawn.h>
+#include <spdlog/spdlog.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+extern char** environ;
+
+namespace isochron {
+namespace {
+
+/// The last line that holds text: where Python names the error.
+std::string last_line(std::string text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  return text.substr(text.rfind('\n') + 1);
+}
+
+}  // namespace
+
+bool draw_plots(const std::string& folder) {
+  const std::string script = ISOCHRON_SCRIPTS "/plot.py";
+  // A folder named -x must not be taken for an option.
+  const std::string argument = folder.front() == '-' ? "./" + folder : folder;
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) {
+    spdlog::warn("plots: cannot start: {}", std::strerror(errno));
+    return false;
+  }
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
+  std::array<const char*, 4> arguments = {"/usr/bin/python3", script.c_str(), argument.c_str(), nullptr};
+  pid_t child = 0;
+  const int error =
+      posix_spawn(&child, arguments[0], &actions, nullptr, const_cast<char* const*>(arguments.data()), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[1]);
+  std::string messages;
+  if (error == 0) {
+    std::array<char, 4096> buffer;
+    for (ssize_t n; (n = read(ends[0], buffer.data(), buffer.size())) > 0 || (n < 0 && errno == EINTR);)
+      if (n > 0) messages.append(buffer.data(), static_cast<std::size_t>(n));
+  }
+  close(ends[0]);
+  if (error != 0) {
+    spdlog::warn("plots: cannot start {}: {}", arguments[0], std::strerror(error));
+    return false;
+  }
+  int status = 0;
+  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
+  spdlog::warn("plots: {} failed: {}", script, last_line(messages));
+  return false;
+}
+
+}  // namespace isochron

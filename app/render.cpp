@@ -1,0 +1,45 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/plots.h"
+#include "core/image/image.h"
+#include "optim/estimates.h"
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+int render(const CommonOptions& options) {
+  begin_session(options);
+  const Problem problem(read_experiment(options));
+  const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
+  const std::string folder = output_folder(options, problem.experiment());
+  make_output_folder(folder);
+  catch_interrupts();
+  const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
+  write_exr(folder + "/render.exr", estimate.image);
+  std::string table = "gate,mean,standard_error\n";
+  for (int g = 0; g < problem.gates().size(); ++g)
+    table += fmt::format("{},{},{}\n", g, estimate.gates.mean[g], estimate.gates.standard_error[g]);
+  write_file_atomically(folder + "/render.csv", table);
+  spdlog::info("wrote {0}/render.exr and {0}/render.csv", folder);
+  return options.no_plots || draw_plots(folder) ? 0 : 1;
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, Action& action) {
+  auto options = std::make_shared<CommonOptions>();
+  CLI::App* sub = app.add_subcommand("render", "Render the gated images");
+  add_experiment_options(*sub, *options);
+  sub->footer(
+      "Examples:\n"
+      "  isochron render cube.yaml --samples 256\n"
+      "  isochron render cube.yaml --at target -o target_images\n"
+      "  isochron render cube.yaml --at height=0.1 --set gates.sigma=0.05");
+  sub->callback([&action, options] { action = [options] { return render(*options); }; });
+}
+
+}  // namespace isochron

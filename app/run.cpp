@@ -1,0 +1,50 @@
+#include "optim/run.h"
+
+#include <spdlog/spdlog.h>
+
+#include "app/commands.h"
+#include "app/execute_run.h"
+
+namespace isochron {
+namespace {
+
+struct RunCommand {
+  CommonOptions common;
+  bool force = false;
+};
+
+/// Makes the point of --at the one to start from.
+void start_at(const std::string& point, Experiment& experiment) {
+  const Problem problem(experiment);
+  const std::vector<double> theta = problem.parameters().parse_point(point);
+  for (std::size_t i = 0; i < experiment.parameters.size(); ++i) {
+    const Parameters::Block& block = problem.parameters().blocks()[i];
+    experiment.parameters[i].initial.assign(theta.begin() + block.begin, theta.begin() + block.begin + block.count);
+  }
+}
+
+int run(const RunCommand& command) {
+  begin_session(command.common);
+  Experiment experiment = read_experiment(command.common);
+  if (!command.common.at.empty()) start_at(command.common.at, experiment);
+  const std::string folder = output_folder(command.common, experiment);
+  return execute_run(folder, command.common, command.force,
+                     [&](const RunOptions& options) { return start_run(experiment, options); });
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Action& action) {
+  auto command = std::make_shared<RunCommand>();
+  CLI::App* sub = app.add_subcommand("run", "Optimise from the initial values towards the target");
+  add_experiment_options(*sub, command->common);
+  sub->add_flag("--force", command->force, "start anew in a folder that holds a run already");
+  sub->footer(
+      "Examples:\n"
+      "  isochron run cube.yaml\n"
+      "  isochron run cube.yaml -o out --samples 16 --set optimizer.iterations=20\n"
+      "  isochron run cube.yaml --at height=0.1 --seed 5 --force");
+  sub->callback([&action, command] { action = [command] { return run(*command); }; });
+}
+
+}  // namespace isochron
