@@ -111,8 +111,10 @@ def srgb(x):
 
 
 class Grid:
-    """A figure of equal cells below a title, with room for row names at the left, for a colour bar at the right.
-    All lengths in inches."""
+    """A figure of equal cells below a title, with row names at the left and a colour bar at the right.
+
+    All lengths are in inches.
+    """
 
     TOP, BOTTOM, RIGHT, TITLE, GAP = 0.5, 0.15, 1.05, 0.24, 0.08
 
