@@ -25,8 +25,8 @@ void require_positive(double value, const char* name) {
   }
 }
 
-/// Variance of the standard normal cut to (-c, c). Integration by parts turns both moments into the positive series
-/// sum c^(2k) / (2k+1)!!, which loses no digits however short the interval.
+/// Variance of the standard normal cut to (-c, c). Integration by parts turns both moments into the positive
+/// series sum c^(2k) / (2k+1)!!, which loses no digits however short the interval.
 double truncated_variance(double c) {
   double term = 1, sum = 0;
   for (int k = 1; term > sum * 0x1p-60; ++k) {
@@ -55,7 +55,8 @@ void GateShape::set_gaussian(double sigma, double cut) {
   exponent_ = -0.5 * std::numbers::log2e / sigma / sigma;
   slope_factor_ = -1 / sigma / sigma;
   const double smooth = -std::expm1(-0.5 * reach * reach);
-  segments_.push_back({peak_ * smooth, {Side::Form::rayleigh, -sigma, smooth}, {Side::Form::rayleigh, sigma, smooth}});
+  segments_.push_back(
+      {peak_ * smooth, {Side::Form::rayleigh, -sigma, smooth}, {Side::Form::rayleigh, sigma, smooth}});
 }
 
 GateShape GateShape::gaussian(double sigma) {
@@ -119,8 +120,7 @@ double GateShape::sample(double u) const {
   const double rest = target - cumulative_[i];
   if (rest <= 0) return offsets_[i];
   // Smaller root of v t + slope t^2 / 2 = rest, in the form that does not cancel.
-  const double slope = (values_[i + 1] - values_[i]) / (offsets_[i + 1] - offsets_[i]);
-  const double root = std::sqrt(std::max(values_[i] * values_[i] + 2 * slope * rest, 0.0));
+  const double root = std::sqrt(std::max(values_[i] * values_[i] + 2 * slopes_[i] * rest, 0.0));
   return std::min(offsets_[i] + 2 * rest / (values_[i] + root), offsets_[i + 1]);
 }
 
@@ -173,7 +173,10 @@ void GateShape::finish_parts() {
 }
 
 GateSet::GateSet(GateShape shape, std::vector<double> centers)
-    : shape_(std::move(shape)), centers_(std::move(centers)), sorted_(centers_.size()), order_(centers_.size()) {
+    : shape_(std::move(shape)),
+      centers_(std::move(centers)),
+      sorted_(centers_.size()),
+      order_(centers_.size()) {
   if (centers_.empty()) throw InputError("a gate needs at least one centre");
   for (const double c : centers_) {
     if (!std::isfinite(c)) throw InputError("gate centres must be finite");

@@ -1,5 +1,5 @@
-// Path-length importance of a time-gated camera (theory sections 1 and 3). All gates of an experiment share one
-// shape, shifted to their centres: W_g(l) = shape(l - centre_g).
+// Path-length importance of a time-gated camera (theory sections 1 and 3). All gates of an experiment share
+// one shape, shifted to their centres: W_g(l) = shape(l - centre_g).
 #pragma once
 #include <algorithm>
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace isochron {
 
-/// Two lengths where the gate's derivative measure dW is negative (minus) and positive (plus), coupled by one random
-/// number. Either side may be absent. Lengths are relative to the gate's centre, in scene units.
+/// Two lengths where the gate's derivative measure dW is negative (minus) and positive (plus), coupled by one
+/// random number. Either side may be absent. Lengths are relative to the gate's centre, in scene units.
 struct CoupledPair {
   double plus = 0, minus = 0;
   bool has_plus = false, has_minus = false;
@@ -27,9 +27,9 @@ enum class PairPart {
   atoms    ///< every atom; continuous partners are dropped (the `path_length` pass of standard sampling)
 };
 
-/// One gate shape centred at zero, with the four operations of theory section 3. Lengths in scene units, values in
-/// 1 / scene unit; any scale works. The factories throw InputError where an argument is not finite, a width is not
-/// positive or a table is not a gate.
+/// One gate shape centred at zero, with the four operations of theory section 3. Lengths in scene units,
+/// values in 1 / scene unit; any scale works. The factories throw InputError where an argument is not finite,
+/// a width is not positive or a table is not a gate.
 class GateShape {
  public:
   /// 1 at every length.
@@ -38,7 +38,8 @@ class GateShape {
   static GateShape boxcar(double width);
   /// The gaussian inside (-half_width, half_width), zero outside.
   static GateShape truncated_gaussian(double sigma, double half_width);
-  /// Piecewise linear through (offset, value); a repeated offset is a jump; zero outside. Scaled to unit integral.
+  /// Piecewise linear through (offset, value); a repeated offset is a jump; zero outside. Scaled to unit
+  /// integral.
   static GateShape tabulated(std::vector<double> offsets, std::vector<double> values);
 
   GateKind kind() const { return kind_; }
@@ -50,21 +51,27 @@ class GateShape {
   /// Support [lower, upper] beyond which the value is zero (gaussian: below double rounding of its peak).
   double lower() const { return lower_; }
   double upper() const { return upper_; }
-  /// Standard deviation of the gate seen as a density (the width that `auto` sampling looks at); steady: infinity.
+  /// Standard deviation of the gate seen as a density (the width that `auto` sampling looks at); steady:
+  /// infinity.
   double width() const { return width_; }
   /// Integral over the real line: 1, less what truncation took away. Steady: 1 by convention.
   double mass() const { return mass_; }
 
-  double value(double x) const {
-    if (!(x >= lower_ && x <= upper_)) return 0;
-    if (is_gaussian_inside()) return gaussian_value(x);
-    return kind_ == GateKind::tabulated ? table_value(x) : peak_;
-  }
+  struct ValueAndDerivative {
+    double value = 0, derivative = 0;
+  };
+  double value(double x) const { return value_and_derivative(x).value; }
   /// Smooth part W'; at a kink of a table the slope to the right.
-  double derivative(double x) const {
-    if (!(x >= lower_ && x <= upper_)) return 0;
-    if (is_gaussian_inside()) return gaussian_slope_factor() * x * gaussian_value(x);
-    return kind_ == GateKind::tabulated ? table_slope(x) : 0;
+  double derivative(double x) const { return value_and_derivative(x).derivative; }
+  ValueAndDerivative value_and_derivative(double x) const {
+    if (!(x >= lower_ && x <= upper_)) return {};
+    if (is_gaussian_inside()) {
+      const double w = gaussian_value(x);
+      return {w, slope_factor_ * x * w};
+    }
+    if (kind_ != GateKind::tabulated) return {peak_, 0};
+    const int i = table_interval(x);
+    return {values_[i] + slopes_[i] * (x - offsets_[i]), slopes_[i]};
   }
   /// Offset with density value / mass; u in (0, 1). Not for the steady gate, which is no density.
   double sample(double u) const;
@@ -81,8 +88,8 @@ class GateShape {
  private:
   /// One sign of dW on a stretch of the quantile axis.
   struct Side {
-    /// atom: all at `from`. uniform: from -> to as the quantile runs 0 -> 1. rayleigh: from * rho, where rho follows
-    /// the Rayleigh law cut where its distribution function is `to`.
+    /// atom: all at `from`. uniform: from -> to as the quantile runs 0 -> 1. rayleigh: from * rho, where rho
+    /// follows the Rayleigh law cut where its distribution function is `to`.
     enum class Form { atom, uniform, rayleigh } form = Form::atom;
     double from = 0, to = 0;
   };
@@ -110,20 +117,13 @@ class GateShape {
 
   /// Interval [i, i+1] of the table that holds x in [lower, upper]; never one of zero length.
   int table_interval(double x) const {
-    const int bucket = std::min(static_cast<int>((x - lower_) * bucket_scale_), static_cast<int>(guide_.size()) - 2);
+    const int bucket =
+        std::min(static_cast<int>((x - lower_) * bucket_scale_), static_cast<int>(guide_.size()) - 2);
     // The guide narrows the search to the knots of one bucket: one or two for evenly spaced tables.
     const auto first = offsets_.begin();
-    const int i = static_cast<int>(std::upper_bound(first + guide_[bucket], first + guide_[bucket + 1], x) - first);
+    const int i =
+        static_cast<int>(std::upper_bound(first + guide_[bucket], first + guide_[bucket + 1], x) - first);
     return std::min(i - 1, last_interval_);
-  }
-  double table_slope(double x) const {
-    const int i = table_interval(x);
-    return (values_[i + 1] - values_[i]) / (offsets_[i + 1] - offsets_[i]);
-  }
-  double table_value(double x) const {
-    const int i = table_interval(x);
-    const double f = (x - offsets_[i]) / (offsets_[i + 1] - offsets_[i]);
-    return values_[i] + f * (values_[i + 1] - values_[i]);
   }
 
   GateKind kind_ = GateKind::steady;
@@ -132,7 +132,8 @@ class GateShape {
   double sigma_ = 0, exponent_ = 0, slope_factor_ = 0;  ///< gaussian kinds: W = peak * 2^(exponent x^2)
   double outside_ = 0;                                  ///< gaussian kinds: mass cut off on either side
   std::vector<double> offsets_, values_, cumulative_;   ///< table: knots, values, integral up to the knot
-  std::vector<int> guide_;                              ///< bucket -> number of knots in the buckets before it
+  std::vector<double> slopes_;                          ///< of the interval after the knot; zero at a jump
+  std::vector<int> guide_;  ///< bucket -> number of knots in the buckets before it
   double bucket_scale_ = 0;
   int last_interval_ = 0;
   std::vector<Segment> segments_;
@@ -170,12 +171,13 @@ class GateSet {
       for_each_gaussian(l, begin, end, [&](int gate, double x, double w) { f(gate, w, factor * x * w); });
     } else {
       for (int i = begin; i < end; ++i) {
-        const double x = l - sorted_[i];
-        f(order_[i], shape_.value(x), shape_.derivative(x));
+        const auto w = shape_.value_and_derivative(l - sorted_[i]);
+        f(order_[i], w.value, w.derivative);
       }
     }
   }
-  /// Density of a length drawn by choosing a gate uniformly and then a length from it. Zero for the steady gate.
+  /// Density of a length drawn by choosing a gate uniformly and then a length from it. Zero for the steady
+  /// gate.
   double mixture_pdf(double l) const;
 
  private:
@@ -184,7 +186,8 @@ class GateSet {
   /// Range in `sorted_` of the gates whose support holds l.
   std::pair<int, int> reaching(double l) const;
 
-  /// Calls f(gate, x, W) over a range of gaussian gates, a block at a time so that the exponentials vectorise.
+  /// Calls f(gate, x, W) over a range of gaussian gates, a block at a time so that the exponentials
+  /// vectorise.
   template <class F>
   void for_each_gaussian(double l, int begin, int end, F&& f) const {
     for (int i = begin; i < end; i += kBlock) {

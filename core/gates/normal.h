@@ -5,8 +5,8 @@
 
 namespace isochron {
 
-/// 2^y for y in [-1020, 0], relative error below 1e-14. Free of branches and calls, so that loops over it vectorise;
-/// any finite y outside the range gives a meaningless value but no trap.
+/// 2^y for y in [-1020, 0], relative error below 1e-14. Free of branches and calls, so that loops over it
+/// vectorise; any finite y outside the range gives a meaningless value but no trap.
 inline double fast_exp2(double y) {
   constexpr double kRound = 0x1.8p52;  // adding it leaves round(y) in the low bits of the sum
   const double shifted = y + kRound;
@@ -24,11 +24,13 @@ inline double fast_exp2(double y) {
   p = p * r + 2.4022650695910071233e-1;
   p = p * r + 6.9314718055994530942e-1;
   p = p * r + 1.0;
-  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(p) + (std::bit_cast<std::uint64_t>(shifted) << 52));
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(p) +
+                               (std::bit_cast<std::uint64_t>(shifted) << 52));
 }
 
-/// The x at which the standard normal's distribution function is P, given twice over so that neither the centre nor
-/// the lower tail loses digits: `tail` = P in (0, 1/2] and `from_half` = P - 1/2. Accurate to a few ulp.
+/// The x at which the standard normal's distribution function is P, given twice over so that neither the
+/// centre nor the lower tail loses digits: `tail` = P in (0, 1/2] and `from_half` = P - 1/2. Accurate to a
+/// few ulp.
 double normal_quantile_lower(double tail, double from_half);
 
 }  // namespace isochron

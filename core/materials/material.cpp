@@ -11,8 +11,8 @@ struct Frame {
   Vec3 n, s, t;
 };
 
-/// A GGX normal visible from w_o (local frame, z up) with the density of the visible normals. Stretched to the unit
-/// hemisphere, reflections of w_o by visible normals are uniform on the cap z > -w_o.z.
+/// A GGX normal visible from w_o (local frame, z up) with the density of the visible normals. Stretched to
+/// the unit hemisphere, reflections of w_o by visible normals are uniform on the cap z > -w_o.z.
 Vec3 sample_visible_normal(double alpha, const Vec3& w_o, double u0, double u1) {
   const Vec3 v = normalize(Vec3{alpha * w_o.x, alpha * w_o.y, w_o.z});
   const double phi = kTwoPi * u0;
@@ -49,14 +49,14 @@ LobeDerivative lobe_derivative(const Material& material, double cos_i, double co
   result.d_cos_i = side * (ln_d_by_p - (root_o + b2 * cos_o * ratio_i) * inv_shadowing);
   result.d_cos_o = side * (ln_d_by_p - (root_i + b2 * cos_i * ratio_o) * inv_shadowing);
   result.d_cos_io = -ln_d_by_p * d.p / d.q;
-  const double shadowing_by_alpha = alpha * (cos_o * (1 - cos_i) * (1 + cos_i) / root_i +
-                                             cos_i * (1 - cos_o) * (1 + cos_o) / root_o);
+  const double shadowing_by_alpha =
+      alpha * (cos_o * (1 - cos_i) * (1 + cos_i) / root_i + cos_i * (1 - cos_o) * (1 + cos_o) / root_o);
   result.d_roughness = 2 * (d.excess - a2 * d.p * d.p) * inv_t / alpha - shadowing_by_alpha * inv_shadowing;
   return result;
 }
 
-std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o, double u0,
-                                                double u1) {
+std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o,
+                                                double u0, double u1) {
   const double facing = dot(n, w_o);
   if (facing == 0 || (facing < 0 && !material.two_sided)) return std::nullopt;
   const Frame frame(facing < 0 ? -n : n);

@@ -1,8 +1,8 @@
-// Scattering of a surface, as a function of three cosines only (all our lobes are isotropic): cos_i = n.w_i towards
-// the light side, cos_o = n.w_o towards the camera side, cos_io = w_i.w_o. f = albedo * lobe.
+// Scattering of a surface, as a function of three cosines only (all our lobes are isotropic): cos_i = n.w_i
+// towards the light side, cos_o = n.w_o towards the camera side, cos_io = w_i.w_o. f = albedo * lobe.
 //
-// The rough conductor is a single-scattering GGX with Smith's height-correlated masking-shadowing (Heitz 2014) and a
-// constant reflectance: lobe = D G2 / (4 cos_i cos_o).
+// The rough conductor is a single-scattering GGX with Smith's height-correlated masking-shadowing (Heitz
+// 2014) and a constant reflectance: lobe = D G2 / (4 cos_i cos_o).
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -27,7 +27,7 @@ struct Material {
 
 /// ln(lobe) differentiated by its arguments; the lobe's value alongside.
 struct LobeDerivative {
-  double value = 0;  ///< 1/sr
+  double value = 0;                                                ///< 1/sr
   double d_cos_i = 0, d_cos_o = 0, d_cos_io = 0, d_roughness = 0;  ///< of ln(value)
 };
 
@@ -44,8 +44,9 @@ inline double smith_root(double alpha_squared, double cosine) {
   return std::sqrt(cosine * cosine + alpha_squared * (1 - cosine) * (1 + cosine));
 }
 
-/// GGX density of the half vector h, in 1/sr. With p = cos_i + cos_o and q = |w_i + w_o|^2 the squared cosine of h is
-/// p^2 / q; written in p and q, sin^2 = (q - p^2) / q keeps its accuracy next to the mirror direction.
+/// GGX density of the half vector h, in 1/sr. With p = cos_i + cos_o and q = |w_i + w_o|^2 the squared cosine
+/// of h is p^2 / q; written in p and q, sin^2 = (q - p^2) / q keeps its accuracy next to the mirror
+/// direction.
 struct GgxDensity {
   GgxDensity(double alpha_squared, double cos_i, double cos_o, double cos_io)
       : p(cos_i + cos_o),
@@ -79,12 +80,13 @@ inline double lobe(const Material& material, double cos_i, double cos_o, double 
   return detail::GgxDensity(a2, cos_i, cos_o, cos_io).value / (2 * shadowing);
 }
 
-/// As `lobe`, with the derivatives of its logarithm. Where value is 0 the derivatives are 0. The three cosines count
-/// as independent: the derivative of each is the formula's, continued off the set of cosines that directions can have.
+/// As `lobe`, with the derivatives of its logarithm. Where value is 0 the derivatives are 0. The three
+/// cosines count as independent: the derivative of each is the formula's, continued off the set of cosines
+/// that directions can have.
 LobeDerivative lobe_derivative(const Material& material, double cos_i, double cos_o, double cos_io);
 
-/// Density per solid angle with which `sample_direction` draws w_i given w_o. Integrates to less than one where some
-/// draws end below the surface and are dropped.
+/// Density per solid angle with which `sample_direction` draws w_i given w_o. Integrates to less than one
+/// where some draws end below the surface and are dropped.
 inline double direction_pdf(const Material& material, double cos_i, double cos_o, double cos_io) {
   if (!detail::face_forward(material, cos_i, cos_o)) return 0;
   if (material.type == MaterialType::diffuse) return cos_i * kInvPi;
@@ -93,10 +95,10 @@ inline double direction_pdf(const Material& material, double cos_i, double cos_o
   return detail::GgxDensity(a2, cos_i, cos_o, cos_io).value / (2 * (cos_o + detail::smith_root(a2, cos_o)));
 }
 
-/// Draws w_i given w_o (both point away from the surface with unit normal n): cosine-weighted for diffuse, visible GGX
-/// normals (Heitz 2018, by the spherical caps of Dupuy and Benyoub 2023) for rough conductors. Empty when nothing is
-/// scattered. A two-sided material seen from behind scatters to the side of w_o.
-std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o, double u0,
-                                                double u1);
+/// Draws w_i given w_o (both point away from the surface with unit normal n): cosine-weighted for diffuse,
+/// visible GGX normals (Heitz 2018, by the spherical caps of Dupuy and Benyoub 2023) for rough conductors.
+/// Empty when nothing is scattered. A two-sided material seen from behind scatters to the side of w_o.
+std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o,
+                                                double u0, double u1);
 
 }  // namespace isochron

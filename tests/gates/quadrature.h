@@ -28,12 +28,14 @@ inline std::vector<std::pair<std::string, GateShape>> finite_gates() {
           {"measured", GateShape::tabulated(kMeasuredOffsets, kMeasuredValues)}};
 }
 
-/// Integral of f over the gate's support up to `to`: Gauss-Legendre of 5 points on 400 panels that end at the tables' knots.
+/// Integral of f over the gate's support up to `to`: Gauss-Legendre of 5 points on 400 panels that end at the
+/// tables' knots.
 template <class F>
 double integrate(const GateShape& gate, F&& f, double to = std::numeric_limits<double>::infinity()) {
-  constexpr double kNode[5] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831, 0.9061798459386640};
-  constexpr double kWeight[5] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665,
-                                 0.2369268850561891};
+  constexpr double kNode[5] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
+                               0.9061798459386640};
+  constexpr double kWeight[5] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
+                                 0.4786286704993665, 0.2369268850561891};
   const double last = std::min(gate.upper(), to);
   std::vector<double> ends{gate.lower(), last};
   if (gate.kind() == GateKind::tabulated) {

@@ -17,14 +17,16 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 long double normal_density(long double x, long double sigma) {
-  return std::exp(-0.5L * (x / sigma) * (x / sigma)) / (sigma * std::sqrt(2 * 3.14159265358979323846264338327950288L));
+  return std::exp(-0.5L * (x / sigma) * (x / sigma)) /
+         (sigma * std::sqrt(2 * 3.14159265358979323846264338327950288L));
 }
 
 TEST(FastExp2, MatchesLibrary) {
   double worst = 0;
   for (int i = 0; i <= 200000; ++i) {
     const double y = -54.0 * i / 200000;
-    worst = std::max(worst, std::abs(static_cast<double>(fast_exp2(y) / std::exp2(static_cast<long double>(y)) - 1)));
+    worst = std::max(
+        worst, std::abs(static_cast<double>(fast_exp2(y) / std::exp2(static_cast<long double>(y)) - 1)));
   }
   EXPECT_LT(worst, 1e-14);
   EXPECT_EQ(fast_exp2(0), 1);
@@ -37,7 +39,8 @@ TEST(NormalQuantile, InvertsTheDistribution) {
   for (double p = 1e-17; p < 0.5; p *= 1.1) {
     const long double x = normal_quantile_lower(p, p - 0.5);
     const long double density = normal_density(x, 1), got = 0.5L * std::erfc(-x * std::sqrt(0.5L));
-    EXPECT_NEAR(static_cast<double>((got - p) / density), 0, 2e-15 * static_cast<double>(1 + std::abs(x))) << p;
+    EXPECT_NEAR(static_cast<double>((got - p) / density), 0, 2e-15 * static_cast<double>(1 + std::abs(x)))
+        << p;
   }
   // Near the median `from_half` alone carries the digits: x = sqrt(2 pi) (P - 1/2).
   EXPECT_NEAR(normal_quantile_lower(0.5, -1e-20) / (-1e-20 * std::sqrt(kTwoPi)), 1, 1e-15);
@@ -102,7 +105,8 @@ TEST(GateShape, TabulatedValues) {
   EXPECT_DOUBLE_EQ(gate.derivative(2.5), -0.25);
   EXPECT_EQ(gate.lower(), 0);
   EXPECT_EQ(gate.upper(), 3);
-  // First moments 7/6 (x (1 + 2x) on [0, 1]) and 10/3 (x (3 - x) on [1, 3]), second 5/6 and 6, over the area 4.
+  // First moments 7/6 (x (1 + 2x) on [0, 1]) and 10/3 (x (3 - x) on [1, 3]), second 5/6 and 6, over the
+  // area 4.
   const double mean = (7.0 / 6 + 10.0 / 3) / 4, square = (5.0 / 6 + 6) / 4;
   EXPECT_NEAR(gate.width(), std::sqrt(square - mean * mean), 1e-14);
 }
@@ -113,8 +117,10 @@ TEST(GateShape, TabulatedLookupFindsTheInterval) {
   std::uniform_real_distribution<double> uniform(0, 1);
   std::vector<double> offsets{-3}, values{0.1};
   for (int i = 0; i < 300; ++i) {
-    if (i % 17 != 0) offsets.push_back(offsets.back() + std::pow(10.0, -6 * uniform(generator)));
-    else offsets.push_back(offsets.back());
+    if (i % 17 != 0)
+      offsets.push_back(offsets.back() + std::pow(10.0, -6 * uniform(generator)));
+    else
+      offsets.push_back(offsets.back());
     values.push_back(uniform(generator));
   }
   const GateShape gate = GateShape::tabulated(offsets, values);
@@ -138,7 +144,8 @@ TEST(GateShape, ValueIntegratesToMassAndWidth) {
     const double mass = integrate(gate, [&](double x) { return gate.value(x); });
     EXPECT_NEAR(mass, gate.mass(), 1e-12) << name;
     const double mean = integrate(gate, [&](double x) { return x * gate.value(x); }) / mass;
-    const double variance = integrate(gate, [&](double x) { return (x - mean) * (x - mean) * gate.value(x); }) / mass;
+    const double variance =
+        integrate(gate, [&](double x) { return (x - mean) * (x - mean) * gate.value(x); }) / mass;
     EXPECT_NEAR(gate.width() / std::sqrt(variance), 1, 1e-10) << name;
     EXPECT_LT(gate.width(), scale) << name;
   }

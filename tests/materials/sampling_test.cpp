@@ -28,16 +28,20 @@ struct Frame {
   Vec3 s, t;
 };
 
-Vec3 tilted(double theta) { return {std::sin(theta) * std::cos(0.4), std::sin(theta) * std::sin(0.4), std::cos(theta)}; }
+Vec3 tilted(double theta) {
+  return {std::sin(theta) * std::cos(0.4), std::sin(theta) * std::sin(0.4), std::cos(theta)};
+}
 
 constexpr int kSide = 16, kSamples = 60000;
 
 int bin(double u, double phi) {
   const double v = phi / kTwoPi - std::floor(phi / kTwoPi);
-  return std::min(static_cast<int>(u * kSide), kSide - 1) * kSide + std::min(static_cast<int>(v * kSide), kSide - 1);
+  return std::min(static_cast<int>(u * kSide), kSide - 1) * kSide +
+         std::min(static_cast<int>(v * kSide), kSide - 1);
 }
 
-/// z of the chi-square of counts (the last bin holds the empty draws) against probabilities; thin bins are pooled.
+/// z of the chi-square of counts (the last bin holds the empty draws) against probabilities; thin bins are
+/// pooled.
 double chi_square_z(const std::vector<int>& counts, const std::vector<double>& probability) {
   double chi2 = 0, pooled_expected = 0, pooled_count = 0;
   int bins = 0;
@@ -61,9 +65,9 @@ double chi_square_z(const std::vector<int>& counts, const std::vector<double>& p
   return (chi2 - (bins - 1)) / std::sqrt(2.0 * (bins - 1));
 }
 
-// Bins in the half vector's slope, g = 1 / sqrt(1 + r^2) with r = tan(theta_h) / alpha, so that no lobe is too narrow:
-// dw_i = 4 (w_o.h) dw_h and dw_h = cos^3(theta_h) alpha^2 / g^3 dg dphi. 18 tests at |z| < 5.5 (the tail of
-// a chi-square with 250 degrees of freedom beyond it: about 1e-6): false alarm 2e-5.
+// Bins in the half vector's slope, g = 1 / sqrt(1 + r^2) with r = tan(theta_h) / alpha, so that no lobe is
+// too narrow: dw_i = 4 (w_o.h) dw_h and dw_h = cos^3(theta_h) alpha^2 / g^3 dg dphi. 18 tests at |z| < 5.5
+// (the tail of a chi-square with 250 degrees of freedom beyond it: about 1e-6): false alarm 2e-5.
 TEST(SampleDirection, ConductorFollowsItsDensity) {
   const Frame frame;
   for (const double alpha : {0.01, 0.2, 0.7}) {
@@ -82,7 +86,8 @@ TEST(SampleDirection, ConductorFollowsItsDensity) {
           if (facing <= 0) continue;
           const Vec3 i = 2 * facing * h - o;
           const double by_g_phi = 4 * facing * std::pow(h.z / g, 3) * alpha * alpha;
-          const double mass = direction_pdf(m, i.z, o.z, dot(i, o)) * by_g_phi * kTwoPi / (kSide * kSide * kSub * kSub);
+          const double mass =
+              direction_pdf(m, i.z, o.z, dot(i, o)) * by_g_phi * kTwoPi / (kSide * kSide * kSub * kSub);
           probability[bin(g, phi)] += mass;
           total += mass;
         }
@@ -117,7 +122,8 @@ TEST(SampleDirection, DiffuseFollowsTheCosine) {
   Rng rng({12, 0, 0}, 0, 0);
   for (int k = 0; k < kSamples; ++k) {
     const double u0 = rng.uniform(), u1 = rng.uniform();
-    const auto sample = sample_direction(make(MaterialType::diffuse), kNormal, frame.world(tilted(1.0)), u0, u1);
+    const auto sample =
+        sample_direction(make(MaterialType::diffuse), kNormal, frame.world(tilted(1.0)), u0, u1);
     ASSERT_TRUE(sample);
     const Vec3 i = frame.local(sample->direction);
     ++counts[bin(i.x * i.x + i.y * i.y, std::atan2(i.y, i.x))];
@@ -143,11 +149,13 @@ TEST(SampleDirection, WeightAndDensityAgreeWithTheLobe) {
         const double cos_io = dot(sample->direction, w_o);
         EXPECT_GT(cos_i * cos_o, 0);
         EXPECT_NEAR(length(sample->direction), 1, 1e-14);
-        // Contracted multiply-adds may round the cosines differently here; the density amplifies that by the inverse
-        // of sin^2(theta_h) + alpha^2 cos^2(theta_h), whose terms are sums and differences of |w_i + w_o|^2.
+        // Contracted multiply-adds may round the cosines differently here; the density amplifies that by the
+        // inverse of sin^2(theta_h) + alpha^2 cos^2(theta_h), whose terms are sums and differences of |w_i +
+        // w_o|^2.
         const double q = 2 + 2 * cos_io, p = cos_i + cos_o;
         const double t = alpha * alpha * p * p + std::max(q - p * p, 0.0);
-        const double tolerance = 16 * std::numeric_limits<double>::epsilon() * (1 + (alpha > 0 ? 2 / t + 1 / q : 0));
+        const double tolerance =
+            16 * std::numeric_limits<double>::epsilon() * (1 + (alpha > 0 ? 2 / t + 1 / q : 0));
         EXPECT_NEAR(sample->pdf / direction_pdf(m, cos_i, cos_o, cos_io), 1, tolerance);
         const double expected = lobe(m, cos_i, cos_o, cos_io) * std::abs(cos_i);
         EXPECT_NEAR(sample->weight * sample->pdf / expected, 1, tolerance + 8e-16 / std::abs(cos_i));
@@ -216,7 +224,8 @@ TEST(Lobe, SmoothConductorKeepsItsEnergy) {
   Rng rng({15, 0, 0}, 0, 0);
   for (int k = 0; k < 10000; ++k) {
     const double u0 = rng.uniform(), u1 = rng.uniform();
-    const auto sample = sample_direction(make(MaterialType::rough_conductor, 0.01), {0, 0, 1}, tilted(0.5), u0, u1);
+    const auto sample =
+        sample_direction(make(MaterialType::rough_conductor, 0.01), {0, 0, 1}, tilted(0.5), u0, u1);
     if (sample) sum += sample->weight;
   }
   EXPECT_NEAR(sum / 10000, 1, 2e-3);

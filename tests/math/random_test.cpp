@@ -25,7 +25,8 @@ TEST(Rng, DependsOnItsArgumentsAlone) {
   for (int i = 0; i < 100; ++i) EXPECT_EQ(a.uniform(), b.uniform());
 }
 
-// z of a chi-square statistic with many degrees of freedom is close to normal: |z| < 5 fails falsely once in 1e6.
+// z of a chi-square statistic with many degrees of freedom is close to normal: |z| < 5 fails falsely once in
+// 1e6.
 double chi_square_z(const std::vector<int>& counts, double expected) {
   double chi2 = 0;
   for (const int c : counts) chi2 += (c - expected) * (c - expected) / expected;
@@ -46,8 +47,8 @@ TEST(Rng, UniformInOpenInterval) {
   EXPECT_LT(std::abs(chi_square_z(counts, double(kSamples) / kBins)), 5);
 }
 
-// The first numbers of neighbouring streams, taken in pairs, fill the square evenly whichever key component moves.
-// Five tests at |z| < 5: false alarm 3e-6.
+// The first numbers of neighbouring streams, taken in pairs, fill the square evenly whichever key component
+// moves. Five tests at |z| < 5: false alarm 3e-6.
 TEST(Rng, NeighbouringStreamsAreIndependent) {
   constexpr int kSide = 32, kPairs = 1 << 18;
   const auto first = [](int component, std::uint32_t k) {
