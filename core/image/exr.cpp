@@ -27,7 +27,9 @@ namespace {
 
 constexpr char kRgb[] = {'R', 'G', 'B'};
 
-std::string gate_channel(int gate, char letter) { return fmt::format("gate{:03}.{}", gate, letter); }
+std::string gate_channel(int gate, char letter) {
+  return fmt::format("gate{:03}.{}", gate, letter);
+}
 
 /// A named channel of one float per pixel.
 struct Plane {
@@ -59,7 +61,9 @@ void require_pixels(const GatedImage& image) {
     throw std::invalid_argument("an image to be written needs pixels, gates, and one or three channels");
 }
 
-[[noreturn]] void fail(const std::string& file, const std::string& what) { throw InputError(file + ": " + what); }
+[[noreturn]] void fail(const std::string& file, const std::string& what) {
+  throw InputError(file + ": " + what);
+}
 
 struct ChannelName {
   int gate;
@@ -74,14 +78,14 @@ std::optional<ChannelName> parse_channel(std::string_view name) {
   std::from_chars(name.data() + kPrefix.size(), name.data() + name.size() - 2, gate);
   // Writing it again catches everything but the one way to name a gate.
   if (gate < 0 || gate_channel(gate, letter) != name) return {};
-  return std::string_view("RGBY").find(letter) == std::string_view::npos ? std::nullopt
-                                                                        : std::optional(ChannelName{gate, letter});
+  return std::string_view("RGBY").find(letter) == std::string_view::npos
+             ? std::nullopt
+             : std::optional(ChannelName{gate, letter});
 }
 
 /// Checks that the channels are those of whole gates without a gap; sets `gates` and `channels`.
 void check_channels(const std::string& file, const Imf::ChannelList& list, GatedImage& image) {
-  int count = 0;
-  for (auto channel = list.begin(); channel != list.end(); ++channel, ++count) {
+  for (auto channel = list.begin(); channel != list.end(); ++channel) {
     const std::optional<ChannelName> name = parse_channel(channel.name());
     if (!name)
       fail(file, fmt::format("channel '{}' is not one of a gated image (gateNNN.Y, or gateNNN.R, .G, .B)",
@@ -96,7 +100,6 @@ void check_channels(const std::string& file, const Imf::ChannelList& list, Gated
     image.channels = channels;
     image.gates = std::max(image.gates, name->gate + 1);
   }
-  if (count == 0) fail(file, "has no channels");
   for (int gate = 0; gate < image.gates; ++gate) {
     for (int c = 0; c < image.channels; ++c) {
       const std::string name = gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[c]);
@@ -109,7 +112,8 @@ void check_channels(const std::string& file, const Imf::ChannelList& list, Gated
 GatedImage read_planes(const std::string& file) {
   Imf::InputFile input(file.c_str());
   const auto& window = input.header().dataWindow();
-  if (window != input.header().displayWindow()) fail(file, "is cropped (data window and display window differ)");
+  if (window != input.header().displayWindow())
+    fail(file, "is cropped (data window and display window differ)");
   GatedImage image;
   check_channels(file, input.header().channels(), image);
   const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
@@ -123,7 +127,8 @@ GatedImage read_planes(const std::string& file) {
   for (std::size_t p = 0; p < planes; ++p) {
     const int gate = static_cast<int>(p) / image.channels, channel = static_cast<int>(p) % image.channels;
     // One row for all scanlines (no stride in y); pixels beside each other as in the image.
-    char* base = reinterpret_cast<char*>(row.data() + p) - sizeof(float) * planes * static_cast<std::ptrdiff_t>(window.min.x);
+    char* base = reinterpret_cast<char*>(row.data() + p) -
+                 sizeof(float) * planes * static_cast<std::ptrdiff_t>(window.min.x);
     buffer.insert(gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[channel]),
                   Imf::Slice(Imf::FLOAT, base, sizeof(float) * planes, 0));
   }

@@ -15,22 +15,25 @@ struct Mesh {
   std::vector<std::array<int, 3>> faces;
 };
 
-/// Reads OBJ, OFF, PLY (text or binary) or STL (text or binary), chosen by the file's extension. Vertices and faces are
-/// those of the file, in its order; polygons become fans around their first corner, which is right where they are
-/// convex. Text is read in double precision, binary PLY in float. Throws InputError `FILE[:LINE]: what is wrong`.
+/// Reads OBJ, OFF, PLY (text or binary) or STL (text or binary), chosen by the file's extension. Vertices and
+/// faces are those of the file, in its order; polygons become fans around their first corner, which is right
+/// where they are convex. Text is read in double precision, binary PLY in float. Throws InputError
+/// `FILE[:LINE]: what is wrong`.
 Mesh read_mesh(const std::string& file);
 
 /// The mesh on which shapes are built:
-/// - vertices at exactly equal positions (0 and -0 are equal) become one, so that seams of texture coordinates or normals
+/// - vertices at exactly equal positions (0 and -0 are equal) become one, so that seams of texture
+/// coordinates or normals
 ///   are no borders;
 /// - degenerate faces (two equal corners, or exactly no area) and repetitions of a face are dropped;
-/// - vertices of no remaining face are dropped; the others are in the order of their first appearance in `mesh`.
-/// Throws InputError when no face is left, or when two faces have the same corners but opposite orientation: which of the
-/// two a ray meets would be undefined.
+/// - vertices of no remaining face are dropped; the others are in the order of their first appearance in
+/// `mesh`. Throws InputError when no face is left, or when two faces have the same corners but opposite
+/// orientation: which of the two a ray meets would be undefined.
 Mesh clean_mesh(const Mesh& mesh);
 
-/// Edges of a clean mesh, by ascending vertices: vertex[0] < vertex[1], and face[0] < face[1] unless it is a border. The
-/// two faces may be oriented inconsistently. Throws InputError for an edge of more than two faces.
+/// Edges of a clean mesh, by ascending vertices: vertex[0] < vertex[1], and face[0] < face[1] unless it is a
+/// border. The two faces may be oriented inconsistently. Throws InputError for an edge of more than two
+/// faces.
 std::vector<Edge> build_edges(const Mesh& mesh);
 
 }  // namespace isochron

@@ -22,7 +22,8 @@ namespace {
 
 constexpr std::string_view kSpace = " \t\r\f\v";
 
-/// Wavefront OBJ: `v` and `f` lines; texture coordinates, normals, groups, lines and materials do not matter here.
+/// Wavefront OBJ: `v` and `f` lines; texture coordinates, normals, groups, lines and materials do not matter
+/// here.
 Mesh read_obj(const std::string& file, const std::string& contents) {
   Mesh mesh;
   LineReader lines(file, contents, '#');
@@ -41,17 +42,19 @@ Mesh read_obj(const std::string& file, const std::string& contents) {
         const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), index);
         if (error != std::errc() || end != digits.data() + digits.size() || index == 0 || index < -count ||
             index > INT32_MAX)
-          lines.fail(fmt::format("'{}' is not a vertex of a face (an index from 1, or from -1 down to -{})", word, count));
+          lines.fail(fmt::format("'{}' is not a vertex of a face (an index from 1, or from -1 down to -{})",
+                                 word, count));
         corners.push_back(static_cast<int>(index > 0 ? index - 1 : count + index));
         if (corners.back() > highest) highest = corners.back(), highest_line = lines.line();
       }
-      if (corners.size() < 3) lines.fail(fmt::format("a face of {} vertices (at least three)", corners.size()));
+      if (corners.size() < 3)
+        lines.fail(fmt::format("a face of {} vertices (at least three)", corners.size()));
       add_polygon(corners, mesh);
     }
   }
   if (highest >= static_cast<int>(mesh.positions.size()))
-    throw InputError(fmt::format("{}:{}: there is no vertex {} (the file has {})", file, highest_line, highest + 1,
-                                 mesh.positions.size()));
+    throw InputError(fmt::format("{}:{}: there is no vertex {} (the file has {})", file, highest_line,
+                                 highest + 1, mesh.positions.size()));
   return mesh;
 }
 
@@ -64,7 +67,8 @@ Mesh read_off(const std::string& file, const std::string& contents) {
   if (header != "OFF" && header != "COFF" && header != "NOFF" && header != "CNOFF" && header != "STOFF")
     lines.fail("does not begin with OFF");
   std::string_view word = lines.word();
-  if (!word.empty()) lines.fail(fmt::format("'{}' after OFF (only text files in three dimensions are read)", word));
+  if (!word.empty())
+    lines.fail(fmt::format("'{}' after OFF (only text files in three dimensions are read)", word));
   lines.require_next();
   const long long vertices = lines.integer(), faces = lines.integer();
   if (vertices < 0 || vertices > INT32_MAX || faces < 0 || faces > INT32_MAX) lines.fail("impossible counts");
@@ -92,7 +96,8 @@ Mesh read_binary_stl(const std::string& file, const std::string& contents, std::
       mesh.positions.push_back({points[k], points[k + 1], points[k + 2]});
       const Vec3& p = mesh.positions.back();
       if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-        throw InputError(fmt::format("{}: facet {} has a coordinate that is not a finite number", file, f + 1));
+        throw InputError(
+            fmt::format("{}: facet {} has a coordinate that is not a finite number", file, f + 1));
     }
     mesh.faces.push_back({v, v + 1, v + 2});
   }
@@ -178,10 +183,13 @@ Vec3 LineReader::point() {
   return {x, y, z};
 }
 
-void LineReader::fail(const std::string& what) const { throw InputError(fmt::format("{}:{}: {}", file_, line_, what)); }
+void LineReader::fail(const std::string& what) const {
+  throw InputError(fmt::format("{}:{}: {}", file_, line_, what));
+}
 
 void add_polygon(const std::vector<int>& corners, Mesh& mesh) {
-  for (std::size_t k = 2; k < corners.size(); ++k) mesh.faces.push_back({corners[0], corners[k - 1], corners[k]});
+  for (std::size_t k = 2; k < corners.size(); ++k)
+    mesh.faces.push_back({corners[0], corners[k - 1], corners[k]});
 }
 
 void read_indexed_face(LineReader& lines, long long corners, std::size_t vertices, Mesh& mesh) {
@@ -201,7 +209,8 @@ Mesh read_mesh(const std::string& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension != ".obj" && extension != ".off" && extension != ".ply" && extension != ".stl")
-    throw InputError(fmt::format("{}: '{}' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file, extension));
+    throw InputError(
+        fmt::format("{}: '{}' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file, extension));
   std::error_code ignored;
   if (std::filesystem::is_directory(file, ignored)) throw InputError(file + ": is a folder");
   std::ifstream stream(file, std::ios::binary);

@@ -1,5 +1,5 @@
-// What the readers of mesh files share. Text is read here and not by OpenMesh, whose readers turn NaN into zero, skip
-// vertices they cannot read and pass on indices of vertices that do not exist.
+// What the readers of mesh files share. Text is read here and not by OpenMesh, whose readers turn NaN into
+// zero, skip vertices they cannot read and pass on indices of vertices that do not exist.
 #pragma once
 #include <string>
 #include <string_view>
@@ -9,8 +9,8 @@
 
 namespace isochron {
 
-/// Walks through the lines of a text file. Comments (from `comment` to the end of the line) and blank lines are
-/// skipped. Errors name the file and the line, counted from one.
+/// Walks through the lines of a text file. Comments (from `comment` to the end of the line) and blank lines
+/// are skipped. Errors name the file and the line, counted from one.
 class LineReader {
  public:
   LineReader(const std::string& file, std::string_view text, char comment)

@@ -15,8 +15,8 @@ namespace {
 
 using namespace OpenMesh;  // for the many types of the importer's interface
 
-/// Collects vertices and faces as they stand in the file. OpenMesh's own importer builds half-edges and changes what is
-/// not a manifold before seams are welded.
+/// Collects vertices and faces as they stand in the file. OpenMesh's own importer builds half-edges and
+/// changes what is not a manifold before seams are welded.
 class Collector final : public IO::BaseImporter {
  public:
   explicit Collector(Mesh& mesh) : mesh_(mesh) {}
@@ -30,7 +30,9 @@ class Collector final : public IO::BaseImporter {
     return VertexHandle(static_cast<int>(mesh_.positions.size()) - 1);
   }
   VertexHandle add_vertex() override { return add_vertex(Vec3f(0, 0, 0)); }
-  void set_point(VertexHandle v, const Vec3f& p) override { mesh_.positions.at(v.idx()) = {p[0], p[1], p[2]}; }
+  void set_point(VertexHandle v, const Vec3f& p) override {
+    mesh_.positions.at(v.idx()) = {p[0], p[1], p[2]};
+  }
   FaceHandle add_face(const VHandles& corners) override {
     polygon_.clear();
     for (const VertexHandle v : corners) polygon_.push_back(v.idx());
@@ -144,7 +146,8 @@ Header read_header(LineReader& lines) {
       Element element;
       element.name = lines.word();
       element.count = lines.integer();
-      if (element.count < 0 || element.count > std::numeric_limits<int>::max()) lines.fail("an impossible count");
+      if (element.count < 0 || element.count > std::numeric_limits<int>::max())
+        lines.fail("an impossible count");
       header.elements.push_back(element);
     } else if (keyword == "property") {
       if (header.elements.empty()) lines.fail("a property of no element");
@@ -205,9 +208,9 @@ Mesh read_binary(const std::string& file, const Header& header) {
   }
   if (!read || static_cast<long long>(collector.n_vertices()) != header.find("vertex")->count ||
       static_cast<long long>(collector.n_faces()) != header.find("face")->count)
-    throw InputError(fmt::format("{}: cannot be read as PLY: {} of {} vertices and {} of {} faces found", file,
-                                 collector.n_vertices(), header.find("vertex")->count, collector.n_faces(),
-                                 header.find("face")->count));
+    throw InputError(fmt::format("{}: cannot be read as PLY: {} of {} vertices and {} of {} faces found",
+                                 file, collector.n_vertices(), header.find("vertex")->count,
+                                 collector.n_faces(), header.find("face")->count));
   const int vertices = static_cast<int>(mesh.positions.size());
   for (int v = 0; v < vertices; ++v) {
     const Vec3& p = mesh.positions[v];

@@ -13,8 +13,12 @@ int find_name(const std::vector<T>& items, const std::string& name) {
 
 }  // namespace
 
-int Scene::find_shape(const std::string& name) const { return find_name(shapes, name); }
-int Scene::find_material(const std::string& name) const { return find_name(materials, name); }
+int Scene::find_shape(const std::string& name) const {
+  return find_name(shapes, name);
+}
+int Scene::find_material(const std::string& name) const {
+  return find_name(materials, name);
+}
 
 std::vector<double> TangentBasis::transpose_apply(const std::vector<double>& dof_gradient) const {
   std::vector<double> gradient(columns, 0.0);

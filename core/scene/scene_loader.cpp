@@ -89,7 +89,8 @@ void transform_mesh(const YamlValue& value, Mesh& mesh) {
   const double cosine = std::cos(angle), sine = std::sin(angle);
   for (Vec3& p : mesh.positions) {
     const Vec3 q = p * scale;
-    const Vec3 rotated = angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
+    const Vec3 rotated =
+        angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
     p = rotated + translation;
   }
   for (const auto& face : mesh.faces) {
@@ -100,8 +101,8 @@ void transform_mesh(const YamlValue& value, Mesh& mesh) {
   }
 }
 
-Mesh read_shape_mesh(const YamlValue& file, const std::string& path, const std::optional<YamlValue>& transform,
-                     std::vector<Edge>& edges) {
+Mesh read_shape_mesh(const YamlValue& file, const std::string& path,
+                     const std::optional<YamlValue>& transform, std::vector<Edge>& edges) {
   Mesh mesh;
   try {
     const Mesh raw = read_mesh(path);
@@ -123,7 +124,8 @@ void read_shape(const YamlValue& value, Scene& scene) {
   Shape shape;
   const YamlValue name = map.require("name");
   shape.name = name.text();
-  if (scene.find_shape(shape.name) >= 0) name.fail("'" + shape.name + "' is an earlier shape's name", "names differ");
+  if (scene.find_shape(shape.name) >= 0)
+    name.fail("'" + shape.name + "' is an earlier shape's name", "names differ");
 
   const YamlValue file = map.require("file");
   shape.file = (std::filesystem::path(value.file()).parent_path() / file.text()).lexically_normal().string();
@@ -140,8 +142,10 @@ void read_shape(const YamlValue& value, Scene& scene) {
 
   std::vector<Edge> edges;
   const Mesh mesh = read_shape_mesh(file, shape.file, transform, edges);
-  constexpr std::size_t kMost = std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
-  if (scene.positions.size() + mesh.positions.size() > kMost || scene.triangles.size() + mesh.faces.size() > kMost)
+  constexpr std::size_t kMost =
+      std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
+  if (scene.positions.size() + mesh.positions.size() > kMost ||
+      scene.triangles.size() + mesh.faces.size() > kMost)
     file.fail("the scene has too many vertices or triangles", fmt::format("at most {} of each", kMost));
 
   shape.first_vertex = static_cast<int>(scene.positions.size());

@@ -5,8 +5,8 @@
 
 namespace isochron {
 
-/// Reads a scene file with the meshes it names (paths relative to the scene file), transformed and welded. Throws
-/// InputError `FILE:LINE:COLUMN: KEY: what is wrong (what is allowed)`, in one line.
+/// Reads a scene file with the meshes it names (paths relative to the scene file), transformed and welded.
+/// Throws InputError `FILE:LINE:COLUMN: KEY: what is wrong (what is allowed)`, in one line.
 Scene load_scene(const std::string& file);
 
 }  // namespace isochron

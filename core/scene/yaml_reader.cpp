@@ -40,26 +40,34 @@ namespace {
 std::string quoted(const std::string& text) {
   constexpr std::size_t kLongest = 40;
   std::string shown = text.substr(0, kLongest);
-  std::replace_if(shown.begin(), shown.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+  std::replace_if(
+      shown.begin(), shown.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   return "'" + shown + (text.size() > kLongest ? "...'" : "'");
 }
 
 std::string join(const std::vector<std::string>& words) {
-  return std::accumulate(words.begin(), words.end(), std::string(),
-                         [](const std::string& a, const std::string& b) { return a.empty() ? b : a + ", " + b; });
+  return std::accumulate(
+      words.begin(), words.end(), std::string(),
+      [](const std::string& a, const std::string& b) { return a.empty() ? b : a + ", " + b; });
 }
 
 std::string describe(const YAML::Node& node) {
   switch (node.Type()) {
-    case YAML::NodeType::Map: return "a map";
-    case YAML::NodeType::Sequence: return fmt::format("a list of {}", node.size());
-    case YAML::NodeType::Scalar: return quoted(node.Scalar());
-    default: return "nothing";
+    case YAML::NodeType::Map:
+      return "a map";
+    case YAML::NodeType::Sequence:
+      return fmt::format("a list of {}", node.size());
+    case YAML::NodeType::Scalar:
+      return quoted(node.Scalar());
+    default:
+      return "nothing";
   }
 }
 
 /// yaml-cpp tags quoted scalars with "!".
-bool is_plain(const YAML::Node& node) { return node.IsScalar() && node.Tag() != "!"; }
+bool is_plain(const YAML::Node& node) {
+  return node.IsScalar() && node.Tag() != "!";
+}
 
 template <class T>
 std::optional<T> parse(const YAML::Node& node) {
@@ -80,7 +88,8 @@ std::string child(const std::string& parent, const std::string& name) {
 }
 
 std::string one_line(std::string text) {
-  std::replace_if(text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
   return text;
 }
 
@@ -92,9 +101,10 @@ std::string place(const std::string& source, const YAML::Mark& mark) {
 YAML::Node parse_document(const std::string& source, const std::string& text) {
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty()) throw InputError(source + ":1:1: syntax: the file is empty");
+    if (documents.empty()) throw InputError(source + ":1:1: syntax: is empty");
     if (documents.size() > 1)
-      throw InputError(place(source, documents[1].Mark()) + ": syntax: a second document (one per file is allowed)");
+      throw InputError(place(source, documents[1].Mark()) +
+                       ": syntax: a second document (one per file is allowed)");
     return documents[0];
   } catch (const YAML::Exception& error) {
     throw InputError(place(source, error.mark) + ": syntax: " + one_line(error.msg));
@@ -103,7 +113,8 @@ YAML::Node parse_document(const std::string& source, const std::string& text) {
 
 std::string read_text(const std::string& file) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) throw InputError(file + ":1:1: file: is a folder (a YAML file)");
+  if (std::filesystem::is_directory(file, ignored))
+    throw InputError(file + ":1:1: file: is a folder (a YAML file)");
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   if (!stream) throw InputError(file + ":1:1: file: cannot be opened: " + std::strerror(errno));
@@ -160,8 +171,9 @@ std::string apply_override(YAML::Node node, const std::string& text) {
       if (last) node[*step.index] = value;
       next.reset(node[*step.index]);
     } else {
-      if (!node.IsMap()) throw InputError(fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key,
-                                                      describe(node)));
+      if (!node.IsMap())
+        throw InputError(
+            fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
       if (last) node[step.key] = value;
       const YAML::Node found = std::as_const(node)[step.key];
       if (!found.IsDefined()) throw InputError(fmt::format("{}: there is no key '{}'", source, step.key));
@@ -189,11 +201,21 @@ std::string NumberRange::describe() const {
 YamlValue::YamlValue(std::shared_ptr<const Document> document, const YAML::Node& node, std::string key)
     : document_(std::move(document)), node_(std::make_shared<const YAML::Node>(node)), key_(std::move(key)) {}
 
-const std::string& YamlValue::file() const { return document_->file; }
-bool YamlValue::is_map() const { return node_->IsMap(); }
-bool YamlValue::is_list() const { return node_->IsSequence(); }
-bool YamlValue::is_scalar() const { return node_->IsScalar(); }
-bool YamlValue::is_number() const { return parse<double>(*node_).has_value(); }
+const std::string& YamlValue::file() const {
+  return document_->file;
+}
+bool YamlValue::is_map() const {
+  return node_->IsMap();
+}
+bool YamlValue::is_list() const {
+  return node_->IsSequence();
+}
+bool YamlValue::is_scalar() const {
+  return node_->IsScalar();
+}
+bool YamlValue::is_number() const {
+  return parse<double>(*node_).has_value();
+}
 
 void YamlValue::fail(const std::string& wrong, const std::string& allowed) const {
   std::string message = place(document_->source(key_), node_->Mark()) + ": ";
@@ -290,10 +312,12 @@ YamlMap YamlValue::map() const {
       YamlValue(document_, pair.first, key_).fail(describe(pair.first) + " is used as a key", "a word");
     const std::string name = pair.first.Scalar();
     const std::string path = child(key_, name);
-    YamlMap::Entry entry{name, YamlValue(document_, pair.first, path), YamlValue(document_, pair.second, path)};
+    YamlMap::Entry entry{name, YamlValue(document_, pair.first, path),
+                         YamlValue(document_, pair.second, path)};
     for (const YamlMap::Entry& earlier : map.entries_) {
       if (earlier.name == name)
-        entry.key.fail(fmt::format("stands here twice, first on line {}", earlier.key.node_->Mark().line + 1));
+        entry.key.fail(
+            fmt::format("stands here twice, first on line {}", earlier.key.node_->Mark().line + 1));
     }
     map.entries_.push_back(std::move(entry));
   }
@@ -341,10 +365,13 @@ void YamlMap::reject_unknown() const {
   }
 }
 
-void YamlMap::fail(const std::string& wrong, const std::string& allowed) const { value_.fail(wrong, allowed); }
+void YamlMap::fail(const std::string& wrong, const std::string& allowed) const {
+  value_.fail(wrong, allowed);
+}
 
 std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {
-  // Edit distance in which swapping two neighbours is one step; a misspelling takes one step in three letters.
+  // Edit distance in which swapping two neighbours is one step; a misspelling takes one step in three
+  // letters.
   std::string best;
   std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
   for (const std::string& other : candidates) {

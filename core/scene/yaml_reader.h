@@ -32,12 +32,12 @@ struct NumberRange {
 
 class YamlMap;
 
-/// One value of a document with the place and path it was found at. Cheap to copy. The document lives as long as any
-/// of its values.
+/// One value of a document with the place and path it was found at. Cheap to copy. The document lives as long
+/// as any of its values.
 class YamlValue {
  public:
-  const std::string& key() const { return key_; }    ///< dotted path; empty at the top of the document
-  const std::string& file() const;                   ///< as given to `open_yaml`
+  const std::string& key() const { return key_; }  ///< dotted path; empty at the top of the document
+  const std::string& file() const;                 ///< as given to `open_yaml`
   bool is_map() const;
   bool is_list() const;
   bool is_scalar() const;
@@ -99,9 +99,9 @@ class YamlMap {
   std::vector<std::string> asked_;
 };
 
-/// Reads a file of one YAML document. Each override is `KEY.PATH=VALUE` (list entries as `KEY[INDEX]`), with VALUE in
-/// YAML; it replaces the file's value or adds a key to a map. Errors in overridden values name `--set KEY.PATH` in
-/// place of the file. Throws InputError when the file cannot be read or is not YAML.
+/// Reads a file of one YAML document. Each override is `KEY.PATH=VALUE` (list entries as `KEY[INDEX]`), with
+/// VALUE in YAML; it replaces the file's value or adds a key to a map. Errors in overridden values name
+/// `--set KEY.PATH` in place of the file. Throws InputError when the file cannot be read or is not YAML.
 YamlValue open_yaml(const std::string& file, const std::vector<std::string>& overrides = {});
 
 /// The candidate that `word` is probably a misspelling of, or empty.

@@ -1,0 +1,405 @@
+#include "core/scene/mesh.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <iostream>
+#include <map>
+#include <random>
+#include <set>
+
+#include "tests/scene/temporary_folder.h"
+
+namespace isochron {
+namespace {
+
+using Face = std::array<int, 3>;
+
+/// Corners of the unit cube's six faces, seen from outside counter-clockwise; corner i is (i & 1, i / 2 & 1,
+/// i / 4).
+constexpr int kCube[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
+                             {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+
+Vec3 cube_corner(int i) {
+  return {double(i & 1), double(i >> 1 & 1), double(i >> 2)};
+}
+
+template <class T>
+void append(std::string& bytes, T value, bool big_endian = false) {
+  char raw[sizeof(T)];
+  std::memcpy(raw, &value, sizeof(T));
+  if (big_endian) std::reverse(raw, raw + sizeof(T));
+  bytes.append(raw, sizeof(T));
+}
+
+double volume(const Mesh& mesh) {
+  double sum = 0;
+  for (const Face& f : mesh.faces)
+    sum += dot(mesh.positions[f[0]], cross(mesh.positions[f[1]], mesh.positions[f[2]])) / 6;
+  return sum;
+}
+
+/// A closed cube of volume one with 8 vertices, 12 faces and 18 edges, whatever its file.
+void expect_cube(const Mesh& raw) {
+  const Mesh mesh = clean_mesh(raw);
+  EXPECT_EQ(mesh.positions.size(), 8u);
+  EXPECT_EQ(mesh.faces.size(), 12u);
+  EXPECT_NEAR(volume(mesh), 1, 1e-15);  // also tells the orientation
+  const std::vector<Edge> edges = build_edges(mesh);
+  EXPECT_EQ(edges.size(), 18u);
+  for (const Edge& edge : edges) {
+    EXPECT_GE(edge.face[0], 0);
+    EXPECT_GT(edge.face[1], edge.face[0]);
+  }
+}
+
+class MeshFile : public testing::Test {
+ protected:
+  Mesh read(const std::string& name, const std::string& contents) {
+    return read_mesh(folder.write(name, contents));
+  }
+  /// The message without the folder.
+  std::string error(const std::string& name, const std::string& contents) {
+    const std::string message = error_of([&] { read(name, contents); });
+    const std::string prefix = folder.path("");
+    return message.starts_with(prefix) ? message.substr(prefix.size()) : message;
+  }
+
+  TemporaryFolder folder;
+};
+
+std::string cube_obj() {
+  std::string text = "# a cube of quads\nmtllib none.mtl\no cube\n";
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 p = cube_corner(i);
+    text += fmt::format("v {} {} {}\n", p.x, p.y, p.z);
+  }
+  text += "vt 0 0\nvn 0 0 1\nusemtl none\ns off\n";
+  for (const auto& q : kCube) {
+    text += "f";
+    const char* const suffixes[] = {"", "/1", "//1", "/1/1"};
+    for (int k = 0; k < 4; ++k) text += fmt::format(" {}{}", q[k] + 1, suffixes[k]);
+    text += "\r\n";
+  }
+  return text;
+}
+
+std::string cube_ply(const std::string& format) {
+  const bool big = format == "binary_big_endian";
+  std::string bytes =
+      "ply\nformat " + format +
+      " 1.0\ncomment 3 quads\nelement vertex 8\nproperty float x\nproperty float y\nproperty uchar red\n"
+      "property float z\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n";
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 p = cube_corner(i);
+    if (format == "ascii") {
+      bytes += fmt::format("{} {} 255 {}\n", p.x, p.y, p.z);
+    } else {
+      append(bytes, static_cast<float>(p.x), big), append(bytes, static_cast<float>(p.y), big);
+      append(bytes, static_cast<unsigned char>(255)), append(bytes, static_cast<float>(p.z), big);
+    }
+  }
+  for (const auto& q : kCube) {
+    if (format == "ascii") {
+      bytes += "4";
+      for (const int v : q) bytes += fmt::format(" {}", v);
+      bytes += "\n";
+    } else {
+      append(bytes, static_cast<unsigned char>(4));
+      for (const int v : q) append(bytes, static_cast<std::int32_t>(v), big);
+    }
+  }
+  return bytes;
+}
+
+std::string cube_stl(bool binary) {
+  std::string bytes = binary ? std::string(80, ' ') : "solid cube\n";
+  if (binary) append(bytes, std::uint32_t{12});
+  for (const auto& q : kCube) {
+    for (int k = 2; k < 4; ++k) {
+      if (binary) {
+        bytes.append(12, '\0');
+      } else {
+        bytes += "  facet normal 0 0 0\n    outer loop\n";
+      }
+      for (const int v : {q[0], q[k - 1], q[k]}) {
+        const Vec3 p = cube_corner(v);
+        if (binary) {
+          append(bytes, static_cast<float>(p.x)), append(bytes, static_cast<float>(p.y)),
+              append(bytes, static_cast<float>(p.z));
+        } else {
+          bytes += fmt::format("      vertex {} {} {}\n", p.x, p.y, p.z);
+        }
+      }
+      if (binary) {
+        bytes.append(2, '\0');
+      } else {
+        bytes += "    endloop\n  endfacet\n";
+      }
+    }
+  }
+  return binary ? bytes : bytes + "endsolid cube\n";
+}
+
+std::string cube_off() {
+  std::string text = "OFF\n# counts\n8 6 0\n";
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 p = cube_corner(i);
+    text += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+  }
+  for (const auto& q : kCube) {
+    text += "4";
+    for (const int v : q) text += fmt::format(" {}", v);
+    text += " 255 0 0\n";
+  }
+  return text;
+}
+
+TEST_F(MeshFile, EveryFormatGivesTheSameCube) {
+  std::ostringstream chatter;
+  std::streambuf* const standard = std::cerr.rdbuf(chatter.rdbuf());
+  expect_cube(read("cube.obj", cube_obj()));
+  expect_cube(read("cube.off", cube_off()));
+  expect_cube(read("text.ply", cube_ply("ascii")));
+  expect_cube(read("little.ply", cube_ply("binary_little_endian")));
+  expect_cube(read("big.ply", cube_ply("binary_big_endian")));
+  expect_cube(read("text.stl", cube_stl(false)));
+  expect_cube(read("binary.STL", cube_stl(true)));
+  std::cerr.rdbuf(standard);
+  EXPECT_EQ(chatter.str(), "");
+}
+
+TEST_F(MeshFile, TextIsReadInDoublePrecision) {
+  const Mesh mesh = read("m.obj", "v 0.1 +1e-3 -2.5E1\nv 1 0 0 1 0.5 0.5 0.5\nv 0 1 1e-400\nf -3 -2 -1\n");
+  EXPECT_EQ(mesh.positions[0], (Vec3{0.1, 1e-3, -25}));
+  EXPECT_EQ(mesh.positions[1], (Vec3{1, 0, 0}));
+  EXPECT_EQ(mesh.positions[2], (Vec3{0, 1, 0}));
+  EXPECT_EQ(mesh.faces, (std::vector<Face>{{0, 1, 2}}));
+}
+
+TEST_F(MeshFile, PolygonsBecomeFans) {
+  const Mesh mesh = read("m.obj", "v 0 0 0\nv 2 0 0\nv 3 1 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4 5\n");
+  EXPECT_EQ(mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
+}
+
+TEST_F(MeshFile, ObjErrors) {
+  const std::string three = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_EQ(error("m.obj", "v 0 0\n"), "m.obj:1: '' is not a finite number");
+  EXPECT_EQ(error("m.obj", "# c\n\nv 0 inf 0\n"), "m.obj:3: 'inf' is not a finite number");
+  EXPECT_EQ(error("m.obj", "v 0 1e999 0\n"), "m.obj:1: '1e999' is not a finite number");
+  EXPECT_EQ(error("m.obj", "v 0 0.1x 0\n"), "m.obj:1: '0.1x' is not a finite number");
+  EXPECT_EQ(error("m.obj", three + "f 1 2\n"), "m.obj:4: a face of 2 vertices (at least three)");
+  EXPECT_EQ(error("m.obj", three + "f 0 1 2\n"),
+            "m.obj:4: '0' is not a vertex of a face (an index from 1, or from -1 down to -3)");
+  EXPECT_EQ(error("m.obj", three + "f 1 2 -4/1\n"),
+            "m.obj:4: '-4/1' is not a vertex of a face (an index from 1, or from -1 down to -3)");
+  EXPECT_EQ(error("m.obj", three + "f 1 2 3\n\nf 9 2 3\n"), "m.obj:6: there is no vertex 9 (the file has 3)");
+  EXPECT_EQ(error("m.obj", ""), "m.obj: has no faces");
+  EXPECT_EQ(error("m.obj", "garbage"), "m.obj: has no faces");
+  EXPECT_EQ(error("m.abc", three), "m.abc: '.abc' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)");
+  std::filesystem::create_directory(folder.path("folder.obj"));
+  EXPECT_EQ(error_of([&] { read_mesh(folder.path("folder.obj")); }),
+            folder.path("folder.obj") + ": is a folder");
+}
+
+TEST_F(MeshFile, OffErrors) {
+  EXPECT_EQ(error("m.off", "garbage\n"), "m.off:1: does not begin with OFF");
+  EXPECT_EQ(error("m.off", "OFF BINARY\n"),
+            "m.off:1: 'BINARY' after OFF (only text files in three dimensions are read)");
+  EXPECT_EQ(error("m.off", "OFF\n3 -1 0\n"), "m.off:2: impossible counts");
+  EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 nan 0\n"), "m.off:4: 'nan' is not a finite number");
+  EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n"), "m.off:4: the file ends too early");
+  EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
+            "m.off:6: there is no vertex 3 (0 to 2)");
+  EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
+            "m.off:6: a face of 2 vertices (at least three)");
+  EXPECT_EQ(error("m.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"), "m.off: has no faces");
+}
+
+TEST_F(MeshFile, PlyErrors) {
+  const auto text = [&](const std::string& from, const std::string& to, const std::string& format = "ascii") {
+    std::string contents = cube_ply(format);
+    contents.replace(contents.find(from), from.size(), to);
+    return error("m.ply", contents);
+  };
+  EXPECT_EQ(error("m.ply", ""), "m.ply:0: the file ends too early");
+  EXPECT_EQ(text("ply\n", "plx\n"), "m.ply:1: does not begin with ply");
+  EXPECT_EQ(text("ascii", "utf8"), "m.ply:2: 'utf8' is not a format of PLY");
+  EXPECT_EQ(text("property float z", "property float w"),
+            "m.ply:11: the header has no element vertex with properties x, y and z");
+  EXPECT_EQ(text("element face", "element faces"),
+            "m.ply:11: has no faces (an element face with property vertex_indices)");
+  EXPECT_EQ(text("\n1 ", "\nnan "), "m.ply:13: 'nan' is not a finite number");
+  EXPECT_EQ(text("4 4 5 7 6", "4 4 5 8 6"), "m.ply:21: there is no vertex 8 (0 to 7)");
+  EXPECT_EQ(text("4 1 3 7 5\n", ""), "m.ply:24: the file ends too early");
+}
+
+TEST_F(MeshFile, BinaryPlyErrors) {
+  std::ostringstream chatter;
+  std::streambuf* const standard = std::cerr.rdbuf(chatter.rdbuf());
+  const std::string good = cube_ply("binary_little_endian");
+  const std::size_t body = good.find("end_header\n") + 11, faces = body + 8 * 13;
+  std::string bad = good;
+  const float nan = std::nanf("");
+  std::memcpy(bad.data() + body + 13, &nan, sizeof nan);
+  EXPECT_EQ(error("m.ply", bad), "m.ply: vertex 1 has a coordinate that is not a finite number");
+  bad = good;
+  const std::int32_t index = 77;
+  std::memcpy(bad.data() + faces + 1 + 8, &index, sizeof index);
+  EXPECT_EQ(error("m.ply", bad), "m.ply: there is no vertex 77 (0 to 7)");
+  EXPECT_TRUE(error("m.ply", good.substr(0, body + 30)).starts_with("m.ply: cannot be read as PLY: "));
+  EXPECT_TRUE(error("m.ply", good.substr(0, faces + 20)).starts_with("m.ply: cannot be read as PLY: "));
+  EXPECT_TRUE(error("m.ply", good.substr(0, good.size() - 1)).starts_with("m.ply: cannot be read as PLY: "));
+  std::cerr.rdbuf(standard);
+  EXPECT_EQ(chatter.str(), "");
+}
+
+TEST_F(MeshFile, StlErrors) {
+  EXPECT_EQ(error("m.stl", "garbage"),
+            "m.stl:1: is neither text STL nor binary STL of the size its header states");
+  std::string bad = cube_stl(true);
+  const float nan = std::nanf("");
+  std::memcpy(bad.data() + 84 + 50 * 2 + 12 + 4, &nan, sizeof nan);
+  EXPECT_EQ(error("m.stl", bad), "m.stl: facet 3 has a coordinate that is not a finite number");
+  EXPECT_EQ(error("m.stl", cube_stl(true).substr(0, 200)),
+            "m.stl:1: is neither text STL nor binary STL of the size its header states");
+  EXPECT_EQ(error("m.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 x 0\n"),
+            "m.stl:5: 'x' is not a finite number");
+  EXPECT_EQ(error("m.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n"),
+            "m.stl:6: a facet of 2 vertices (three)");
+  EXPECT_EQ(error("m.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\n"),
+            "m.stl:4: the file ends within a facet");
+}
+
+TEST(CleanMesh, WeldsSeams) {
+  // Every face of the cube with corners of its own, as exporters write where texture coordinates or normals
+  // jump. Zero is written with either sign.
+  Mesh mesh;
+  for (int q = 0; q < 6; ++q) {
+    const int first = static_cast<int>(mesh.positions.size());
+    for (const int v : kCube[q]) {
+      Vec3 p = cube_corner(v);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (p[axis] == 0 && q % 2 == 0) p[axis] = -0.0;
+      }
+      mesh.positions.push_back(p);
+    }
+    mesh.faces.push_back({first, first + 1, first + 2});
+    mesh.faces.push_back({first, first + 2, first + 3});
+  }
+  ASSERT_EQ(mesh.positions.size(), 24u);
+  expect_cube(mesh);
+  const Mesh clean = clean_mesh(mesh);
+  for (const Vec3& p : clean.positions) {
+    for (int axis = 0; axis < 3; ++axis) EXPECT_FALSE(std::signbit(p[axis]));
+  }
+  // In the order of first appearance: the first face's corners, then those of the second.
+  const int order[] = {0, 2, 3, 1, 4, 5, 7, 6};
+  for (int i = 0; i < 8; ++i) EXPECT_EQ(clean.positions[i], cube_corner(order[i])) << i;
+}
+
+TEST(CleanMesh, WeldsEqualPositionsOnly) {
+  const double next = std::nextafter(1.0, 2.0);
+  const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {next, 0, 0}, {0, 0, 1}}, {{0, 1, 2}, {0, 4, 3}}};
+  EXPECT_EQ(clean_mesh(mesh).positions.size(), 5u);
+  EXPECT_EQ(build_edges(clean_mesh(mesh)).size(), 6u);
+}
+
+TEST(CleanMesh, DropsWhatHasNoArea) {
+  const Mesh mesh{{{9, 9, 9}, {0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {2, 0, 0}, {1, 0, 0}},
+                  {{1, 2, 2}, {1, 2, 5}, {1, 2, 4}, {1, 2, 3}, {2, 3, 1}, {3, 1, 5}}};
+  const Mesh clean = clean_mesh(mesh);
+  EXPECT_EQ(clean.positions, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+  EXPECT_EQ(clean.faces, (std::vector<Face>{{0, 1, 2}}));
+
+  const Mesh flat{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}};
+  EXPECT_EQ(error_of([&] { clean_mesh(flat); }), "has no face with an area");
+}
+
+TEST(CleanMesh, KeepsThinFaces) {
+  const Mesh thin{{{0, 0, 0}, {1, 0, 0}, {0.5, 1e-30, 0}}, {{0, 1, 2}}};
+  EXPECT_EQ(clean_mesh(thin).faces.size(), 1u);
+}
+
+TEST(CleanMesh, RejectsFacesBackToBack) {
+  const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {1, 0, 2}}};
+  EXPECT_EQ(
+      error_of([&] { clean_mesh(mesh); }),
+      "two faces with corners (0, 0, 0) (1, 0, 0) (0, 1, 0) lie back to back (one face, and two_sided in its "
+      "material, is allowed)");
+}
+
+TEST(Edges, RejectsThreeFaces) {
+  const Mesh mesh{{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}},
+                  {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}}};
+  EXPECT_EQ(error_of([&] { build_edges(mesh); }),
+            "the edge from (0, 0, 0) to (0, 0, 1) has 3 faces (at most two are allowed)");
+}
+
+TEST(Edges, AcceptsInconsistentOrientation) {
+  const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}}, {{0, 1, 2}, {1, 2, 3}}};
+  EXPECT_EQ(build_edges(mesh).size(), 5u);
+}
+
+TEST(Edges, MatchBruteForce) {
+  // Random parts of a grid with a shuffled order of vertices, so that there are borders of every shape.
+  std::mt19937 random(11);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    constexpr int kSide = 7;
+    std::vector<int> name(kSide * kSide);
+    for (int i = 0; i < kSide * kSide; ++i) name[i] = i;
+    std::shuffle(name.begin(), name.end(), random);
+    Mesh mesh;
+    mesh.positions.resize(name.size());
+    for (int i = 0; i < kSide * kSide; ++i)
+      mesh.positions[name[i]] = {double(i % kSide), double(i / kSide), 0};
+    for (int i = 0; i < kSide * kSide; ++i) {
+      if (i % kSide == kSide - 1 || i / kSide == kSide - 1) continue;
+      if (random() % 4 != 0) mesh.faces.push_back({name[i], name[i + 1], name[i + kSide]});
+      if (random() % 4 != 0) mesh.faces.push_back({name[i + kSide + 1], name[i + kSide], name[i + 1]});
+    }
+    std::map<std::set<int>, std::vector<int>> expected;
+    for (int f = 0; f < static_cast<int>(mesh.faces.size()); ++f) {
+      for (int k = 0; k < 3; ++k) expected[{mesh.faces[f][k], mesh.faces[f][(k + 1) % 3]}].push_back(f);
+    }
+    const std::vector<Edge> edges = build_edges(mesh);
+    ASSERT_EQ(edges.size(), expected.size());
+    auto e = expected.begin();  // a map of sets is sorted by ascending vertices, too
+    for (const Edge& edge : edges) {
+      EXPECT_EQ((std::set<int>{edge.vertex[0], edge.vertex[1]}), e->first);
+      EXPECT_LT(edge.vertex[0], edge.vertex[1]);
+      EXPECT_EQ(edge.face[0], e->second[0]);
+      EXPECT_EQ(edge.face[1], e->second.size() == 2 ? e->second[1] : -1);
+      ++e;
+    }
+  }
+}
+
+TEST(Edges, TorusOfOneMillionFaces) {
+  // Written with all corners separate, as STL does; a closed surface of genus one has V - E + F = 0.
+  constexpr int kSide = 708;
+  Mesh mesh;
+  const auto corner = [&](int i, int j) {
+    const double u = 2 * M_PI * (i % kSide) / kSide, v = 2 * M_PI * (j % kSide) / kSide;
+    mesh.positions.push_back({(3 + std::cos(v)) * std::cos(u), (3 + std::cos(v)) * std::sin(u), std::sin(v)});
+    return static_cast<int>(mesh.positions.size()) - 1;
+  };
+  for (int i = 0; i < kSide; ++i) {
+    for (int j = 0; j < kSide; ++j) {
+      mesh.faces.push_back({corner(i, j), corner(i + 1, j), corner(i + 1, j + 1)});
+      mesh.faces.push_back({corner(i, j), corner(i + 1, j + 1), corner(i, j + 1)});
+    }
+  }
+  const Mesh clean = clean_mesh(mesh);
+  const std::vector<Edge> edges = build_edges(clean);
+  EXPECT_EQ(clean.positions.size(), static_cast<std::size_t>(kSide) * kSide);
+  EXPECT_EQ(clean.faces.size(), 2 * clean.positions.size());
+  EXPECT_EQ(edges.size(), 3 * clean.positions.size());
+  for (const Edge& edge : edges) ASSERT_GE(edge.face[1], 0);
+}
+
+}  // namespace
+}  // namespace isochron
