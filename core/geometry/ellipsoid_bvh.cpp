@@ -16,14 +16,20 @@ constexpr int kHeuristicDepth = 24;  ///< below it ranges are halved, which boun
 constexpr int kStack = 7 * (kHeuristicDepth + 32) + 2 * kWidth;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// GCC's and clang's vector types: one instruction with AVX-512, two with AVX, four with SSE2.
-using Wide = double __attribute__((vector_size(kWidth * sizeof(double))));
+// By value, unlike std::min and std::max, which keep loops from being vectorised.
+inline double min(double a, double b) { return a < b ? a : b; }
+inline double max(double a, double b) { return a > b ? a : b; }
+
+/// Eight values side by side. Loops over the lanes have straight-line bodies that compilers vectorise.
+struct alignas(64) Wide {
+  double lane[kWidth];
+};
 
 struct WideVec3 {
   Wide x, y, z;
+  Vec3 get(int i) const { return {x.lane[i], y.lane[i], z.lane[i]}; }
+  void set(int i, const Vec3& p) { x.lane[i] = p.x, y.lane[i] = p.y, z.lane[i] = p.z; }
 };
-
-inline void set_lane(WideVec3& v, int lane, const Vec3& p) { v.x[lane] = p.x, v.y[lane] = p.y, v.z[lane] = p.z; }
 
 /// Up to eight triangles; unused lanes hold NaN, which fails every comparison.
 struct Block {
@@ -58,6 +64,10 @@ struct QuadraticForm {
     if (!e.valid()) return;
     inverse_minor2 = 1 / (e.minor * e.minor);
     k = inverse_minor2 - 1 / (e.major * e.major);
+  }
+  /// From |r|^2 and (r.u)^2, or with products of two points the bilinear form.
+  double operator()(double squared, double axial_squared) const {
+    return squared * inverse_minor2 - axial_squared * k;
   }
 };
 
@@ -144,7 +154,7 @@ int EllipsoidBvh::Impl::make_block(const std::vector<Input>& triangles, const Ra
   for (int lane = 0; lane < kWidth; ++lane) {
     const bool used = lane < range.second - range.first;
     const Input* input = used ? &triangles[static_cast<std::size_t>(range.first[lane].index)] : nullptr;
-    for (std::size_t v = 0; v < 3; ++v) set_lane(block.vertex[v], lane, used ? input->vertex[v] : Vec3{nan, nan, nan});
+    for (std::size_t v = 0; v < 3; ++v) block.vertex[v].set(lane, used ? input->vertex[v] : Vec3{nan, nan, nan});
     block.id[lane] = used ? input->id : -1;
   }
   blocks.push_back(block);
@@ -185,77 +195,65 @@ int EllipsoidBvh::Impl::make_node(const std::vector<Input>& triangles, const Ran
       node.child[lane] =
           leaf ? make_block(triangles, children[i]) : make_node(triangles, children[i], depth + 1);
     }
-    set_lane(node.center, lane, center);
-    set_lane(node.half, lane, half);
+    node.center.set(lane, center);
+    node.half.set(lane, half);
   }
   nodes[self] = node;
   return static_cast<int>(self);
 }
 
 void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std::vector<int>& ids) const {
-  WideVec3 r[3];
-  Wide axial[3], squared[3], q[3];
-  Wide highest_low, lowest_high;
-  for (int v = 0; v < 3; ++v) {
-    r[v] = {block.vertex[v].x - shell.center.x, block.vertex[v].y - shell.center.y,
-            block.vertex[v].z - shell.center.z};
-    axial[v] = r[v].x * shell.axis.x + r[v].y * shell.axis.y + r[v].z * shell.axis.z;
-    squared[v] = r[v].x * r[v].x + r[v].y * r[v].y + r[v].z * r[v].z;
-    q[v] = squared[v] * shell.high.inverse_minor2 - axial[v] * axial[v] * shell.high.k;
-    const Wide low = squared[v] * shell.low.inverse_minor2 - axial[v] * axial[v] * shell.low.k;
-    highest_low = v == 0 ? low : (low > highest_low ? low : highest_low);
-    lowest_high = v == 0 ? q[v] : (q[v] < lowest_high ? q[v] : lowest_high);
+  const Vec3 c = shell.center, u = shell.axis;
+  const QuadraticForm high = shell.high, low = shell.low;
+  Wide lowest_bound, lowest_vertex, highest_vertex;
+  for (int i = 0; i < kWidth; ++i) {
+    const Vec3 r0 = block.vertex[0].get(i) - c, r1 = block.vertex[1].get(i) - c, r2 = block.vertex[2].get(i) - c;
+    const double x0 = dot(r0, u), x1 = dot(r1, u), x2 = dot(r2, u);
+    const double s0 = dot(r0, r0), s1 = dot(r1, r1), s2 = dot(r2, r2);
+    const double q0 = high(s0, x0 * x0), q1 = high(s1, x1 * x1), q2 = high(s2, x2 * x2);
+    // Q lies above its tangent plane at each vertex v, 2 B(v, p) - Q(v) with B the bilinear form of Q, and a plane
+    // over a triangle is lowest at a vertex: a bound that is exact to second order in the triangle's size.
+    const double b01 = 2 * high(dot(r0, r1), x0 * x1), b12 = 2 * high(dot(r1, r2), x1 * x2),
+                 b20 = 2 * high(dot(r2, r0), x2 * x0);
+    const double nearest = min(min(q0, q1), q2);
+    const double tangent = max(max(min(b01, b20) - q0, min(b01, b12) - q1), min(b12, b20) - q2);
+    lowest_vertex.lane[i] = nearest;
+    lowest_bound.lane[i] = min(tangent, nearest);
+    highest_vertex.lane[i] = max(max(low(s0, x0 * x0), low(s1, x1 * x1)), low(s2, x2 * x2));
   }
-  // Q lies above its tangent plane at each vertex, 2 B(v, p) - Q(v) with B the bilinear form of Q, and a plane over a
-  // triangle is lowest at a vertex: a lower bound over the triangle that is exact to second order in its size.
-  const auto bilinear = [&](int i, int j) {
-    const Wide product = r[i].x * r[j].x + r[i].y * r[j].y + r[i].z * r[j].z;
-    return 2 * (product * shell.high.inverse_minor2 - axial[i] * axial[j] * shell.high.k);
-  };
-  const Wide b01 = bilinear(0, 1), b12 = bilinear(1, 2), b20 = bilinear(2, 0);
-  const Wide t0 = (b01 < b20 ? b01 : b20) - q[0];
-  const Wide t1 = (b01 < b12 ? b01 : b12) - q[1];
-  const Wide t2 = (b12 < b20 ? b12 : b20) - q[2];
-  Wide bound = t0 > t1 ? t0 : t1;
-  bound = bound > t2 ? bound : t2;
-  bound = bound < lowest_high ? bound : lowest_high;
-  const auto touches = (bound <= shell.inside) & (highest_low >= shell.outside);
-  for (int lane = 0; lane < kWidth; ++lane) {
-    if (!touches[lane]) continue;
-    if (lowest_high[lane] > shell.inside) {
+  for (int i = 0; i < kWidth; ++i) {
+    if (!(lowest_bound.lane[i] <= shell.inside) || !(highest_vertex.lane[i] >= shell.outside)) continue;
+    if (lowest_vertex.lane[i] > shell.inside) {
       // No vertex inside the outer ellipsoid: they cross only if the triangle's plane or edges reach into it.
-      const auto vertex = [&](int v) {
-        return Vec3{block.vertex[v].x[lane], block.vertex[v].y[lane], block.vertex[v].z[lane]};
-      };
       EllipseArcs arcs;
-      if (!clip_ellipse(shell.outer, vertex(0), vertex(1), vertex(2), arcs)) continue;
+      if (!clip_ellipse(shell.outer, block.vertex[0].get(i), block.vertex[1].get(i), block.vertex[2].get(i), arcs))
+        continue;
     }
-    ids.push_back(block.id[lane]);
+    ids.push_back(block.id[i]);
   }
 }
 
 int EllipsoidBvh::Impl::test_node(const Node& node, const Shell& shell, int* hits) const {
-  const WideVec3 r{node.center.x - shell.center.x, node.center.y - shell.center.y,
-                   node.center.z - shell.center.z};
-  const Wide axial = r.x * shell.axis.x + r.y * shell.axis.y + r.z * shell.axis.z;
-  const Wide squared = r.x * r.x + r.y * r.y + r.z * r.z;
-  const Wide half_squared = node.half.x * node.half.x + node.half.y * node.half.y + node.half.z * node.half.z;
-  // Q over the box differs from Q at its centre by at most sum |dQ_i| h_i, and on the upper side also |h|^2 / minor^2.
-  const auto slope = [&](const QuadraticForm& form) {
-    const Wide along = axial * form.k;
-    const Wide x = r.x * form.inverse_minor2 - along * shell.axis.x;
-    const Wide y = r.y * form.inverse_minor2 - along * shell.axis.y;
-    const Wide z = r.z * form.inverse_minor2 - along * shell.axis.z;
-    return 2 * ((x < 0 ? -x : x) * node.half.x + (y < 0 ? -y : y) * node.half.y + (z < 0 ? -z : z) * node.half.z);
-  };
-  const Wide lowest = squared * shell.high.inverse_minor2 - axial * axial * shell.high.k - slope(shell.high);
-  const Wide highest = (squared + half_squared) * shell.low.inverse_minor2 - axial * axial * shell.low.k +
-                       slope(shell.low);
-  const auto touches = (lowest <= shell.inside) & (highest >= shell.outside);
+  const Vec3 c = shell.center, u = shell.axis;
+  const QuadraticForm high = shell.high, low = shell.low;
+  Wide lowest, highest;
+  for (int i = 0; i < kWidth; ++i) {
+    const Vec3 r = node.center.get(i) - c, h = node.half.get(i);
+    const double x = dot(r, u), squared = dot(r, r);
+    // Q over the box differs from Q at its centre by at most sum |dQ_k| h_k, and on the upper side also by
+    // |h|^2 / minor^2.
+    const auto slope = [&](const QuadraticForm& form) {
+      const Vec3 half_gradient = r * form.inverse_minor2 - u * (x * form.k);
+      return 2 * (std::abs(half_gradient.x) * h.x + std::abs(half_gradient.y) * h.y +
+                  std::abs(half_gradient.z) * h.z);
+    };
+    lowest.lane[i] = high(squared, x * x) - slope(high);
+    highest.lane[i] = low(squared + dot(h, h), x * x) + slope(low);
+  }
   int count = 0;
-  for (int lane = 0; lane < kWidth; ++lane) {
-    hits[count] = node.child[lane];
-    count += static_cast<int>(touches[lane] & 1);
+  for (int i = 0; i < kWidth; ++i) {
+    hits[count] = node.child[i];
+    count += (lowest.lane[i] <= shell.inside) & (highest.lane[i] >= shell.outside);
   }
   return count;
 }
