@@ -27,12 +27,8 @@ std::string checksum(const std::string& text) {
 }
 
 std::string list(const std::vector<double>& values, std::size_t begin, std::size_t count) {
-  std::string text = "[";
-  for (std::size_t i = begin; i < begin + count; ++i) {
-    if (i > begin) text += ", ";
-    text += exact(values[i]);
-  }
-  return text + "]";
+  const auto first = values.begin() + static_cast<std::ptrdiff_t>(begin);
+  return fmt::format("[{}]", fmt::join(first, first + static_cast<std::ptrdiff_t>(count), ", "));
 }
 
 /// YAML writes special values with a dot; yaml-cpp reads them that way only.

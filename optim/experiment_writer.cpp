@@ -19,9 +19,7 @@ std::string quote(const std::string& text) {
 }
 
 std::string list(const std::vector<double>& values) {
-  std::string text = "[";
-  for (std::size_t i = 0; i < values.size(); ++i) text += (i ? ", " : "") + exact(values[i]);
-  return text + "]";
+  return fmt::format("[{}]", fmt::join(values, ", "));
 }
 
 std::string number_or_list(const std::vector<double>& values) {

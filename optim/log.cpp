@@ -19,9 +19,9 @@ std::string header(const Parameters& parameters) {
   std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm";
   for (const Parameters::Block& block : parameters.blocks()) {
     if (block.count > kMostColumns) {
-      text += "," + block.name + ".norm";
+      text += fmt::format(",{}.norm", block.name);
     } else {
-      for (int i = 0; i < block.count; ++i) text += "," + parameters.component_names()[block.begin + i];
+      for (int i = 0; i < block.count; ++i) text += fmt::format(",{}", parameters.component_names()[block.begin + i]);
     }
   }
   return text + "\n";
@@ -50,9 +50,9 @@ void Log::append(const LogRow& row, const std::vector<double>& theta) {
     if (block.count > kMostColumns) {
       double sum = 0;
       for (int i = block.begin; i < block.begin + block.count; ++i) sum += theta[i] * theta[i];
-      text += "," + exact(std::sqrt(sum));
+      text += fmt::format(",{}", std::sqrt(sum));
     } else {
-      for (int i = block.begin; i < block.begin + block.count; ++i) text += "," + exact(theta[i]);
+      for (int i = block.begin; i < block.begin + block.count; ++i) text += fmt::format(",{}", theta[i]);
     }
   }
   text += "\n";
