@@ -17,6 +17,11 @@ namespace {
 
 constexpr int kLargestResolution = 32768;  // so that the number of pixels fits an int
 
+/// As `normalize`, for a vector so long or short that its length squared is no double.
+Vec3 unit(const Vec3& v) {
+  return normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
+}
+
 Camera read_camera(const YamlValue& value) {
   YamlMap map = value.map();
   Camera camera;
@@ -36,8 +41,8 @@ Camera read_camera(const YamlValue& value) {
   if (camera.look_at == camera.position) look_at.fail("is the camera's position", "a point away from it");
   // What is left of the cross product of two parallel vectors is round-off of this relative size.
   constexpr double kParallel = 16 * std::numeric_limits<double>::epsilon();
-  const Vec3 forward = normalize(camera.look_at - camera.position);
-  if (length(cross(forward, normalize(camera.up))) <= kParallel)
+  const Vec3 forward = unit(camera.look_at - camera.position);
+  if (length(cross(forward, unit(camera.up))) <= kParallel)
     (up ? *up : look_at).fail("up is parallel to the line of sight", "any other direction");
   return camera;
 }
@@ -79,7 +84,7 @@ void transform_mesh(const YamlValue& value, Mesh& mesh) {
   if (const auto factor = map.find("scale")) scale = factor->number(NumberRange::positive());
   if (const auto rotate = map.find("rotate")) {
     YamlMap rotation = rotate->map();
-    axis = normalize(rotation.require("axis").direction());
+    axis = unit(rotation.require("axis").direction());
     angle = rotation.require("degrees").number() * kPi / 180;
     rotation.reject_unknown();
   }
@@ -93,11 +98,15 @@ void transform_mesh(const YamlValue& value, Mesh& mesh) {
         angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
     p = rotated + translation;
   }
+}
+
+/// Normals are computed from cross products, which must not vanish or overflow.
+void check_areas(const YamlValue& cause, const Mesh& mesh) {
   for (const auto& face : mesh.faces) {
     const Vec3& a = mesh.positions[face[0]];
     const double area = length_squared(cross(mesh.positions[face[1]] - a, mesh.positions[face[2]] - a));
     if (!(area > 0) || !std::isfinite(area))
-      value.fail("makes a face vanish or overflow", "sizes that a double can hold");
+      cause.fail("gives a face whose area vanishes or overflows", "sizes that a double can hold");
   }
 }
 
@@ -116,6 +125,7 @@ Mesh read_shape_mesh(const YamlValue& file, const std::string& path,
     file.fail(error.what());
   }
   if (transform) transform_mesh(*transform, mesh);
+  check_areas(transform ? *transform : file, mesh);
   return mesh;
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/scene/temporary_folder.h"
@@ -114,6 +115,29 @@ TEST_F(SceneLoader, LoadsEverything) {
   EXPECT_EQ(inner, 1);
 }
 
+TEST_F(SceneLoader, EdgesOfLaterShapesCountOn) {
+  const Scene scene = load_scene(with("meshes/triangle.off", "meshes/quad.obj"));
+  ASSERT_EQ(scene.edges.size(), 10u);
+  for (int shape = 0; shape < 2; ++shape) {
+    // The diagonal joins the quad's corners 0 and 2, between its two triangles.
+    const auto diagonal = std::count_if(scene.edges.begin(), scene.edges.end(), [&](const Edge& edge) {
+      return edge.vertex == std::array{4 * shape, 4 * shape + 2} &&
+             edge.face == std::array{2 * shape, 2 * shape + 1};
+    });
+    EXPECT_EQ(diagonal, 1) << shape;
+  }
+}
+
+TEST_F(SceneLoader, DirectionsOfAnyLength) {
+  for (const std::string length : {"1e-200", "1e200"}) {
+    const Scene scene =
+        load_scene(with("material: metal}", "material: metal, transform: {rotate: {axis: [0, 0, " + length +
+                                                "], degrees: 90}}}"));
+    EXPECT_LT(isochron::length(scene.positions[1] - Vec3{0, 1, 0}), 1e-15);
+    EXPECT_NE(error("up: [0, 1, 0]", "up: [0, 0, " + length + "]").find("up is parallel"), std::string::npos);
+  }
+}
+
 TEST_F(SceneLoader, ColoursAndDefaults) {
   EXPECT_FALSE(load_scene(with("emission: 10", "emission: [1, 2, 3]")).grey);
   EXPECT_EQ(load_scene(with("emission: 10", "emission: [1, 2, 3]")).shapes[1].emission, Rgb(1, 2, 3));
@@ -224,10 +248,12 @@ TEST_F(SceneLoader, ShapeErrors) {
             "scene.yaml:12:103: shapes[1].transform.rotate.axis: the zero vector has no direction "
             "([x, y, z], not all zero)");
   EXPECT_EQ(error("emission: 10", "emission: 10, transform: {scale: 1e-200}"),
-            "scene.yaml:12:87: shapes[1].transform: makes a face vanish or overflow (sizes that a double can "
+            "scene.yaml:12:87: shapes[1].transform: gives a face whose area vanishes or overflows (sizes "
+            "that a double can "
             "hold)");
   EXPECT_EQ(error("emission: 10", "emission: 10, transform: {translate: [1e30, 0, 0]}"),
-            "scene.yaml:12:87: shapes[1].transform: makes a face vanish or overflow (sizes that a double can "
+            "scene.yaml:12:87: shapes[1].transform: gives a face whose area vanishes or overflows (sizes "
+            "that a double can "
             "hold)");
 
   const std::string head = std::string(kScene).substr(0, std::string(kScene).find("shapes:"));
@@ -245,6 +271,9 @@ TEST_F(SceneLoader, MeshErrorsNameTheShape) {
   EXPECT_EQ(mesh("quad.fbx", "x"),
             at + "quad.fbx: '.fbx' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)");
   EXPECT_EQ(mesh("empty.obj", "v 0 0 0\n"), at + "empty.obj: has no faces");
+  EXPECT_EQ(mesh("huge.obj", "v 0 0 0\nv 1e200 0 0\nv 0 1 0\nf 1 2 3\n"),
+            "scene.yaml:11:25: shapes[0].file: gives a face whose area vanishes or overflows "
+            "(sizes that a double can hold)");
   EXPECT_EQ(mesh("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
             at + "flat.obj: has no face with an area");
   EXPECT_EQ(mesh("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
