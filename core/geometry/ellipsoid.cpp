@@ -115,7 +115,7 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   const Vec3 mapped_normal{major * dot(ellipsoid.axis, normal), minor * dot(ellipsoid.side, normal),
                            minor * dot(ellipsoid.up, normal)};
   const double mapped_length = length(mapped_normal), edge1_length = length(d1);
-  const Vec3 unit_normal = mapped_normal / mapped_length;
+  const Vec3 unit_normal = mapped_normal * (1 / mapped_length);
   const double inverse_length = 1 / edge1_length;
   const Vec3 x_axis = d1 * inverse_length, y_axis = cross(unit_normal, x_axis);
   const Vec2 p0{dot(w0, x_axis), dot(w0, y_axis)};
