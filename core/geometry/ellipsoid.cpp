@@ -10,17 +10,24 @@ namespace {
 struct Vec2 {
   double x, y;
 };
-double dot(const Vec2& a, const Vec2& b) { return a.x * b.x + a.y * b.y; }
-double cross(const Vec2& a, const Vec2& b) { return a.x * b.y - a.y * b.x; }
+double dot(const Vec2& a, const Vec2& b) {
+  return a.x * b.x + a.y * b.y;
+}
+double cross(const Vec2& a, const Vec2& b) {
+  return a.x * b.y - a.y * b.x;
+}
 
 /// Counter-clockwise angle from a to b, in (-pi, pi].
-double angle_between(const Vec2& a, const Vec2& b) { return std::atan2(cross(a, b), dot(a, b)); }
+double angle_between(const Vec2& a, const Vec2& b) {
+  return std::atan2(cross(a, b), dot(a, b));
+}
 
-/// One edge of the triangle against the circle about the origin. Where the edge leaves the disc the circle enters the
-/// triangle, and the other way round. Crossing points are scaled by the edge's squared length: only angles matter.
+/// One edge of the triangle against the circle about the origin. Where the edge leaves the disc the circle
+/// enters the triangle, and the other way round. Crossing points are scaled by the edge's squared length:
+/// only angles matter.
 struct EdgeCrossing {
-  double height = 0;     ///< of the centre over the edge, inward, times the edge's length
-  double half = 0;       ///< half the chord, times the edge's length
+  double height = 0;  ///< of the centre over the edge, inward, times the edge's length
+  double half = 0;    ///< half the chord, times the edge's length
   Vec2 direction{};
   bool arc_starts = false, arc_ends = false;
 
@@ -33,8 +40,8 @@ struct EdgeCrossing {
   }
 };
 
-/// Angle of the arc that starts on edges[i]. Outside the disc the triangle's boundary runs on from there to the next
-/// point where an arc ends: that point ends this arc too, because triangle and disc are convex.
+/// Angle of the arc that starts on edges[i]. Outside the disc the triangle's boundary runs on from there to
+/// the next point where an arc ends: that point ends this arc too, because triangle and disc are convex.
 double arc_span(const EdgeCrossing (&edges)[3], int i) {
   const EdgeCrossing& next = edges[(i + 1) % 3];
   const EdgeCrossing& last = edges[(i + 2) % 3];
@@ -43,8 +50,9 @@ double arc_span(const EdgeCrossing (&edges)[3], int i) {
   const Vec2 end = next.arc_ends ? next.end_point() : last.end_point();
   const double span = angle_between(start, end);
   if (span >= 0) return span;
-  // More than half a turn, or a tiny arc turned negative by round-off. Measured by way of the next edge's normal both
-  // parts are less than half a turn, so their sum needs no wrapping and tells the two cases apart.
+  // More than half a turn, or a tiny arc turned negative by round-off. Measured by way of the next edge's
+  // normal both parts are less than half a turn, so their sum needs no wrapping and tells the two cases
+  // apart.
   const Vec2 normal = next.outward();
   return angle_between(start, normal) + angle_between(normal, end);
 }
@@ -70,14 +78,15 @@ double EllipseArcs::angle(double u) const {
   return start[i] + rest;
 }
 
-bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs) {
+bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2,
+                  EllipseArcs& arcs) {
   arcs.count = 0;
   arcs.total_span = 0;
   if (!ellipsoid.valid()) return false;
   const double major = ellipsoid.major, minor = ellipsoid.minor;
 
-  // Normal, not normalised. In a sliver the cross product is not quite perpendicular to its factors; the frame below
-  // needs it perpendicular to the first.
+  // Normal, not normalised. In a sliver the cross product is not quite perpendicular to its factors; the
+  // frame below needs it perpendicular to the first.
   const Vec3 edge1 = v1 - v0, edge2 = v2 - v0;
   const double edge1_squared = length_squared(edge1);
   Vec3 normal = cross(edge1, edge2);
@@ -86,8 +95,9 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   constexpr double kRoundOff = 4 * std::numeric_limits<double>::epsilon();
   if (!(normal_squared > kRoundOff * kRoundOff * edge1_squared * length_squared(edge2))) return false;
 
-  // The ellipsoid reaches the plane if minor^2 exceeds the product of the foci's heights over it, that is if tau
-  // exceeds the length of the reflected (or, with the foci on different sides, the straight) path between them.
+  // The ellipsoid reaches the plane if minor^2 exceeds the product of the foci's heights over it, that is if
+  // tau exceeds the length of the reflected (or, with the foci on different sides, the straight) path between
+  // them.
   const double height_a = dot(normal, v0 - ellipsoid.a), height_b = dot(normal, v0 - ellipsoid.b);
   const double excess = minor * minor * normal_squared - height_a * height_b;
   if (!(excess > 0)) return false;
@@ -95,7 +105,8 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   const double support_squared = excess + offset * offset;
   if (!(support_squared < std::numeric_limits<double>::infinity())) return false;
 
-  // To the space where the ellipsoid is the unit sphere, in the ellipsoid's own frame so that the map is diagonal.
+  // To the space where the ellipsoid is the unit sphere, in the ellipsoid's own frame so that the map is
+  // diagonal.
   const double inverse_major = 1 / major, inverse_minor = 1 / minor;
   const auto map = [&](const Vec3& v) {
     return Vec3{dot(ellipsoid.axis, v) * inverse_major, dot(ellipsoid.side, v) * inverse_minor,
@@ -108,8 +119,8 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   const bool inside[3] = {length_squared(w0) < 1, length_squared(w0 + d1) < 1, length_squared(w0 + d2) < 1};
   if (inside[0] && inside[1] && inside[2]) return false;
 
-  // The circle: centre on the mapped normal at signed distance offset / support, in-plane axes along and across the
-  // first edge.
+  // The circle: centre on the mapped normal at signed distance offset / support, in-plane axes along and
+  // across the first edge.
   const double radius_squared = excess / support_squared;
   const double radius = std::sqrt(radius_squared);
   const Vec3 mapped_normal{major * dot(ellipsoid.axis, normal), minor * dot(ellipsoid.side, normal),
@@ -133,11 +144,13 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
     EdgeCrossing& edge = edges[i];
     edge.direction = directions[i];
     edge.height = cross(vertices[i], directions[i]);
-    const double half_squared = radius_squared * dot(directions[i], directions[i]) - edge.height * edge.height;
+    const double half_squared =
+        radius_squared * dot(directions[i], directions[i]) - edge.height * edge.height;
     if (half_squared <= 0 && edge.height < 0) return false;
-    // Both edges at a vertex read the same inside flag, so starts and ends of arcs alternate whatever the round-off.
-    const bool dips_in = !inside[i] && !inside[j] && half_squared > 0 && dot(vertices[i], directions[i]) < 0 &&
-                         dot(vertices[j], directions[i]) > 0;
+    // Both edges at a vertex read the same inside flag, so starts and ends of arcs alternate whatever the
+    // round-off.
+    const bool dips_in = !inside[i] && !inside[j] && half_squared > 0 &&
+                         dot(vertices[i], directions[i]) < 0 && dot(vertices[j], directions[i]) > 0;
     edge.arc_starts = !inside[j] && (inside[i] || dips_in);
     edge.arc_ends = !inside[i] && (inside[j] || dips_in);
     if (edge.arc_starts || edge.arc_ends) edge.half = std::sqrt(std::max(half_squared, 0.0));
@@ -166,11 +179,13 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   return true;
 }
 
-double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n) {
-  // With p = q - centre, the surface is Q(p) = p.Kp = 1 and u_a + u_b = 2 major minor^2 Kp / (|q-a| |q-b|). The arcs'
-  // centre is K-conjugate to the plane, so only the part v = e1 cos + e2 sin of p has an in-plane gradient; it is
-  // conjugate to w = dq/dphi, and v.Kv = r^2 with r the circle's radius gives |P_T Kv| = r^2 |w| / |e1 x e2|. Finally
-  // |e1 x e2| = r^2 major minor^2 / sqrt(minor^2 + (n.(b-a)/2)^2): the shrinking radius drops out of the ratio.
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi,
+                                 const Vec3& n) {
+  // With p = q - centre, the surface is Q(p) = p.Kp = 1 and u_a + u_b = 2 major minor^2 Kp / (|q-a| |q-b|).
+  // The arcs' centre is K-conjugate to the plane, so only the part v = e1 cos + e2 sin of p has an in-plane
+  // gradient; it is conjugate to w = dq/dphi, and v.Kv = r^2 with r the circle's radius gives |P_T Kv| = r^2
+  // |w| / |e1 x e2|. Finally |e1 x e2| = r^2 major minor^2 / sqrt(minor^2 + (n.(b-a)/2)^2): the shrinking
+  // radius drops out of the ratio.
   const Vec3 q = arcs.point(phi);
   const double across = dot(n, ellipsoid.b - ellipsoid.a);
   return std::sqrt(length_squared(q - ellipsoid.a) * length_squared(q - ellipsoid.b) /

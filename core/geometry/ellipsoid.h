@@ -1,4 +1,5 @@
-// Points with |q-a| + |q-b| = tau on triangles: the ellipsoidal change of variable (theory section 4, paper Eqs. 6-8).
+// Points with |q-a| + |q-b| = tau on triangles: the ellipsoidal change of variable (theory section 4, paper
+// Eqs. 6-8).
 #pragma once
 #include "core/math/vec.h"
 
@@ -9,20 +10,21 @@ struct Ellipsoid {
   Vec3 a, b;
   double tau = 0;
 
-  Vec3 center, axis;               ///< unit axis; any unit vector when the foci coincide
-  Vec3 side, up;                   ///< complete the axis to an orthonormal frame
-  double major = 0, minor = 0;     ///< semi-axes
+  Vec3 center, axis;            ///< unit axis; any unit vector when the foci coincide
+  Vec3 side, up;                ///< complete the axis to an orthonormal frame
+  double major = 0, minor = 0;  ///< semi-axes
 
   /// Empty (valid() false) when tau <= |a-b| or is not finite.
   Ellipsoid(const Vec3& focus_a, const Vec3& focus_b, double total_length);
   bool valid() const { return minor > 0; }
 };
 
-/// The part of an ellipse that lies inside a triangle: q(phi) = center + e1 cos phi + e2 sin phi over up to three
-/// arcs. The frame (e1, e2) and the order of the arcs vary continuously with tau, foci and triangle, so that equal
-/// random numbers on nearby ellipsoids give nearby points (coupled pairs rely on it): e1 points along the edge
-/// v0 -> v1, angles grow from there around the triangle's normal (v1-v0) x (v2-v0), every arc starts where it enters
-/// the triangle, and arcs are ordered by the edge they enter through. A complete ellipse starts at phi = 0.
+/// The part of an ellipse that lies inside a triangle: q(phi) = center + e1 cos phi + e2 sin phi over up to
+/// three arcs. The frame (e1, e2) and the order of the arcs vary continuously with tau, foci and triangle, so
+/// that equal random numbers on nearby ellipsoids give nearby points (coupled pairs rely on it): e1 points
+/// along the edge v0 -> v1, angles grow from there around the triangle's normal (v1-v0) x (v2-v0), every arc
+/// starts where it enters the triangle, and arcs are ordered by the edge they enter through. A complete
+/// ellipse starts at phi = 0.
 struct EllipseArcs {
   Vec3 center, e1, e2;
   int count = 0;
@@ -34,12 +36,15 @@ struct EllipseArcs {
   Vec3 point(double phi) const { return center + e1 * std::cos(phi) + e2 * std::sin(phi); }
 };
 
-/// Intersects the ellipsoid with triangle (v0, v1, v2). False when they do not meet in an arc of positive length, when
-/// the triangle has no area, and when a coordinate is not finite.
-bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs);
+/// Intersects the ellipsoid with triangle (v0, v1, v2). False when they do not meet in an arc of positive
+/// length, when the triangle has no area, and when a coordinate is not finite.
+bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2,
+                  EllipseArcs& arcs);
 
-/// dA / (dphi dtau) at q(phi): |dq/dphi| / |P_T (u_a + u_b)|, in length units, with n the triangle's unit normal.
-/// Stays bounded where the ellipse shrinks to a point: it equals |q-a| |q-b| / sqrt(tau^2 - |P_T (b-a)|^2).
-double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n);
+/// dA / (dphi dtau) at q(phi): |dq/dphi| / |P_T (u_a + u_b)|, in length units, with n the triangle's unit
+/// normal. Stays bounded where the ellipse shrinks to a point: it equals |q-a| |q-b| / sqrt(tau^2 - |P_T
+/// (b-a)|^2).
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi,
+                                 const Vec3& n);
 
 }  // namespace isochron

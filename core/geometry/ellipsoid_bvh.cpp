@@ -11,14 +11,18 @@ namespace isochron {
 namespace {
 
 constexpr int kWidth = 8;
-constexpr int kFlat = 16;  ///< up to so many triangles a scan beats a hierarchy
+constexpr int kFlat = 16;            ///< up to so many triangles a scan beats a hierarchy
 constexpr int kHeuristicDepth = 24;  ///< below it ranges are halved, which bounds the depth for any input
 constexpr int kStack = 7 * (kHeuristicDepth + 32) + 2 * kWidth;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // By value, unlike std::min and std::max, which keep loops from being vectorised.
-inline double min(double a, double b) { return a < b ? a : b; }
-inline double max(double a, double b) { return a > b ? a : b; }
+inline double min(double a, double b) {
+  return a < b ? a : b;
+}
+inline double max(double a, double b) {
+  return a > b ? a : b;
+}
 
 /// Eight values side by side. Loops over the lanes have straight-line bodies that compilers vectorise.
 struct alignas(64) Wide {
@@ -57,7 +61,8 @@ struct Box {
 };
 
 /// Q(p) = |r|^2 / minor^2 - k (r.u)^2 with r = p - centre: Q <= 1 inside the ellipsoid. Both coefficients are
-/// zero when the ellipsoid is not valid: without an inner one nothing is excluded, and an infinite outer one holds all.
+/// zero when the ellipsoid is not valid: without an inner one nothing is excluded, and an infinite outer one
+/// holds all.
 struct QuadraticForm {
   double inverse_minor2 = 0, k = 0;
   explicit QuadraticForm(const Ellipsoid& e) {
@@ -98,7 +103,9 @@ struct EllipsoidBvh::Impl {
     for (const Item* i = range.first; i != range.second; ++i) box.add(i->box);
     return box;
   }
-  static std::size_t blocks_of(std::ptrdiff_t count) { return static_cast<std::size_t>((count + 7) / kWidth); }
+  static std::size_t blocks_of(std::ptrdiff_t count) {
+    return static_cast<std::size_t>((count + 7) / kWidth);
+  }
 
   static Item* split(const Range& range);
   int make_block(const std::vector<Input>& triangles, const Range& range);
@@ -155,7 +162,8 @@ int EllipsoidBvh::Impl::make_block(const std::vector<Input>& triangles, const Ra
   for (int lane = 0; lane < kWidth; ++lane) {
     const bool used = lane < range.second - range.first;
     const Input* input = used ? &triangles[static_cast<std::size_t>(range.first[lane].index)] : nullptr;
-    for (std::size_t v = 0; v < 3; ++v) block.vertex[v].set(lane, used ? input->vertex[v] : Vec3{nan, nan, nan});
+    for (std::size_t v = 0; v < 3; ++v)
+      block.vertex[v].set(lane, used ? input->vertex[v] : Vec3{nan, nan, nan});
     block.id[lane] = used ? input->id : -1;
   }
   blocks.push_back(block);
@@ -208,12 +216,14 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
   const QuadraticForm high = shell.high, low = shell.low;
   Wide lowest_bound, lowest_vertex, highest_vertex;
   for (int i = 0; i < kWidth; ++i) {
-    const Vec3 r0 = block.vertex[0].get(i) - c, r1 = block.vertex[1].get(i) - c, r2 = block.vertex[2].get(i) - c;
+    const Vec3 r0 = block.vertex[0].get(i) - c, r1 = block.vertex[1].get(i) - c,
+               r2 = block.vertex[2].get(i) - c;
     const double x0 = dot(r0, u), x1 = dot(r1, u), x2 = dot(r2, u);
     const double s0 = dot(r0, r0), s1 = dot(r1, r1), s2 = dot(r2, r2);
     const double q0 = high(s0, x0 * x0), q1 = high(s1, x1 * x1), q2 = high(s2, x2 * x2);
-    // Q lies above its tangent plane at each vertex v, 2 B(v, p) - Q(v) with B the bilinear form of Q, and a plane
-    // over a triangle is lowest at a vertex: a bound that is exact to second order in the triangle's size.
+    // Q lies above its tangent plane at each vertex v, 2 B(v, p) - Q(v) with B the bilinear form of Q, and a
+    // plane over a triangle is lowest at a vertex: a bound that is exact to second order in the triangle's
+    // size.
     const double b01 = 2 * high(dot(r0, r1), x0 * x1), b12 = 2 * high(dot(r1, r2), x1 * x2),
                  b20 = 2 * high(dot(r2, r0), x2 * x0);
     const double nearest = min(min(q0, q1), q2);
@@ -233,8 +243,8 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
     if (!reported[i] || !(lowest_vertex.lane[i] > shell.inside)) continue;
     // No vertex inside the outer ellipsoid: they cross only if the triangle's plane or edges reach into it.
     EllipseArcs arcs;
-    reported[i] =
-        clip_ellipse(shell.outer, block.vertex[0].get(i), block.vertex[1].get(i), block.vertex[2].get(i), arcs);
+    reported[i] = clip_ellipse(shell.outer, block.vertex[0].get(i), block.vertex[1].get(i),
+                               block.vertex[2].get(i), arcs);
     --uncertain;
   }
   int found[kWidth], count = 0;
@@ -271,7 +281,8 @@ int EllipsoidBvh::Impl::test_node(const Node& node, const Shell& shell, int* hit
   return count;
 }
 
-/// Queries jump about in memory: asking early for all that will be visited saves a fifth of the time on large meshes.
+/// Queries jump about in memory: asking early for all that will be visited saves a fifth of the time on large
+/// meshes.
 void EllipsoidBvh::Impl::prefetch(int entry) const {
   const char* address = entry < 0 ? reinterpret_cast<const char*>(&blocks[static_cast<std::size_t>(~entry)])
                                   : reinterpret_cast<const char*>(&nodes[static_cast<std::size_t>(entry)]);
@@ -284,7 +295,9 @@ EllipsoidBvh& EllipsoidBvh::operator=(EllipsoidBvh&&) noexcept = default;
 EllipsoidBvh::~EllipsoidBvh() = default;
 
 EllipsoidBvh::EllipsoidBvh(const std::vector<Input>& triangles) {
-  const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
+  const auto finite = [](const Vec3& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+  };
   std::vector<Impl::Item> items;
   items.reserve(triangles.size());
   Box bounds;
@@ -308,7 +321,9 @@ EllipsoidBvh::EllipsoidBvh(const std::vector<Input>& triangles) {
     impl_->make_block(triangles, {&items[i], items.data() + std::min(items.size(), i + kWidth)});
 }
 
-bool EllipsoidBvh::empty() const { return !impl_; }
+bool EllipsoidBvh::empty() const {
+  return !impl_;
+}
 
 void EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
                          std::vector<int>& ids) const {
@@ -318,15 +333,17 @@ void EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double ta
   const Vec3& axis = outer.valid() ? outer.axis : inner.axis;
   Shell shell{outer.center, axis, QuadraticForm(outer), QuadraticForm(inner), 0, 0, outer};
 
-  // Positions relative to the centre carry the round-off of all coordinates involved, here counted generously as a
-  // change of tau; |dQ/dtau| <= major / minor^2 on the surface turns it into a change of Q, and the evaluation of Q
-  // cancels terms of size reach^2 / minor^2.
+  // Positions relative to the centre carry the round-off of all coordinates involved, here counted generously
+  // as a change of tau; |dQ/dtau| <= major / minor^2 on the surface turns it into a change of Q, and the
+  // evaluation of Q cancels terms of size reach^2 / minor^2.
   const Vec3 middle = impl_->bounds.center();
   const double radius = length(impl_->bounds.upper - middle);
   const double reach = length(middle - outer.center) + radius + outer.major;
   const double magnitude = reach + length(middle) + radius + length(a) + length(b);
   const double round_off = 64 * std::numeric_limits<double>::epsilon();
-  const auto slack = [&](const QuadraticForm& form) { return 4 * round_off * reach * magnitude * form.inverse_minor2; };
+  const auto slack = [&](const QuadraticForm& form) {
+    return 4 * round_off * reach * magnitude * form.inverse_minor2;
+  };
   shell.inside = 1 + slack(shell.high);
   shell.outside = inner.valid() ? 1 - slack(shell.low) : -kInfinity;
   shell.outer = Ellipsoid(a, b, tau_high + round_off * magnitude);

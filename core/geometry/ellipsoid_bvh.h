@@ -23,9 +23,10 @@ class EllipsoidBvh {
 
   bool empty() const;
   /// Appends to `ids` every triangle that may meet an ellipsoid with foci a, b and a total length in
-  /// [tau_low, tau_high]: all that do, and few that do not. tau_low below |a-b| means "down to nothing", tau_high at or
-  /// below |a-b| finds nothing, an infinite one sets no limit. Triangles with coordinates that are not finite are never
-  /// reported, those without area may be. The order depends on the hierarchy only. Safe to call from several threads.
+  /// [tau_low, tau_high]: all that do, and few that do not. tau_low below |a-b| means "down to nothing",
+  /// tau_high at or below |a-b| finds nothing, an infinite one sets no limit. Triangles with coordinates that
+  /// are not finite are never reported, those without area may be. The order depends on the hierarchy only.
+  /// Safe to call from several threads.
   void query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
 
  private:

@@ -127,10 +127,14 @@ void query_all(benchmark::State& state, const Triangles& triangles, double exten
   state.counters["crossing"] = static_cast<double>(found) / static_cast<double>(state.iterations());
 }
 
-void BM_QueryRoom(benchmark::State& state) { query_all(state, box(), 1); }
+void BM_QueryRoom(benchmark::State& state) {
+  query_all(state, box(), 1);
+}
 BENCHMARK(BM_QueryRoom)->ArgName("permille")->Arg(0)->Arg(10);
 
-void BM_QueryMesh(benchmark::State& state) { query_all(state, mesh(), 2); }
+void BM_QueryMesh(benchmark::State& state) {
+  query_all(state, mesh(), 2);
+}
 BENCHMARK(BM_QueryMesh)->ArgName("permille")->Arg(0)->Arg(10);
 
 void BM_BuildMesh(benchmark::State& state) {

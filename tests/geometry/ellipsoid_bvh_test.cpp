@@ -41,14 +41,16 @@ Triangles rippled_sphere(int rings, double radius) {
   const auto point = [&](int i, int j) {
     const double theta = kPi * i / rings, phi = kPi * j / rings;
     const double r = radius * (1 + 0.05 * std::sin(9 * theta) * std::cos(7 * phi));
-    return Vec3{r * std::sin(theta) * std::cos(phi), r * std::sin(theta) * std::sin(phi), r * std::cos(theta)};
+    return Vec3{r * std::sin(theta) * std::cos(phi), r * std::sin(theta) * std::sin(phi),
+                r * std::cos(theta)};
   };
   Triangles triangles;
   for (int i = 0; i < rings; ++i)
     for (int j = 0; j < 2 * rings; ++j) {
       const int id = static_cast<int>(triangles.size());
       if (i > 0) triangles.push_back({{point(i, j), point(i + 1, j), point(i, j + 1)}, id});
-      if (i + 1 < rings) triangles.push_back({{point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)}, id + 1});
+      if (i + 1 < rings)
+        triangles.push_back({{point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)}, id + 1});
     }
   return triangles;
 }
@@ -57,11 +59,11 @@ struct Tally {
   int crossing = 0, missed = 0, extra = 0, twice = 0;
 };
 
-/// Compares a query with a scan over all triangles. What must be found: triangles with arcs at either end of the shell
-/// or in between, and those with a vertex in it. What may be found: those that reach out of the inner ellipsoid
-/// (lengths are convex: at a vertex) and into the outer one (at a vertex, or in an arc).
-void compare(const Triangles& triangles, const EllipsoidBvh& bvh, const Vec3& a, const Vec3& b, double tau_low,
-             double tau_high, Tally& tally) {
+/// Compares a query with a scan over all triangles. What must be found: triangles with arcs at either end of
+/// the shell or in between, and those with a vertex in it. What may be found: those that reach out of the
+/// inner ellipsoid (lengths are convex: at a vertex) and into the outer one (at a vertex, or in an arc).
+void compare(const Triangles& triangles, const EllipsoidBvh& bvh, const Vec3& a, const Vec3& b,
+             double tau_low, double tau_high, Tally& tally) {
   std::vector<int> ids;
   bvh.query(a, b, tau_low, tau_high, ids);
   const std::set<int> found(ids.begin(), ids.end());

@@ -3,29 +3,24 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <functional>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "core/math/constants.h"
+#include "tests/geometry/random_cases.h"
 
 namespace isochron {
 namespace {
 
 using Vec3L = Vec3T<long double>;
 
-struct Triangle {
-  Vec3 v0, v1, v2;
-  double area() const { return 0.5 * length(cross(v1 - v0, v2 - v0)); }
-  Vec3 normal() const { return normalize(cross(v1 - v0, v2 - v0)); }
-};
+Vec3L extended(const Vec3& v) {
+  return {v.x, v.y, v.z};
+}
 
-Vec3L extended(const Vec3& v) { return {v.x, v.y, v.z}; }
-
-/// Total span in long double by another route: in-plane axes from a Gram-Schmidt under the quadratic form, all roots
-/// of the three edge functions sorted, and the midpoint of every piece tested. `margin` is the least relative distance
-/// from a change of topology.
+/// Total span in long double by another route: in-plane axes from a Gram-Schmidt under the quadratic form,
+/// all roots of the three edge functions sorted, and the midpoint of every piece tested. `margin` is the
+/// least relative distance from a change of topology.
 long double reference_span(const Ellipsoid& e, const Triangle& t, long double& margin) {
   margin = 1;
   const Vec3L a = extended(e.a), b = extended(e.b), c = (a + b) / 2.0L, f = (b - a) / 2.0L;
@@ -76,39 +71,9 @@ long double reference_span(const Ellipsoid& e, const Triangle& t, long double& m
   return sum;
 }
 
-double sum_of_distances(const Ellipsoid& e, const Vec3& q) { return length(q - e.a) + length(q - e.b); }
-
-class RandomCases {
- public:
-  Vec3 vec(double scale) { return {scale * normal_(rng_), scale * normal_(rng_), scale * normal_(rng_)}; }
-  double uniform() { return uniform_(rng_); }
-  Triangle triangle() {
-    // A common centre, sizes over two decades, one vertex in eight pulled on the opposite edge: a sliver.
-    const double size = std::pow(10.0, 2 * uniform() - 1);
-    const Vec3 centre = vec(0.5);
-    Triangle t{centre + vec(size), centre + vec(size), centre + vec(size)};
-    if (uniform() < 0.125) t.v2 = t.v0 + (t.v1 - t.v0) * uniform() + (t.v2 - t.v0) * 1e-3;
-    return t;
-  }
-  /// Half of them pass through a point of the triangle, so that the two meet.
-  Ellipsoid ellipsoid(const Triangle& t) {
-    const Vec3 a = vec(1);
-    const double kind = uniform();
-    const Vec3 b = kind < 0.1 ? a : vec(1);
-    double tau = length(b - a) * (1 + std::pow(10.0, 4 * uniform() - 4)) + 1e-3 * uniform();
-    if (uniform() < 0.75) {
-      const double x = uniform(), y = uniform() * (1 - x);
-      const Vec3 q = t.v0 + (t.v1 - t.v0) * x + (t.v2 - t.v0) * y;
-      tau = length(q - a) + length(q - b);
-    }
-    return Ellipsoid(a, b, tau);
-  }
-
- private:
-  std::mt19937_64 rng_{20240611};
-  std::normal_distribution<double> normal_;
-  std::uniform_real_distribution<double> uniform_;
-};
+double sum_of_distances(const Ellipsoid& e, const Vec3& q) {
+  return length(q - e.a) + length(q - e.b);
+}
 
 TEST(Ellipsoid, SemiAxes) {
   const Ellipsoid e({1, 2, 3}, {4, 6, 3}, 13);
@@ -138,8 +103,8 @@ TEST(ClipEllipse, AgreesWithLongDoubleReference) {
       ++close_calls;  // roots that nearly coincide: the span itself is ill-conditioned
       continue;
     }
-    // Positions are good to round-off of the coordinates; in angle they are divided by the size of the ellipse and, at
-    // grazing roots, by the square root of the margin.
+    // Positions are good to round-off of the coordinates; in angle they are divided by the size of the
+    // ellipse and, at grazing roots, by the square root of the margin.
     const double size = length(t.v1 - t.v0) + length(t.v2 - t.v0) + length(t.v0 - e.center) + e.tau;
     const double sliver = length_squared(t.v1 - t.v0) + length_squared(t.v2 - t.v0);
     const double tolerance = 1e-14 * size / e.minor * (sliver / t.area()) / static_cast<double>(margin);
@@ -198,7 +163,8 @@ TEST(ClipEllipse, ArcsStartAndEndOnEdges) {
       double best = std::numeric_limits<double>::infinity();
       int edge = -1;
       for (int i = 0; i < 3; ++i) {
-        const double h = std::abs(dot(normalize(cross(area2, v[(i + 1) % 3] - v[i])), arcs.point(phi) - v[i]));
+        const double h =
+            std::abs(dot(normalize(cross(area2, v[(i + 1) % 3] - v[i])), arcs.point(phi) - v[i]));
         if (h < best) best = h, edge = i;
       }
       // Grazing roots lose half of the digits along the ellipse but none across the edge.
@@ -218,9 +184,9 @@ TEST(ClipEllipse, ArcsStartAndEndOnEdges) {
 }
 
 TEST(ClipEllipse, NearbyInputsGiveNearbyPoints) {
-  // Equal random numbers on slightly different inputs. Where arcs appear, merge or shrink to nothing no order can be
-  // continuous, and where an edge is grazed the ends move like the square root of the step: at steps of 1e-9 those
-  // are a few in a thousand.
+  // Equal random numbers on slightly different inputs. Where arcs appear, merge or shrink to nothing no order
+  // can be continuous, and where an edge is grazed the ends move like the square root of the step: at steps
+  // of 1e-9 those are a few in a thousand.
   RandomCases random;
   int compared = 0, far[3] = {};
   for (int k = 0; k < 50000; ++k) {
@@ -253,7 +219,8 @@ TEST(ClipEllipse, NearbyInputsGiveNearbyPoints) {
 TEST(ClipEllipse, SphereOnPlane) {
   // Coinciding foci at height 3 over the plane, radius 5: a circle of radius 4 about the foot point.
   EllipseArcs arcs;
-  ASSERT_TRUE(clip_ellipse(Ellipsoid({0, 0, 3}, {0, 0, 3}, 10), {-20, -10, 0}, {20, -10, 0}, {0, 30, 0}, arcs));
+  ASSERT_TRUE(
+      clip_ellipse(Ellipsoid({0, 0, 3}, {0, 0, 3}, 10), {-20, -10, 0}, {20, -10, 0}, {0, 30, 0}, arcs));
   EXPECT_EQ(arcs.count, 1);
   EXPECT_EQ(arcs.start[0], 0);
   EXPECT_EQ(arcs.total_span, kTwoPi);
@@ -297,7 +264,8 @@ TEST(ClipEllipse, ThinEllipsoid) {
   // tau one part in 1e12 above the focal distance; a triangle across the axis sees a tiny, accurate circle.
   const double tau = 2 * (1 + 1e-12);
   const Ellipsoid e({0, 0, -1}, {0, 0, 1}, tau);
-  const long double minor = std::sqrt((static_cast<long double>(tau) - 2) * (static_cast<long double>(tau) + 2)) / 2;
+  const long double minor =
+      std::sqrt((static_cast<long double>(tau) - 2) * (static_cast<long double>(tau) + 2)) / 2;
   EllipseArcs arcs;
   ASSERT_TRUE(clip_ellipse(e, {-1, -1, 0}, {2, -1, 0}, {0, 2, 0}, arcs));
   EXPECT_EQ(arcs.total_span, kTwoPi);
@@ -314,10 +282,12 @@ TEST(ClipEllipse, RefusesWhatHasNoArc) {
   EXPECT_FALSE(clip_ellipse(e, v0, v1, v0, arcs));
   EXPECT_FALSE(clip_ellipse(e, v0, v0, v0, arcs));
   EXPECT_FALSE(clip_ellipse(e, v0, v0 + (v1 - v0) * 0.3, v1, arcs));
-  EXPECT_FALSE(clip_ellipse(e, {-1.1, 0.3, 0.7}, {0.1, 0.9, 1.3}, {-0.5, 0.6, 1.0}, arcs));  // on a line, nearly
+  EXPECT_FALSE(
+      clip_ellipse(e, {-1.1, 0.3, 0.7}, {0.1, 0.9, 1.3}, {-0.5, 0.6, 1.0}, arcs));  // on a line, nearly
   EXPECT_FALSE(clip_ellipse(Ellipsoid({0, 0, 1}, {1, 0, 1}, 1), v0, v1, v2, arcs));
-  EXPECT_FALSE(clip_ellipse(Ellipsoid({0, 0, 1}, {1, 0, 1}, 2), v0, v1, v2, arcs));  // specular length sqrt(5)
-  EXPECT_FALSE(clip_ellipse(e, v0 * 0.01, v1 * 0.01, v2 * 0.01, arcs));              // wholly inside
+  EXPECT_FALSE(
+      clip_ellipse(Ellipsoid({0, 0, 1}, {1, 0, 1}, 2), v0, v1, v2, arcs));  // specular length sqrt(5)
+  EXPECT_FALSE(clip_ellipse(e, v0 * 0.01, v1 * 0.01, v2 * 0.01, arcs));     // wholly inside
   EXPECT_FALSE(clip_ellipse(e, v0 + Vec3{9, 0, 0}, v1 + Vec3{9, 0, 0}, v2 + Vec3{9, 0, 0}, arcs));
   EXPECT_EQ(arcs.count, 0);
   EXPECT_EQ(arcs.total_span, 0);
@@ -332,98 +302,6 @@ TEST(ClipEllipse, RefusesWhatHasNoArc) {
       if (i < 6) {
         EXPECT_FALSE(clip_ellipse(Ellipsoid(f[0], f[1], 4), v0, v1, v2, arcs));
       }
-    }
-}
-
-TEST(AreaPerAngleAndLength, MatchesItsDefinition) {
-  RandomCases random;
-  int checked = 0;
-  for (int k = 0; k < 20000; ++k) {
-    const Triangle t = random.triangle();
-    const Ellipsoid e = random.ellipsoid(t);
-    EllipseArcs arcs;
-    if (!clip_ellipse(e, t.v0, t.v1, t.v2, arcs)) continue;
-    const double phi = arcs.angle(0.4);
-    const Vec3 n = t.normal(), q = arcs.point(phi);
-    const Vec3 dq = arcs.e2 * std::cos(phi) - arcs.e1 * std::sin(phi);
-    const Vec3 gradient = normalize(q - e.a) + normalize(q - e.b);
-    const double in_plane = length(gradient - n * dot(n, gradient));
-    // The literal quotient is a good reference only away from the specular point and from slivers.
-    if (in_plane < 1e-2 || t.area() < 0.02 * length_squared(t.v1 - t.v0)) continue;
-    ++checked;
-    const double expected = length(dq) / in_plane;
-    EXPECT_NEAR(area_per_angle_and_length(e, arcs, phi, n), expected, 1e-9 * expected) << "case " << k;
-  }
-  EXPECT_GT(checked, 5000);
-}
-
-TEST(AreaPerAngleAndLength, AccurateAsTheEllipseShrinks) {
-  // Foci at height h over the plane, 2f apart: the section has semi-axes A sqrt(1 - (h/B)^2) and sqrt(B^2 - h^2), so
-  // its area grows with tau = 2A at pi/2 [B - h^2/B + A^2/B (1 + h^2/B^2)], which is finite at B = h.
-  const double h = 0.7, f = 1.3;
-  const double specular = 2 * std::hypot(h, f);
-  for (const double above : {1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0}) {
-    const double tau = specular * (1 + above);
-    const Ellipsoid e({-f, 0, h}, {f, 0, h}, tau);
-    EllipseArcs arcs;
-    if (!clip_ellipse(e, {-30, -20, 0}, {30, -20, 0}, {0, 40, 0}, arcs)) {
-      EXPECT_LE(above, 1e-15);
-      continue;
-    }
-    const int steps = 64;
-    double sum = 0;
-    for (int i = 0; i < steps; ++i)
-      sum += area_per_angle_and_length(e, arcs, kTwoPi * (i + 0.5) / steps, {0, 0, 1}) * kTwoPi / steps;
-    const long double A = tau / 2.0L, B2 = A * A - static_cast<long double>(f) * f, B = std::sqrt(B2);
-    const long double h2 = static_cast<long double>(h) * h;
-    const double rate = static_cast<double>(std::acos(-1.0L) / 2 * (B - h2 / B + A * A / B * (1 + h2 / B2)));
-    EXPECT_NEAR(sum / rate, 1, 1e-13) << above;
-  }
-}
-
-TEST(AreaPerAngleAndLength, SweepsTheTriangleOnce) {
-  const Triangle triangles[] = {{{0, 0, 0}, {2, 0.3, 0.1}, {0.5, 1.5, -0.4}},
-                                {{-3, -2, 0}, {3, -2, 0}, {0, 4, 0}},
-                                {{0.2, 0.1, 0.5}, {2.2, 0.15, 0.6}, {1.0, 0.2, 0.5}}};
-  const std::pair<Vec3, Vec3> foci[] = {
-      {{0.3, 0.2, 1.5}, {1.0, -0.4, 0.8}}, {{0.1, 0.2, 1}, {0.1, 0.2, 1}}, {{0.5, 0.5, 0}, {-0.5, 0.3, -2}}};
-  const auto segment_minimum = [](const std::function<double(double)>& s) {
-    double lo = 0, hi = 1;
-    for (int i = 0; i < 200; ++i) {
-      const double x = lo + (hi - lo) / 3, y = hi - (hi - lo) / 3;
-      (s(x) < s(y) ? hi : lo) = s(x) < s(y) ? y : x;
-    }
-    return s(lo);
-  };
-  for (const Triangle& t : triangles)
-    for (const auto& [a, b] : foci) {
-      // The arcs change their topology at the lengths of the vertices, at the least length of every edge and of the
-      // plane; in between the integrand is smooth but for square roots at the ends, which the cosine map removes.
-      const auto s = [a = a, b = b](const Vec3& q) { return length(q - a) + length(q - b); };
-      const Vec3 v[3] = {t.v0, t.v1, t.v2}, n = t.normal();
-      std::vector<double> breaks;
-      for (int i = 0; i < 3; ++i) {
-        breaks.push_back(s(v[i]));
-        breaks.push_back(segment_minimum([&](double x) { return s(v[i] + (v[(i + 1) % 3] - v[i]) * x); }));
-      }
-      breaks.push_back(std::sqrt(length_squared(b - a) + std::max(0.0, 4 * dot(n, a - t.v0) * dot(n, b - t.v0))));
-      std::sort(breaks.begin(), breaks.end());
-      double area = 0;
-      const int outer = 200, inner = 64;
-      for (std::size_t i = 0; i + 1 < breaks.size(); ++i)
-        for (int j = 1; j < outer; ++j) {  // Simpson's rule twice; the outer one's end points have no weight
-          const double theta = kPi * j / outer, half = (breaks[i + 1] - breaks[i]) / 2;
-          const Ellipsoid e(a, b, breaks[i] + half * (1 - std::cos(theta)));
-          EllipseArcs arcs;
-          if (!clip_ellipse(e, t.v0, t.v1, t.v2, arcs)) continue;
-          for (int k = 0; k < arcs.count; ++k)
-            for (int m = 0; m <= inner; ++m) {
-              const double weight = (m == 0 || m == inner ? 1 : m % 2 ? 4 : 2) / (3.0 * inner);
-              area += weight * arcs.span[k] * half * std::sin(theta) * kPi / outer * (j % 2 ? 4 : 2) / 3 *
-                      area_per_angle_and_length(e, arcs, arcs.start[k] + arcs.span[k] * m / inner, n);
-            }
-        }
-      EXPECT_NEAR(area / t.area(), 1, 1e-6);
     }
 }
 
