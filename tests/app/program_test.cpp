@@ -1,0 +1,268 @@
+// Runs the program itself on tiny experiments.
+#include <fcntl.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <thread>
+
+#include "core/image/image.h"
+#include "tests/optim/tiny_scene.h"
+
+extern char** environ;
+
+namespace isochron {
+namespace {
+
+struct Result {
+  int status;  ///< exit status, or minus the signal
+  std::string errors;
+};
+
+class Program : public testing::Test {
+ protected:
+  Program() {
+    write_tiny_scene(folder_);
+    folder_.write("tiny.yaml", tiny_experiment());
+  }
+
+  /// Runs `isochron ARGUMENTS...`; sends `signal` as soon as `when` holds.
+  Result run(std::vector<std::string> arguments, int signal = 0, const std::function<bool()>& when = {}) {
+    arguments.insert(arguments.begin(), ISOCHRON_PROGRAM);
+    std::vector<char*> argv;
+    for (std::string& argument : arguments) argv.push_back(argument.data());
+    argv.push_back(nullptr);
+    posix_spawn_file_actions_t actions;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, folder_.file("stdout").c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, folder_.file("stderr").c_str(),
+                                     O_WRONLY | O_CREAT | O_TRUNC, 0600);
+    pid_t child = 0;
+    if (posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ) != 0) ADD_FAILURE() << "cannot start";
+    posix_spawn_file_actions_destroy(&actions);
+    int status = 0;
+    while (signal != 0 && waitpid(child, &status, WNOHANG) == 0) {
+      if (when()) {
+        kill(child, signal);
+        signal = 0;
+      }
+      std::this_thread::sleep_for(std::chrono::microseconds(200));
+    }
+    if (signal == 0) waitpid(child, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status), folder_.read("stderr")};
+  }
+
+  std::vector<std::string> run_command(const std::string& out, std::vector<std::string> more = {}) const {
+    std::vector<std::string> arguments = {"run", folder_.file("tiny.yaml"), "-o", folder_.file(out), "--no-plots",
+                                          "--quiet"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  int rows(const std::string& out) const {
+    const std::string log = folder_.read(out + "/log.csv");
+    return static_cast<int>(std::count(log.begin(), log.end(), '\n')) - 1;
+  }
+
+  /// log.csv without its seconds.
+  std::string log(const std::string& out) const {
+    std::istringstream lines(folder_.read(out + "/log.csv"));
+    std::string line, kept;
+    while (std::getline(lines, line)) {
+      const std::size_t first = line.find(','), second = line.find(',', first + 1);
+      kept += line.substr(0, first) + line.substr(second) + "\n";
+    }
+    return kept;
+  }
+
+  /// Parameters and optimiser state of the last checkpoint, exact.
+  std::string state(const std::string& out) const {
+    const std::string text = folder_.read(out + "/checkpoint.yaml");
+    return text.substr(text.find("adam_steps"), text.find("checksum") - text.find("adam_steps"));
+  }
+
+  void expect_same_run(const std::string& a, const std::string& b) const {
+    EXPECT_EQ(log(a), log(b));
+    EXPECT_EQ(state(a), state(b));
+    for (const char* image : {"/target.exr", "/initial.exr", "/final.exr"})
+      EXPECT_TRUE(folder_.read(a + image) == folder_.read(b + image)) << image;
+    EXPECT_NE(folder_.read(b + "/summary.yaml").find("status: iterations_reached"), std::string::npos);
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
+  const std::string file = folder_.file("tiny.yaml");
+  const std::string out = folder_.file("out");
+  folder_.write("plain", "");
+  const std::vector<std::vector<std::string>> commands = {
+      {},
+      {"polish"},
+      {"run"},
+      {"run", file, "--unknown"},
+      {"run", folder_.file("gone.yaml")},
+      {"run", file, "-o", folder_.file("plain") + "/out"},
+      {"run", file, "-o", out, "--set", "gates.sigma=-1"},
+      {"run", file, "-o", out, "--set", "parameters[0].shape=teapot"},
+      {"run", file, "-o", out, "--set", "parameters=[]"},
+      {"run", file, "-o", out, "--threads", "-1"},
+      {"render", file, "-o", out, "--samples", "1"},
+      {"render", file, "-o", out, "--at", "width=1"},
+      {"derive", file, "-o", out, "--parameter", "width"},
+      {"derive", file, "-o", out, "--set", "samples.visibility=1"},
+      {"gradient", file, "-o", out, "--samples", "1"},
+      {"resume", out},
+  };
+  for (const auto& command : commands) {
+    const Result result = run(command);
+    EXPECT_EQ(result.status, 2) << result.errors;
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+  }
+  EXPECT_FALSE(folder_.has("out/experiment.yaml"));
+}
+
+TEST_F(Program, HelpShowsExamples) {
+  for (const char* command : {"run", "resume", "render", "derive", "gradient"}) {
+    EXPECT_EQ(run({command, "--help"}).status, 0);
+    EXPECT_NE(folder_.read("stdout").find(std::string("  isochron ") + command), std::string::npos);
+  }
+  EXPECT_EQ(run({"--version"}).status, 0);
+}
+
+TEST_F(Program, CommandsWriteTheirFiles) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  ASSERT_EQ(run({"render", file, "-o", out, "--no-plots"}).status, 0);
+  EXPECT_EQ(folder_.read("out/render.csv").rfind("gate,mean,standard_error\n0,", 0), 0u);
+  const GatedImage image = read_exr(out + "/render.exr");
+  EXPECT_EQ(image.gates, 2);
+  EXPECT_EQ(image.channels, 1);
+
+  ASSERT_EQ(run({"derive", file, "-o", out, "--no-plots", "--parameter", "height"}).status, 0);
+  EXPECT_TRUE(folder_.has("out/height.exr"));
+  EXPECT_FALSE(folder_.has("out/power.exr"));
+  const std::string derive = folder_.read("out/derive.csv");
+  EXPECT_EQ(derive.rfind("parameter,gate,component,mean,standard_error\nheight,0,total,", 0), 0u);
+  for (const char* row : {"height,1,total,", "height,1,interior,", "height,1,visibility,"})
+    EXPECT_NE(derive.find(row), std::string::npos);
+
+  ASSERT_EQ(run({"gradient", file, "-o", out, "--at", "target"}).status, 0);
+  const std::string gradient = folder_.read("out/gradient.csv");
+  EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error\nheight,0,", 0), 0u);
+  EXPECT_NE(gradient.find("\npower,10,"), std::string::npos);
+  const std::string cost = folder_.read("out/gradient.yaml");
+  for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"}) EXPECT_NE(cost.find(key), std::string::npos);
+}
+
+TEST_F(Program, RunMovesTowardsTheTargetAndRefusesToOverwrite) {
+  ASSERT_EQ(run(run_command("a")).status, 0);
+  for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml", "target.exr",
+                           "initial.exr", "final.exr", "summary.yaml"})
+    EXPECT_TRUE(folder_.has(std::string("a/") + name)) << name;
+  EXPECT_EQ(rows("a"), 7);
+  const Result again = run(run_command("a"));
+  EXPECT_EQ(again.status, 2);
+  EXPECT_NE(again.errors.find("isochron resume"), std::string::npos);
+  EXPECT_EQ(run(run_command("a", {"--force"})).status, 0);
+}
+
+TEST_F(Program, ResultsDoNotDependOnThreads) {
+  ASSERT_EQ(run(run_command("one", {"--threads", "1"})).status, 0);
+  ASSERT_EQ(run(run_command("two", {"--threads", "2"})).status, 0);
+  expect_same_run("one", "two");
+  ASSERT_EQ(run(run_command("seed", {"--seed", "4"})).status, 0);
+  EXPECT_NE(log("one"), log("seed"));
+}
+
+TEST_F(Program, KilledAnywhereAndResumedGivesTheSameBits) {
+  ASSERT_EQ(run(run_command("whole")).status, 0);
+  const std::vector<std::function<bool(const std::string&)>> moments = {
+      [&](const std::string& out) { return folder_.has(out + "/experiment.yaml"); },
+      [&](const std::string& out) { return folder_.has(out + "/target.exr"); },
+      [&](const std::string& out) { return folder_.has(out + "/log.csv"); },
+      [&](const std::string& out) { return rows(out) >= 1; },
+      [&](const std::string& out) { return folder_.has(out + "/checkpoint.new.yaml"); },
+      [&](const std::string& out) { return rows(out) >= 3; },
+      [&](const std::string& out) { return rows(out) >= 5; },
+      [&](const std::string& out) { return folder_.has(out + "/final.exr"); },
+  };
+  int killed = 0;
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    const std::string out = "killed" + std::to_string(i);
+    if (run(run_command(out), SIGKILL, [&] { return moments[i](out); }).status == -SIGKILL) ++killed;
+    // Killed once more while it goes on.
+    run({"resume", folder_.file(out), "--no-plots", "--quiet"}, SIGKILL, [&] { return rows(out) >= 2; });
+    const Result result = run({"resume", folder_.file(out), "--no-plots", "--quiet"});
+    EXPECT_EQ(result.status, 0) << result.errors;
+    expect_same_run("whole", out);
+  }
+  EXPECT_GE(killed, 5);  // the others may have ended before the signal came
+}
+
+TEST_F(Program, InterruptedLeavesACheckpointAndSaysHowToGoOn) {
+  ASSERT_EQ(run(run_command("whole")).status, 0);
+  for (int signal : {SIGINT, SIGTERM}) {
+    const std::string out = "interrupted" + std::to_string(signal);
+    const Result result = run(run_command(out), signal, [&] { return rows(out) >= 1; });
+    EXPECT_EQ(result.status, 1);
+    EXPECT_NE(result.errors.find("isochron resume " + folder_.file(out)), std::string::npos) << result.errors;
+    EXPECT_NE(folder_.read(out + "/summary.yaml").find("status: interrupted"), std::string::npos);
+    EXPECT_TRUE(folder_.has(out + "/checkpoint.yaml"));
+    EXPECT_EQ(run({"resume", folder_.file(out), "--no-plots", "--quiet"}).status, 0);
+    expect_same_run("whole", out);
+  }
+}
+
+TEST_F(Program, DamagedCheckpointFallsBack) {
+  ASSERT_EQ(run(run_command("whole")).status, 0);
+  ASSERT_EQ(run(run_command("damaged")).status, 0);
+  folder_.write("damaged/checkpoint.yaml", folder_.read("damaged/checkpoint.yaml").substr(0, 100));
+  const Result result = run({"resume", folder_.file("damaged"), "--no-plots", "--quiet"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_NE(result.errors.find("damaged"), std::string::npos);
+  expect_same_run("whole", "damaged");
+}
+
+TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
+  // The square of the images overflows.
+  const Result result = run(run_command("out", {"--at", "power=1e300", "--set", "optimizer.iterations=20"}));
+  EXPECT_EQ(result.status, 1);
+  const std::string summary = folder_.read("out/summary.yaml");
+  EXPECT_NE(summary.find("status: diverged\niterations: 5\n"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("rejected_steps: 5\n"), std::string::npos);
+  EXPECT_NE(summary.find("  height: 0.2\n  power: 1e+300\n"), std::string::npos);
+}
+
+TEST_F(Program, AnExplodedLossIsADivergence) {
+  // From an emission far below the target one step of 500 leads far above it.
+  const Result result = run(run_command("out", {"--at", "height=0,power=2", "--set", "optimizer.learning_rate=500",
+                                                "--set", "parameters[0].upper=0.01", "--set",
+                                                "parameters[0].lower=0", "--set", "parameters[0].initial=0", "--set",
+                                                "optimizer.iterations=1"}));
+  EXPECT_EQ(result.status, 1) << result.errors;
+  EXPECT_NE(folder_.read("out/summary.yaml").find("status: diverged"), std::string::npos);
+}
+
+TEST_F(Program, StopsWhenTheImagesAgree) {
+  const Result result = run(run_command("out", {"--at", "target", "--set", "optimizer.tolerance=0.5"}));
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_NE(folder_.read("out/summary.yaml").find("status: converged\niterations: 0\n"), std::string::npos);
+}
+
+TEST_F(Program, DrawsItsPlots) {
+  const Result result = run({"run", folder_.file("tiny.yaml"), "-o", folder_.file("out"), "--set",
+                             "optimizer.iterations=1"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  for (const char* name : {"target.png", "initial.png", "final.png", "rmse.png"})
+    EXPECT_TRUE(folder_.has(std::string("out/") + name)) << name;
+}
+
+}  // namespace
+}  // namespace isochron

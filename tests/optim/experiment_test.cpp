@@ -1,0 +1,215 @@
+#include "optim/experiment.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "core/math/error.h"
+#include "tests/optim/tiny_scene.h"
+
+namespace isochron {
+namespace {
+
+struct Case {
+  std::string from, to;
+  std::string message;  ///< after the file's name
+};
+
+TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  folder.write("table.txt", "-1 0\n0, 1 # peak\n\n1 x\n");
+  folder.write("wide.txt", "-1 0 3\n");
+  const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
+  const Case cases[] = {
+      {"name: tiny", "nam: tiny", "1:1: name: is missing, is 'nam' a misspelling of it?"},
+      {"name: tiny", "name: a/b", "1:7: name: 'a/b' is not a usable name (letters, digits, _ and -)"},
+      {"scene.yaml", "none.yaml", "2:8: scene: there is no file 'none.yaml' (a path relative to the experiment file)"},
+      {"max_bounces: 2", "max_bounces: -1", "3:14: max_bounces: -1 is out of range (an integer from 0 to 10000)"},
+      {"max_bounces: 2", "max_bounces: 2.5", "3:14: max_bounces: '2.5' is not an integer that fits (an integer from 0"},
+      {"max_bounces", "max_bounce", "3:1: max_bounce: is not a known key, did you mean 'max_bounces'? (allowed: name, "},
+      {"kind: gaussian", "kind: gauss", "4:15: gates.kind: 'gauss' is not known"},
+      {"centers: [4.5, 5.5]", "centers: []", "4:34: gates.centers: holds no gate (at least one number)"},
+      {"centers: [4.5, 5.5]", "centers: [4.5, -1]", "4:40: gates.centers[1]: -1 is out of range (a number at least 0)"},
+      {"centers: [4.5, 5.5]", "centers: {start: 5, stop: 4, count: 3}",
+       "4:51: gates.centers.stop: 4 lies before start (at least 5)"},
+      {"centers: [4.5, 5.5]", "centers: {start: 5, stop: 6, count: 0}", "4:61: gates.centers.count: 0 is out of range"},
+      {"centers: [4.5, 5.5]", "centers: 5", "4:34: gates.centers: is neither (a list of numbers, or {start, stop, count})"},
+      {"sigma: 0.3", "sigma: 0", "4:53: gates.sigma: 0 is out of range (a number above 0)"},
+      {"sigma: 0.3", "sigma: 0.3, width: 1", "4:58: gates.width: is not a known key"},
+      {"sigma: 0.3", "sigma: 0.3, unit: ns", "4:8: gates.scene_unit_m: is missing"},
+      {gates, "{kind: steady, centers: [1]}", "4:23: gates.centers: is not a known key"},
+      {gates, "{kind: boxcar, centers: [1], width: .inf}", "4:44: gates.width: '.inf' is not a finite number"},
+      {gates, "{kind: truncated_gaussian, centers: [1], sigma: 1}", "4:8: gates.half_width: is missing"},
+      {gates, "{kind: tabulated, centers: [1], offsets: [0, 1], values: [1]}",
+       "4:65: gates.values: 1 values are given (one for each of the 2 offsets)"},
+      {gates, "{kind: tabulated, centers: [1], offsets: [1, 0], values: [1, 1]}",
+       "4:8: gates: the table is no gate (two rows or more, offsets in rising order, values at least 0"},
+      {gates, "{kind: tabulated, centers: [1], file: gone.txt}", "4:46: gates.file: there is no file 'gone.txt'"},
+      {"name: height", "name: target", "6:12: parameters[0].name: 'target' is the name of another output"},
+      {"name: power", "name: height", "7:12: parameters[1].name: 'height' stands here twice"},
+      {"type: translation", "type: shift", "6:26: parameters[0].type: 'shift' is not known (allowed: translation, "},
+      {"shape: block", "material: metal", "6:5: parameters[0].shape: is missing"},
+      {"direction: [0, 1, 0]", "direction: [0, 0, 0]", "6:64: parameters[0].direction: the zero vector has no direction"},
+      {"direction: [0, 1, 0]", "axis: [0, 1, 0]", "6:5: parameters[0].direction: is missing"},
+      {"direction: [0, 1, 0]", "direction: [0, 1, 0], selection: {box: {min: [0, 0, 0]}}",
+       "6:92: parameters[0].selection.box.max: is missing"},
+      {"direction: [0, 1, 0]", "direction: [0, 1, 0], selection: 3",
+       "6:86: parameters[0].selection: is neither (a list of vertex indices, or {box: {min, max}})"},
+      {"type: translation, shape: block, direction: [0, 1, 0]", "type: vertices, shape: block, direction: inward",
+       "6:61: parameters[0].direction: 'inward' is not known (allowed: normal, free)"},
+      {"initial: 0.2", "initial: []", "6:84: parameters[0].initial: holds no number (at least one)"},
+      {"initial: 0.2", "initial: [0.2, x]", "6:90: parameters[0].initial[1]: 'x' is not a finite number"},
+      {"initial: 0.2", "initial: gone.txt", "6:84: parameters[0].initial: there is no file 'gone.txt'"},
+      {", target: 0}", "}", "6:5: parameters[0].target: is missing"},
+      {"target: 10}", "target: 10, lower: a}", "7:79: parameters[1].lower: there is no file 'a'"},
+      {"samples: 64,", "samples: 0,", "8:19: target.samples: 0 is out of range (an integer from 1 to 1073741824)"},
+      {"{samples: 64, seed: 7}", "{images: gone.exr}", "8:18: target.images: there is no file 'gone.exr'"},
+      {"{samples: 64, seed: 7}", "{images: scene.yaml, seed: 7}", "8:30: target.seed: is not a known key (allowed: images)"},
+      {"primal: 16", "primal: 0", "9:19: samples.primal: 0 is out of range"},
+      {"interior: 16", "interior: -2", "9:33: samples.interior: -2 is out of range"},
+      {"path_length", "pathlength", "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},
+      {"method: adam", "method: lbfgs", "10:21: optimizer.method: 'lbfgs' is not available yet (allowed: adam)"},
+      {"method: adam", "method: levenberg_marquardt", "10:21: optimizer.method: 'levenberg_marquardt' is not available"},
+      {"method: adam", "method: sgd", "10:21: optimizer.method: 'sgd' is not known (allowed: adam, lbfgs, levenberg_"},
+      {"learning_rate: 0.02", "learning_rate: 0", "10:42: optimizer.learning_rate: 0 is out of range (a number above 0)"},
+      {"iterations: 6", "iterations: -1", "10:60: optimizer.iterations: -1 is out of range"},
+      {"seed: 3", "seed: -3", "11:7: seed: -3 is out of range"},
+      {"seed: 3", "gradient: {method: exact}", "11:20: gradient.method: 'exact' is not known (allowed: analytic, finite"},
+      {"seed: 3", "gradient: {step: 0}", "11:18: gradient.step: 0 is out of range (a number above 0)"},
+      {"seed: 3", "estimator: {sampling: best}", "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
+      {"seed: 3", "estimator: {antithetic: 1}", "11:25: estimator.antithetic: '1' is neither (true or false)"},
+  };
+  for (const Case& c : cases) {
+    const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
+    try {
+      load_experiment(file);
+      ADD_FAILURE() << "accepted: " << c.to;
+    } catch (const InputError& error) {
+      const std::string what = error.what();
+      EXPECT_EQ(what.substr(0, file.size() + 1 + c.message.size()), file + ":" + c.message);
+      EXPECT_EQ(what.find('\n'), std::string::npos);
+    }
+  }
+  const auto table_error = [&](const std::string& table) -> std::string {
+    const std::string file = folder.write(
+        "tiny.yaml", replaced(tiny_experiment(), gates, "{kind: tabulated, centers: [5], file: " + table + "}"));
+    try {
+      load_experiment(file);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  const std::string canonical = std::filesystem::canonical(folder.path()).string();
+  EXPECT_EQ(table_error("table.txt"), canonical + "/table.txt:4:3: 'x' is not a finite number");
+  EXPECT_EQ(table_error("wide.txt"), canonical + "/wide.txt:1:1: 3 numbers in this row (allowed: 2)");
+}
+
+TEST(Experiment, OverridesAreCheckedLikeTheFile) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string file = folder.write("tiny.yaml", tiny_experiment());
+  const Experiment changed =
+      load_experiment(file, {"optimizer.iterations=9", "parameters[1].initial=[5]", "gates.centers=[1, 2, 3]",
+                             "estimator={sampling: standard, antithetic: false}"});
+  EXPECT_EQ(changed.optimizer.iterations, 9);
+  EXPECT_EQ(changed.parameters[1].initial, std::vector<double>{5});
+  EXPECT_EQ(changed.gates.centers.size(), 3u);
+  EXPECT_EQ(changed.estimator.sampling, Sampling::standard);
+  EXPECT_FALSE(changed.estimator.antithetic);
+  for (const char* wrong : {"optimizer.iterations=-9", "parameters[7].initial=1", "nothing=1", "gates.sigma=",
+                            "gates.sigma", "optimizer.method=lbfgs"}) {
+    try {
+      load_experiment(file, {wrong});
+      ADD_FAILURE() << "accepted: " << wrong;
+    } catch (const InputError& error) {
+      const std::string key = std::string(wrong).substr(0, std::string(wrong).find('='));
+      EXPECT_EQ(std::string(error.what()).rfind("--set " + key, 0), 0u) << error.what();
+    }
+  }
+}
+
+TEST(Experiment, DefaultsAreFilledIn) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const Experiment e = load_experiment(folder.write("e.yaml", "name: e\nscene: scene.yaml\ngates: {kind: steady}\n"));
+  EXPECT_EQ(e.estimator.max_bounces, 8);
+  EXPECT_EQ(e.samples.visibility, 64);
+  EXPECT_EQ(e.target.samples, 4096);
+  EXPECT_EQ(e.target.seed, 7u);
+  EXPECT_EQ(e.seed, 1u);
+  EXPECT_EQ(make_gates(e.gates).size(), 1);
+  EXPECT_TRUE(make_gates(e.gates).shape().is_steady());
+}
+
+TEST(Experiment, TimesBecomeLengths) {
+  GateSpec spec;
+  spec.kind = GateKind::boxcar;
+  spec.unit = LengthUnit::ns;
+  spec.scene_unit_m = 0.149896229;  // half of what light travels in a nanosecond
+  spec.centers = {1, 3};
+  spec.width = 0.25;
+  const GateSet gates = make_gates(spec);
+  EXPECT_NEAR(gates.center(0), 2, 1e-14);
+  EXPECT_NEAR(gates.center(1), 6, 1e-14);
+  EXPECT_NEAR(gates.shape().upper() - gates.shape().lower(), 0.5, 1e-14);
+  spec.unit = LengthUnit::ps;
+  EXPECT_NEAR(make_gates(spec).center(1), 6e-3, 1e-16);
+}
+
+TEST(Experiment, ResolvedFileReadsBackTheSame) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  folder.write("values.txt", "0.1\n0.2 0.3\n0.4\n");
+  folder.write("table.txt", "-1 0\n0 1\n0 0.5\n1.5 0\n");
+  const std::string vertices =
+      "seed: 9007199254740993\nestimator: {sampling: ellipsoidal, antithetic: false}\n"
+      "gradient: {method: finite_difference, step: 0.003}\n";
+  const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
+  for (const char* other : {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
+                            "{kind: boxcar, centers: {start: 1, stop: 2, count: 4}, width: 0.7}",
+                            "{kind: truncated_gaussian, centers: [3], sigma: 0.2, half_width: 0.6, unit: ps, "
+                            "scene_unit_m: 0.33}",
+                            "{kind: tabulated, centers: [3], file: table.txt}"}) {
+    std::string text = replaced(replaced(tiny_experiment(), gates, other), "seed: 3\n", vertices);
+    text = replaced(text, "  - {name: power",
+                    "  - {name: dent, type: vertices, shape: block, direction: normal, initial: values.txt, target: "
+                    "[0, 0, 0, 0.1], lower: -1, upper: [1, 2, 3, 4]}\n"
+                    "  - {name: turn, type: rotation, shape: block, axis: [0, 3, 4], pivot: [1, 0.1, 0], selection: "
+                    "{box: {min: [-1, 0, -1], max: [0, 1, 0.1]}}, initial: 5, target: 0}\n"
+                    "  - {name: pull, type: vertices, shape: block, direction: [1, 1, 0], selection: [2, 0], initial: "
+                    "0, target: [0.1, -0.1]}\n"
+                    "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
+                    "  - {name: power");
+    const Experiment original = load_experiment(folder.write("tiny.yaml", text));
+    const std::string out = folder.file("runs/deep");
+    std::filesystem::create_directories(out);
+    const std::string resolved = resolved_yaml(original, out);
+    const Experiment back = load_experiment(folder.write("runs/deep/experiment.yaml", resolved));
+    EXPECT_EQ(resolved_yaml(back, out), resolved);
+    EXPECT_EQ(back.scene, original.scene);
+    EXPECT_EQ(back.seed, 9007199254740993u);
+    EXPECT_EQ(back.gates.kind, original.gates.kind);
+    EXPECT_EQ(back.gates.centers, original.gates.centers);
+    EXPECT_EQ(back.gates.offsets, original.gates.offsets);
+    EXPECT_EQ(back.gates.sigma, original.gates.sigma);
+    EXPECT_EQ(back.gates.scene_unit_m, original.gates.scene_unit_m);
+    EXPECT_EQ(back.gates.unit, original.gates.unit);
+    EXPECT_EQ(back.estimator.sampling, Sampling::ellipsoidal);
+    EXPECT_FALSE(back.estimator.antithetic);
+    EXPECT_EQ(back.gradient.step, 0.003);
+    ASSERT_EQ(back.parameters.size(), 6u);
+    EXPECT_EQ(back.parameters[1].initial, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
+    EXPECT_EQ(back.parameters[1].upper, (std::vector<double>{1, 2, 3, 4}));
+    EXPECT_EQ(back.parameters[1].direction_kind, VertexDirection::normal);
+    EXPECT_EQ(back.parameters[2].axis, (Vec3{0, 3, 4}));
+    EXPECT_EQ(back.parameters[2].pivot, (Vec3{1, 0.1, 0}));
+    EXPECT_EQ(back.parameters[2].selection.max, (Vec3{0, 1, 0.1}));
+    EXPECT_EQ(back.parameters[3].selection.indices, (std::vector<int>{2, 0}));
+    EXPECT_EQ(back.parameters[4].material, "metal");
+  }
+}
+
+}  // namespace
+}  // namespace isochron

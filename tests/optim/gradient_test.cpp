@@ -1,0 +1,69 @@
+// The whole chain from scene to loss gradient against central differences of the images.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "optim/estimates.h"
+#include "optim/loss.h"
+#include "tests/optim/tiny_scene.h"
+
+namespace isochron {
+namespace {
+
+TEST(Gradient, AgreesWithFiniteDifferences) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string file = folder.write("tiny.yaml", tiny_experiment());
+  const std::vector<std::string> samples = {"samples={primal: 2048, interior: 2048, visibility: 2048, path_length: 0}",
+                                            "parameters[1].initial=2"};
+  const Problem analytic(load_experiment(file, samples));
+  std::vector<std::string> with_method = samples;
+  with_method.push_back("gradient={method: finite_difference, step: 0.01}");
+  const Problem differences(load_experiment(file, with_method));
+  const Poll go_on = [] {};
+  const GatedImage target = analytic.make_target(go_on);
+  const std::vector<double> theta = analytic.parameters().initial();
+  const GradientEstimate a = estimate_gradient(analytic, theta, target, go_on);
+  const GradientEstimate b = estimate_gradient(differences, theta, target, go_on);
+  ASSERT_EQ(a.repeats, kMostBatches);
+  for (int i = 0; i < 2; ++i) {
+    // Student's t of 31 degrees of freedom exceeds 5 with probability 2e-5.
+    const double error = std::hypot(a.gradient.standard_error[i], b.gradient.standard_error[i]);
+    EXPECT_LT(std::abs(a.gradient.mean[i] - b.gradient.mean[i]), 5 * error) << analytic.parameters().component_names()[i];
+    // The test must be able to see a wrong factor.
+    EXPECT_GT(std::abs(b.gradient.mean[i]), 12 * error) << analytic.parameters().component_names()[i];
+  }
+}
+
+TEST(Gradient, OfAnEmissionIsKnown) {
+  // Radiance is linear in the lamp's emission e: dI/de = I / e, so dLoss/de = (2/N) sum (I - T) I / e.
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string file = folder.write("tiny.yaml", tiny_experiment());
+  const Problem problem(
+      load_experiment(file, {"samples={primal: 1024, interior: 1024, visibility: 0, path_length: 0}",
+                             "parameters[1].initial=2"}));
+  const Poll go_on = [] {};
+  const GatedImage target = problem.make_target(go_on);
+  const std::vector<double> theta = problem.parameters().initial();
+  const GradientEstimate estimate = estimate_gradient(problem, theta, target, go_on);
+  const GatedImage image = problem.render(theta, {99, 0, 0}, {0, 8192});
+  const double expected = inner_product(loss_adjoint(image, target), image) / theta[1];
+  const double error = estimate.gradient.standard_error[1];
+  EXPECT_NEAR(estimate.gradient.mean[1], expected, 5 * error + 0.01 * std::abs(expected));
+  EXPECT_GT(std::abs(expected), 12 * error);
+}
+
+TEST(BatchStatistics, WeightsBatchesByTheirSamples) {
+  BatchStatistics statistics;
+  statistics.add({1.0}, 1);
+  statistics.add({4.0}, 2);
+  statistics.add({2.0}, 1);
+  const Statistics result = statistics.result();
+  EXPECT_NEAR(result.mean[0], 2.75, 1e-15);
+  // sqrt(3/2 * (0.25^2 * 1.75^2 + 0.5^2 * 1.25^2 + 0.25^2 * 0.75^2))
+  EXPECT_NEAR(result.standard_error[0], std::sqrt(1.5 * (0.19140625 + 0.390625 + 0.03515625)), 1e-15);
+}
+
+}  // namespace
+}  // namespace isochron

@@ -1,0 +1,177 @@
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "core/math/error.h"
+#include "optim/adam.h"
+#include "optim/checkpoint.h"
+#include "optim/log.h"
+#include "optim/loss.h"
+#include "tests/optim/temporary_folder.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+TEST(Adam, FollowsTheHandComputedSequence) {
+  const AdamOptions options{.learning_rate = 0.1};
+  AdamState state;
+  std::vector<double> theta = {1.0};
+  adam_step(options, {4.0}, {-kInfinity}, {kInfinity}, state, theta);
+  EXPECT_NEAR(theta[0], 0.9, 1e-15);  // the first step is the learning rate
+  // m = 0.9*0.4 - 0.1*2 = 0.16, corrected by 1 - 0.81; v = 0.999*0.016 + 0.001*4 = 0.019984, by 1 - 0.998001.
+  adam_step(options, {-2.0}, {-kInfinity}, {kInfinity}, state, theta);
+  EXPECT_NEAR(theta[0], 0.9 - 0.1 * (0.16 / 0.19) / std::sqrt(0.019984 / 0.001999), 1e-14);
+  // m = 0.9*0.16 + 0.1*1 = 0.244; v = 0.999*0.019984 + 0.001 = 0.020964016.
+  const double before = theta[0];
+  adam_step(options, {1.0}, {-kInfinity}, {kInfinity}, state, theta);
+  EXPECT_NEAR(theta[0], before - 0.1 * (0.244 / 0.271) / std::sqrt(0.020964016 / 0.002997001), 1e-14);
+  EXPECT_EQ(state.steps, 3);
+}
+
+TEST(Adam, StaysWithinBoundsAndDoesNotDependOnTheLossesUnit) {
+  const AdamOptions options{.learning_rate = 0.5};
+  AdamState state, scaled_state;
+  std::vector<double> theta = {0.2, 0.8, 0.5}, scaled = theta;
+  const std::vector<double> lower = {0, 0, 0}, upper = {1, 1, 1};
+  adam_step(options, {1.0, -1.0, 0.0}, lower, upper, state, theta);
+  adam_step(options, {0x1p-200, -0x1p-200, 0.0}, lower, upper, scaled_state, scaled);
+  EXPECT_EQ(theta, (std::vector<double>{0, 1, 0.5}));
+  EXPECT_EQ(scaled, theta);
+}
+
+TEST(Loss, AdjointIsTheDerivativeOfTheLoss) {
+  GatedImage image(2, 1, 2, 3), target(2, 1, 2, 3);
+  for (std::size_t i = 0; i < image.data.size(); ++i) {
+    image.data[i] = std::sin(1.0 + static_cast<double>(i));
+    target.data[i] = std::cos(2.0 * static_cast<double>(i));
+  }
+  const GatedImage adjoint = loss_adjoint(image, target);
+  for (std::size_t i = 0; i < image.data.size(); ++i) {
+    GatedImage up = image, down = image;
+    up.data[i] += 1e-3, down.data[i] -= 1e-3;  // the loss is quadratic: central differences are exact
+    const double slope = (mean_squared_error(up, target) - mean_squared_error(down, target)) / 2e-3;
+    EXPECT_NEAR(adjoint.data[i], slope, 1e-12);
+  }
+  GatedImage shifted = target;
+  for (double& value : shifted.data) value += 0.5;
+  EXPECT_NEAR(mean_squared_error(shifted, target), 0.25, 1e-15);
+  shifted.data[3] = kInfinity;
+  EXPECT_TRUE(std::isnan(mean_squared_error(shifted, target)));
+}
+
+/// Four albedos: as many unknowns as the tests need, without geometry.
+struct Bound {
+  Scene scene;
+  std::vector<ParameterSpec> specs;
+  Bound() {
+    for (const char* name : {"a", "b", "c", "d"}) {
+      scene.materials.push_back({.name = name});
+      ParameterSpec spec;
+      spec.name = name;
+      spec.type = ParameterType::albedo;
+      spec.material = name;
+      spec.initial = {0.5};
+      specs.push_back(spec);
+    }
+  }
+};
+
+std::vector<std::uint64_t> bits(const std::vector<double>& values) {
+  std::vector<std::uint64_t> result;
+  for (double value : values) result.push_back(std::bit_cast<std::uint64_t>(value));
+  return result;
+}
+
+Checkpoint awkward_checkpoint() {
+  Checkpoint c;
+  c.iteration = 17;
+  c.seconds = 1.0 / 3;
+  c.rejected = 2;
+  c.theta = {0.1 + 0.2, -0.0, std::numeric_limits<double>::denorm_min(), std::numeric_limits<double>::max()};
+  c.adam = {15, {1e-300, -1.0 / 3, std::nextafter(1.0, 2.0), 3e8}, {5e-324, 0x1.fffffffffffffp-3, 1e17, 2.5}};
+  c.loss_initial = std::nextafter(0.1, 1.0);
+  return c;
+}
+
+TEST(Checkpoint, RoundTripIsBitExact) {
+  const Bound bound;
+  const Parameters parameters(bound.scene, bound.specs);
+  const TemporaryFolder folder;
+  EXPECT_FALSE(load_checkpoint(folder.path(), parameters, nullptr).has_value());
+  const Checkpoint saved = awkward_checkpoint();
+  save_checkpoint(folder.path(), saved, parameters);
+  const auto loaded = load_checkpoint(folder.path(), parameters, nullptr);
+  ASSERT_TRUE(loaded.has_value());
+  EXPECT_EQ(loaded->iteration, 17);
+  EXPECT_EQ(loaded->rejected, 2);
+  EXPECT_EQ(loaded->adam.steps, 15);
+  EXPECT_EQ(bits(loaded->theta), bits(saved.theta));
+  EXPECT_EQ(bits(loaded->adam.m), bits(saved.adam.m));
+  EXPECT_EQ(bits(loaded->adam.v), bits(saved.adam.v));
+  EXPECT_EQ(bits({loaded->loss_initial, loaded->seconds}), bits({saved.loss_initial, saved.seconds}));
+  EXPECT_TRUE(std::isnan(loaded->param_rmse_initial));
+}
+
+TEST(Checkpoint, FallsBackToTheOneBefore) {
+  const Bound bound;
+  const Parameters parameters(bound.scene, bound.specs);
+  const TemporaryFolder folder;
+  Checkpoint checkpoint = awkward_checkpoint();
+  save_checkpoint(folder.path(), checkpoint, parameters);
+  checkpoint.iteration = 18;
+  save_checkpoint(folder.path(), checkpoint, parameters);
+  EXPECT_EQ(load_checkpoint(folder.path(), parameters, nullptr)->iteration, 18);
+
+  const std::string whole = folder.read("checkpoint.yaml");
+  const std::string damages[] = {whole.substr(0, whole.size() / 2), "", std::string(3, '\0'), whole.substr(0, whole.size() - 1),
+                                 std::string(whole).replace(whole.find("iteration: 18"), 13, "iteration: 19")};
+  for (const std::string& damaged : damages) {
+    folder.write("checkpoint.yaml", damaged);
+    std::string warning;
+    const auto loaded = load_checkpoint(folder.path(), parameters, &warning);
+    ASSERT_TRUE(loaded.has_value());
+    EXPECT_EQ(loaded->iteration, 17);
+    EXPECT_NE(warning.find("damaged"), std::string::npos);
+    EXPECT_FALSE(folder.has("checkpoint.yaml"));  // or the next save would move it over the whole one
+  }
+  folder.write("checkpoint.previous.yaml", "iteration: [");
+  EXPECT_THROW(load_checkpoint(folder.path(), parameters, nullptr), InputError);
+}
+
+TEST(Checkpoint, IsOfOneVersionAndOneSetOfParameters) {
+  const Bound bound;
+  const TemporaryFolder folder;
+  const Parameters parameters(bound.scene, bound.specs);
+  save_checkpoint(folder.path(), awkward_checkpoint(), parameters);
+  std::vector<ParameterSpec> renamed = bound.specs, fewer = bound.specs;
+  renamed[1].name = "other";
+  fewer.pop_back();
+  EXPECT_THROW(load_checkpoint(folder.path(), Parameters(bound.scene, renamed), nullptr), InputError);
+  EXPECT_THROW(load_checkpoint(folder.path(), Parameters(bound.scene, fewer), nullptr), InputError);
+}
+
+TEST(Log, CutsWhatTheCheckpointDoesNotKnow) {
+  const Bound bound;
+  const Parameters parameters(bound.scene, bound.specs);
+  const TemporaryFolder folder;
+  const std::vector<double> theta = {1, 2, 3, 0.1};
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  {
+    Log log(folder.file("log.csv"), parameters, 0);
+    for (int i = 0; i < 3; ++i) log.append({i, 0.5, 0.25, 0.5, nan, 2}, theta);
+  }
+  const std::string header = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,a,b,c,d\n";
+  const std::string rest = ",0.5,0.25,0.5,,2,1,2,3,0.1\n";
+  EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + rest + "2" + rest);
+  folder.write("log.csv", folder.read("log.csv") + "1,0.5");  // torn by a kill
+  { Log log(folder.file("log.csv"), parameters, 2); }
+  EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + rest);
+}
+
+}  // namespace
+}  // namespace isochron

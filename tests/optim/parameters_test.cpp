@@ -1,0 +1,222 @@
+#include "optim/parameters.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+/// Two shapes: a tetrahedron of four vertices and a quad of four, one diffuse and one rough material.
+Scene two_shapes(bool grey) {
+  Scene scene;
+  scene.grey = grey;
+  scene.materials = {{.name = "white"}, {.name = "metal", .type = MaterialType::rough_conductor}};
+  scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}, {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
+  scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0}, {{1, 2, 3}, 0}, {{4, 5, 6}, 1}, {{4, 6, 7}, 1}};
+  scene.shapes = {{.name = "tetra", .file = "", .material = 1, .emission = {}, .first_vertex = 0, .vertex_count = 4,
+                   .first_triangle = 0, .triangle_count = 4},
+                  {.name = "quad", .file = "", .material = 0, .emission = Rgb(5.0), .first_vertex = 4,
+                   .vertex_count = 4, .first_triangle = 4, .triangle_count = 2}};
+  return scene;
+}
+
+ParameterSpec spec(const std::string& name, ParameterType type, const std::string& of, double initial) {
+  ParameterSpec s;
+  s.name = name;
+  s.type = type;
+  (type == ParameterType::albedo || type == ParameterType::roughness ? s.material : s.shape) = of;
+  s.initial = {initial};
+  s.target = {initial};
+  return s;
+}
+
+std::vector<ParameterSpec> every_kind() {
+  std::vector<ParameterSpec> specs;
+  specs.push_back(spec("move", ParameterType::translation, "tetra", 0.3));
+  specs.back().direction = {0.5, 1, -2};
+  specs.push_back(spec("dent", ParameterType::vertices, "tetra", 0.1));
+  specs.back().direction_kind = VertexDirection::normal;
+  specs.back().selection = {Selection::Kind::list, {3, 1}, {}, {}};
+  specs.push_back(spec("turn", ParameterType::rotation, "tetra", 25));
+  specs.back().axis = {1, 2, -0.5};
+  specs.back().pivot = {0.2, -0.4, 1};
+  specs.push_back(spec("free", ParameterType::vertices, "tetra", -0.2));
+  specs.back().direction_kind = VertexDirection::free;
+  specs.back().selection = {Selection::Kind::box, {}, {-0.1, -0.1, -0.1}, {1.1, 0.1, 0.1}};
+  specs.push_back(spec("turn_more", ParameterType::rotation, "tetra", -70));
+  specs.back().axis = {0, 0, 3};
+  specs.push_back(spec("lift", ParameterType::vertices, "quad", 0.0));
+  specs.back().direction = {0, 2, 0};
+  specs.push_back(spec("colour", ParameterType::albedo, "white", 0.4));
+  specs.push_back(spec("rough", ParameterType::roughness, "metal", 0.25));
+  specs.push_back(spec("power", ParameterType::emission, "quad", 3));
+  return specs;
+}
+
+/// All degrees of freedom of a scene in the order of DofLayout.
+std::vector<double> dofs(const Scene& scene) {
+  std::vector<double> all;
+  for (const Vec3& p : scene.positions) all.insert(all.end(), {p.x, p.y, p.z});
+  for (const Material& m : scene.materials)
+    all.insert(all.end(), {m.albedo.r, m.albedo.g, m.albedo.b, m.roughness, m.ior});
+  for (const Shape& s : scene.shapes) all.insert(all.end(), {s.emission.r, s.emission.g, s.emission.b});
+  return all;
+}
+
+std::vector<double> point_near_initial(const Parameters& parameters, unsigned seed) {
+  std::mt19937 generator(seed);
+  std::uniform_real_distribution<double> shift(-0.05, 0.05);
+  std::vector<double> theta = parameters.initial();
+  for (double& value : theta) value += shift(generator);
+  return theta;
+}
+
+TEST(Parameters, TangentIsTheDerivativeOfApply) {
+  for (bool grey : {true, false}) {
+    const Scene scene = two_shapes(grey);
+    const Parameters parameters(scene, every_kind());
+    ASSERT_EQ(parameters.size(), 1 + 2 + 1 + 6 + 1 + 4 + (grey ? 1 : 3) + 1 + (grey ? 1 : 3));
+    const std::vector<double> theta = point_near_initial(parameters, 5);
+    const TangentBasis basis = parameters.tangent(theta);
+    ASSERT_EQ(basis.columns, parameters.size());
+    ASSERT_EQ(static_cast<int>(basis.row_begin.size()), DofLayout(scene).size() + 1);
+    ASSERT_EQ(basis.row_begin.back(), static_cast<int>(basis.entries.size()));
+    for (int column = 0; column < basis.columns; ++column) {
+      const double h = 1e-5;  // truncation h^2 and cancellation 1e-16 / h are both below 1e-9
+      std::vector<double> up = theta, down = theta;
+      up[column] += h, down[column] -= h;
+      const std::vector<double> above = dofs(parameters.apply(up)), below = dofs(parameters.apply(down));
+      for (std::size_t row = 0; row < above.size(); ++row) {
+        double coefficient = 0;
+        for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e) {
+          if (e > basis.row_begin[row]) {
+            EXPECT_LT(basis.entries[e - 1].column, basis.entries[e].column);
+          }
+          if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
+        }
+        EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
+      }
+    }
+  }
+}
+
+TEST(Parameters, TransposeIsTheAdjointOfTheTangent) {
+  const Scene scene = two_shapes(false);
+  const Parameters parameters(scene, every_kind());
+  const std::vector<double> theta = point_near_initial(parameters, 6);
+  std::mt19937 generator(7);
+  std::normal_distribution<double> normal;
+  std::vector<double> x(parameters.size()), y(DofLayout(scene).size());
+  for (double& value : x) value = normal(generator);
+  for (double& value : y) value = normal(generator);
+  // The directional derivative of apply along x, by differences: no use of the basis on this side.
+  const double h = 1e-5;
+  std::vector<double> up = theta, down = theta;
+  for (std::size_t i = 0; i < x.size(); ++i) up[i] += h * x[i], down[i] -= h * x[i];
+  const std::vector<double> above = dofs(parameters.apply(up)), below = dofs(parameters.apply(down));
+  double left = 0, right = 0;
+  for (std::size_t i = 0; i < y.size(); ++i) left += y[i] * (above[i] - below[i]) / (2 * h);
+  const std::vector<double> transposed = parameters.tangent(theta).transpose_apply(y);
+  for (std::size_t i = 0; i < x.size(); ++i) right += transposed[i] * x[i];
+  EXPECT_NEAR(left, right, 1e-7);
+}
+
+TEST(Parameters, ActInTheListedOrder) {
+  const Scene scene = two_shapes(true);
+  std::vector<ParameterSpec> specs = {spec("move", ParameterType::translation, "tetra", 1),
+                                      spec("turn", ParameterType::rotation, "tetra", 90)};
+  specs[0].direction = {1, 0, 0};
+  specs[1].axis = {0, 0, 2};
+  specs[1].pivot = {0, 1, 0};
+  // (1, 0, 0) + (1, 0, 0) turned by 90 degrees about z through (0, 1, 0): (2, -1, 0) -> (1, 2, 0), plus the pivot.
+  const Vec3 moved_first = Parameters(scene, specs).apply({1, 90}).positions[1];
+  EXPECT_NEAR(length(moved_first - Vec3{1, 3, 0}), 0, 1e-15 * 8);
+  // Turned first: (1, -1, 0) -> (1, 1, 0), plus the pivot and the shift.
+  std::swap(specs[0], specs[1]);
+  const Vec3 turned_first = Parameters(scene, specs).apply({90, 1}).positions[1];
+  EXPECT_NEAR(length(turned_first - Vec3{2, 2, 0}), 0, 1e-15 * 8);
+}
+
+TEST(Parameters, NormalsAreAreaWeighted) {
+  const Scene scene = two_shapes(true);
+  ParameterSpec dent = spec("dent", ParameterType::vertices, "tetra", 0);
+  dent.direction_kind = VertexDirection::normal;
+  // At the origin three faces meet: areas 1 (z = 0), 3/2 (y = 0), 3 (x = 0), all facing outwards.
+  const Vec3 expected = normalize(Vec3{-3, -1.5, -1});
+  const Vec3 moved = Parameters(scene, {dent}).apply({1, 0, 0, 0}).positions[0];
+  EXPECT_NEAR(length(moved - expected), 0, 1e-15);
+}
+
+TEST(Parameters, ComponentsAndPoints) {
+  const Scene scene = two_shapes(true);
+  const Parameters parameters(scene, every_kind());
+  EXPECT_EQ(parameters.component_names()[0], "move");
+  EXPECT_EQ(parameters.component_names()[2], "dent[1]");
+  const std::vector<double> theta = parameters.parse_point("move=0.7,dent=0.25,free[4]=-1");
+  EXPECT_EQ(theta[0], 0.7);
+  EXPECT_EQ(theta[1], 0.25);
+  EXPECT_EQ(theta[2], 0.25);
+  EXPECT_EQ(theta[3], 25);
+  EXPECT_EQ(theta[4 + 4], -1);
+  EXPECT_THROW(parameters.parse_point("nothing=1"), InputError);
+  EXPECT_THROW(parameters.parse_point("move"), InputError);
+  EXPECT_THROW(parameters.parse_point("move=1e400"), InputError);
+  EXPECT_THROW(parameters.parse_point("colour=1.5"), InputError);
+  EXPECT_THROW(parameters.parse_point(""), InputError);
+}
+
+TEST(Parameters, SelectedColumnsAreThoseOfTheWhole) {
+  const Scene scene = two_shapes(true);
+  const Parameters parameters(scene, every_kind());
+  const TangentBasis whole = parameters.tangent(parameters.initial());
+  std::vector<double> y(DofLayout(scene).size());
+  for (std::size_t i = 0; i < y.size(); ++i) y[i] = std::sin(1.0 + static_cast<double>(i));
+  const std::vector<double> all = whole.transpose_apply(y);
+  const std::vector<double> some = select_columns(whole, 2, 5).transpose_apply(y);
+  EXPECT_EQ(some, std::vector<double>(all.begin() + 2, all.begin() + 7));
+}
+
+TEST(Parameters, RejectWhatDoesNotFitTheScene) {
+  const Scene scene = two_shapes(true);
+  const auto message = [&](const ParameterSpec& s) -> std::string {
+    try {
+      Parameters(scene, {s});
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "accepted";
+  };
+  ParameterSpec s = spec("p", ParameterType::translation, "cube", 0);
+  EXPECT_EQ(message(s), "parameter p: shape: there is no shape 'cube' in the scene (allowed: tetra, quad)");
+  s = spec("p", ParameterType::roughness, "white", 0.2);
+  EXPECT_EQ(message(s), "parameter p: material: material 'white' is diffuse and has no roughness");
+  s = spec("p", ParameterType::albedo, "gold", 0.2);
+  EXPECT_EQ(message(s), "parameter p: material: there is no material 'gold' in the scene (allowed: white, metal)");
+  s = spec("p", ParameterType::translation, "tetra", 0);
+  s.selection = {Selection::Kind::box, {}, {5, 5, 5}, {6, 6, 6}};
+  EXPECT_EQ(message(s), "parameter p: selection: selects no vertex of shape 'tetra'");
+  s.selection = {Selection::Kind::list, {4}, {}, {}};
+  EXPECT_EQ(message(s), "parameter p: selection: there is no vertex 4 in shape 'tetra' (0 to 3)");
+  s.selection = {Selection::Kind::list, {2, 2}, {}, {}};
+  EXPECT_EQ(message(s), "parameter p: selection: vertex 2 is listed twice");
+  s = spec("p", ParameterType::albedo, "white", 1.2);
+  EXPECT_EQ(message(s), "parameter p: initial: 1.2 is out of bounds (0.0001 to 1)");
+  s = spec("p", ParameterType::albedo, "white", 0.5);
+  s.target = {0.2};
+  s.lower = {0.3};
+  EXPECT_EQ(message(s), "parameter p: target: 0.2 is out of bounds (0.3 to 1)");
+  s = spec("p", ParameterType::emission, "quad", 0);
+  EXPECT_EQ(message(s), "parameter p: initial: is no emission (a number above 0)");
+  s = spec("p", ParameterType::rotation, "quad", 0);
+  s.axis = {0, 0, 1};
+  s.initial = {1, 2};
+  EXPECT_EQ(message(s), "parameter p: initial: 2 values are given (1)");
+}
+
+}  // namespace
+}  // namespace isochron
