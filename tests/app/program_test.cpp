@@ -232,7 +232,10 @@ TEST_F(Program, DamagedCheckpointFallsBack) {
 
 TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
   // The square of the images overflows.
-  const Result result = run(run_command("out", {"--at", "power=1e300", "--set", "optimizer.iterations=20"}));
+  write_exr(folder_.file("black.exr"), GatedImage(8, 8, 2, 1));
+  const Result result = run(run_command(
+      "out", {"--set", "target={images: black.exr}", "--set", "optimizer.iterations=20", "--set",
+              "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
   EXPECT_EQ(result.status, 1);
   const std::string summary = folder_.read("out/summary.yaml");
   EXPECT_NE(summary.find("status: diverged\niterations: 5\n"), std::string::npos) << summary;
