@@ -54,6 +54,29 @@ TEST(Gradient, OfAnEmissionIsKnown) {
   EXPECT_GT(std::abs(expected), 12 * error);
 }
 
+TEST(Gradient, ResidualAndDerivativeAreIndependent) {
+  // At the target, with one sample per pixel, all that is left of the residual is noise. The gradient averages to zero,
+  // but to 2 Var(I) / e for the emission e if residual and derivative came from the same random numbers; the loss there
+  // is Var(I).
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string file = folder.write("tiny.yaml", tiny_experiment());
+  const Problem problem(load_experiment(
+      file, {"samples={primal: 1, interior: 1, visibility: 0, path_length: 0}", "target.samples=16384"}));
+  const Poll go_on = [] {};
+  const GatedImage target = problem.make_target(go_on);
+  const std::vector<double> theta = problem.parameters().target();
+  BatchStatistics statistics;
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    const Evaluation e = problem.evaluate(theta, target, i, go_on);
+    statistics.add({e.gradient[1], e.loss}, 1);
+  }
+  const Statistics result = statistics.result();
+  const double bias_if_shared = 2 * result.mean[1] / theta[1];
+  EXPECT_GT(bias_if_shared, 10 * result.standard_error[0]);
+  EXPECT_LT(std::abs(result.mean[0]), 5 * result.standard_error[0]);  // false alarms: 6e-7
+}
+
 TEST(BatchStatistics, WeightsBatchesByTheirSamples) {
   BatchStatistics statistics;
   statistics.add({1.0}, 1);
