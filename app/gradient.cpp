@@ -28,8 +28,8 @@ int gradient(const CommonOptions& options) {
 
   std::string table = "parameter,value,gradient,standard_error\n";
   for (int i = 0; i < parameters.size(); ++i)
-    table += fmt::format("{},{},{},{}\n", parameters.component_names()[i], theta[i], estimate.gradient.mean[i],
-                         estimate.gradient.standard_error[i]);
+    table += fmt::format("{},{},{},{}\n", parameters.component_names()[i], theta[i],
+                         estimate.gradient.mean[i], estimate.gradient.standard_error[i]);
   write_file_atomically(folder + "/gradient.csv", table);
   write_file_atomically(folder + "/gradient.yaml",
                         fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds, thread_count(options),
@@ -42,7 +42,8 @@ int gradient(const CommonOptions& options) {
 
 void add_gradient(CLI::App& app, Action& action) {
   auto options = std::make_shared<CommonOptions>();
-  CLI::App* sub = app.add_subcommand("gradient", "Estimate the gradient of the loss, its standard error and cost");
+  CLI::App* sub =
+      app.add_subcommand("gradient", "Estimate the gradient of the loss, its standard error and cost");
   add_experiment_options(*sub, *options);
   sub->footer(
       "Examples:\n"

@@ -9,7 +9,9 @@ namespace {
 
 volatile std::sig_atomic_t flag = 0;
 
-void raise_flag(int) { flag = 1; }
+void raise_flag(int) {
+  flag = 1;
+}
 
 }  // namespace
 
@@ -21,7 +23,9 @@ void catch_interrupts() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-bool interrupted() { return flag != 0; }
+bool interrupted() {
+  return flag != 0;
+}
 
 void poll_interrupt() {
   if (interrupted()) throw Interrupted{};

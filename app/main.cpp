@@ -1,9 +1,9 @@
-// The program: parses the command line, runs one command, turns exceptions into messages and exit statuses (0: done,
-// 1: failed, 2: the input cannot be used).
-#include <CLI/CLI.hpp>
+// The program: parses the command line, runs one command, turns exceptions into messages and exit statuses
+// (0: done, 1: failed, 2: the input cannot be used).
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <string>
@@ -27,7 +27,8 @@ int main(int argc, char** argv) {
   CLI::App app("Differentiable time-gated rendering and optimisation", "isochron");
   app.set_version_flag("--version", "isochron " ISOCHRON_VERSION);
   app.require_subcommand(1);
-  app.footer("Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");
+  app.footer(
+      "Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");
   isochron::Action action;
   isochron::add_run(app, action);
   isochron::add_resume(app, action);

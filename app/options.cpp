@@ -22,7 +22,8 @@ void add_experiment_options(CLI::App& command, CommonOptions& options) {
   command.add_option("-o,--output", options.output, "output folder; default runs/NAME")->type_name("DIR");
   command
       .add_option("--at", options.at,
-                  "values of the parameters: initial (default), target, or NAME=VALUE[,NAME=VALUE...] with the others "
+                  "values of the parameters: initial (default), target, or NAME=VALUE[,NAME=VALUE...] with "
+                  "the others "
                   "initial")
       ->type_name("POINT");
   command.add_option("--samples", options.samples, "samples per pixel, for every term that is not left out")

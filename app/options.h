@@ -16,11 +16,11 @@ namespace isochron {
 using Action = std::function<int()>;
 
 struct CommonOptions {
-  std::string file;             ///< experiment, or for resume the folder
-  std::string output;           ///< empty: runs/NAME
-  std::string at;               ///< empty: initial
-  std::optional<int> samples;   ///< per pixel, for every term that is not left out
-  int threads = 0;              ///< 0: all cores
+  std::string file;            ///< experiment, or for resume the folder
+  std::string output;          ///< empty: runs/NAME
+  std::string at;              ///< empty: initial
+  std::optional<int> samples;  ///< per pixel, for every term that is not left out
+  int threads = 0;             ///< 0: all cores
   std::optional<std::uint64_t> seed;
   std::vector<std::string> set;
   bool quiet = false;

@@ -20,14 +20,17 @@ std::string duration(double seconds) {
 
 ProgressLine::ProgressLine(bool quiet) : quiet_(quiet), terminal_(isatty(STDERR_FILENO) == 1) {}
 
-ProgressLine::~ProgressLine() { end(); }
+ProgressLine::~ProgressLine() {
+  end();
+}
 
 void ProgressLine::show(const Progress& p) {
   if (quiet_) return;
-  const std::string error = std::isnan(p.param_rmse) ? "" : fmt::format("  parameter error {:.4g}", p.param_rmse);
+  const std::string error =
+      std::isnan(p.param_rmse) ? "" : fmt::format("  parameter error {:.4g}", p.param_rmse);
   const std::string text =
-      fmt::format("iteration {}/{}  loss {:.4g}{}  {:.3g} s each  {} left", p.iteration, p.iterations, p.loss, error,
-                  p.seconds_per_iteration, duration(p.seconds_left));
+      fmt::format("iteration {}/{}  loss {:.4g}{}  {:.3g} s each  {} left", p.iteration, p.iterations, p.loss,
+                  error, p.seconds_per_iteration, duration(p.seconds_left));
   if (terminal_)
     fmt::print(stderr, "\r\x1b[K{}", text);
   else

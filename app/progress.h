@@ -3,8 +3,8 @@
 
 namespace isochron {
 
-/// Shows iteration, loss, parameter error, time per iteration and time left on stderr: one line rewritten in place on a
-/// terminal, one line per iteration elsewhere.
+/// Shows iteration, loss, parameter error, time per iteration and time left on stderr: one line rewritten in
+/// place on a terminal, one line per iteration elsewhere.
 class ProgressLine {
  public:
   explicit ProgressLine(bool quiet);

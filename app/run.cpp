@@ -19,7 +19,8 @@ void start_at(const std::string& point, Experiment& experiment) {
   const std::vector<double> theta = problem.parameters().parse_point(point);
   for (std::size_t i = 0; i < experiment.parameters.size(); ++i) {
     const Parameters::Block& block = problem.parameters().blocks()[i];
-    experiment.parameters[i].initial.assign(theta.begin() + block.begin, theta.begin() + block.begin + block.count);
+    experiment.parameters[i].initial.assign(theta.begin() + block.begin,
+                                            theta.begin() + block.begin + block.count);
   }
 }
 

@@ -1,4 +1,5 @@
-// Adam (Kingma and Ba 2015, algorithm 1) with bounds: a step that would leave [lower, upper] ends on the bound.
+// Adam (Kingma and Ba 2015, algorithm 1) with bounds: a step that would leave [lower, upper] ends on the
+// bound.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -18,9 +19,9 @@ struct AdamState {
   std::vector<double> m, v;  ///< running means of the gradient and its square
 };
 
-/// One step on `theta`; every vector has its size, `state.m` and `state.v` may be empty before the first step.
-/// The algorithm's epsilon (1e-8 in the paper, absolute) is left out: it would make the step depend on the unit of the
-/// loss. Where every gradient so far was zero the unknown stays.
+/// One step on `theta`; every vector has its size, `state.m` and `state.v` may be empty before the first
+/// step. The algorithm's epsilon (1e-8 in the paper, absolute) is left out: it would make the step depend on
+/// the unit of the loss. Where every gradient so far was zero the unknown stays.
 inline void adam_step(const AdamOptions& options, const std::vector<double>& gradient,
                       const std::vector<double>& lower, const std::vector<double>& upper, AdamState& state,
                       std::vector<double>& theta) {
@@ -34,8 +35,8 @@ inline void adam_step(const AdamOptions& options, const std::vector<double>& gra
     state.v[i] = options.beta2 * state.v[i] + (1 - options.beta2) * gradient[i] * gradient[i];
     const double deviation = std::sqrt(state.v[i] / correction2);
     if (deviation > 0)
-      theta[i] = std::clamp(theta[i] - options.learning_rate * (state.m[i] / correction1) / deviation, lower[i],
-                            upper[i]);
+      theta[i] = std::clamp(theta[i] - options.learning_rate * (state.m[i] / correction1) / deviation,
+                            lower[i], upper[i]);
   }
 }
 

@@ -32,7 +32,9 @@ std::string list(const std::vector<double>& values, std::size_t begin, std::size
 }
 
 /// YAML writes special values with a dot; yaml-cpp reads them that way only.
-std::string scalar(double value) { return std::isfinite(value) ? exact(value) : ".nan"; }
+std::string scalar(double value) {
+  return std::isfinite(value) ? exact(value) : ".nan";
+}
 
 /// Raised inside this file when a checkpoint is not whole.
 struct Damaged : std::runtime_error {
@@ -46,7 +48,8 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   const YAML::Node root = YAML::Load(text);
   const std::string version = root["version"].as<std::string>();
   if (version != program_version())
-    throw InputError(fmt::format("{}: version: written by {}; allowed: {}", file, version, program_version()));
+    throw InputError(
+        fmt::format("{}: version: written by {}; allowed: {}", file, version, program_version()));
   Checkpoint c;
   c.iteration = root["iteration"].as<int>();
   c.seconds = root["seconds"].as<double>();
@@ -73,10 +76,11 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
     append("m", c.adam.m);
     append("v", c.adam.v);
     if (name != block.name || count != block.count)
-      throw InputError(fmt::format("{}: parameters: '{}' with {} values; the experiment has '{}' with {}", file, name,
-                                   count, block.name, block.count));
+      throw InputError(fmt::format("{}: parameters: '{}' with {} values; the experiment has '{}' with {}",
+                                   file, name, count, block.name, block.count));
   }
-  if (c.adam.m.size() != c.theta.size() || c.adam.v.size() != c.theta.size()) throw Damaged("values are missing");
+  if (c.adam.m.size() != c.theta.size() || c.adam.v.size() != c.theta.size())
+    throw Damaged("values are missing");
   return c;
 }
 
@@ -92,8 +96,9 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
   std::string text = fmt::format(
       "version: {}\niteration: {}\nseconds: {}\nrejected: {}\nrejected_in_row: {}\nloss_initial: {}\n"
       "image_rmse_initial: {}\nparam_rmse_initial: {}\nadam_steps: {}\nparameters:{}\n",
-      program_version(), c.iteration, scalar(c.seconds), c.rejected, c.rejected_in_row, scalar(c.loss_initial),
-      scalar(c.image_rmse_initial), scalar(c.param_rmse_initial), adam.steps, parameters.blocks().empty() ? " []" : "");
+      program_version(), c.iteration, scalar(c.seconds), c.rejected, c.rejected_in_row,
+      scalar(c.loss_initial), scalar(c.image_rmse_initial), scalar(c.param_rmse_initial), adam.steps,
+      parameters.blocks().empty() ? " []" : "");
   for (const Parameters::Block& block : parameters.blocks())
     text += fmt::format("  - name: {}\n    value: {}\n    m: {}\n    v: {}\n", block.name,
                         list(c.theta, block.begin, block.count), list(adam.m, block.begin, block.count),

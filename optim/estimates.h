@@ -38,15 +38,16 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
 
 /// One component of the derivative images of a range of unknowns.
 struct DerivativeEstimate {
-  std::string component;            ///< total, interior, visibility or path_length
-  std::vector<GatedImage> images;   ///< one per unknown
-  std::vector<Statistics> gates;    ///< one per unknown, as in ImageEstimate
+  std::string component;           ///< total, interior, visibility or path_length
+  std::vector<GatedImage> images;  ///< one per unknown
+  std::vector<Statistics> gates;   ///< one per unknown, as in ImageEstimate
 };
 
-/// Derivative images of the unknowns [first, first + count) at theta: `total` first, then the terms with samples. The
-/// finite-difference method gives `total` alone, from samples.primal. Throws InputError when a term has one sample.
-std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta, int first,
-                                                     int count, const Poll& poll);
+/// Derivative images of the unknowns [first, first + count) at theta: `total` first, then the terms with
+/// samples. The finite-difference method gives `total` alone, from samples.primal. Throws InputError when a
+/// term has one sample.
+std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
+                                                     int first, int count, const Poll& poll);
 
 struct GradientEstimate {
   Statistics gradient;  ///< one entry per unknown
@@ -56,8 +57,9 @@ struct GradientEstimate {
 /// Number of repeats that estimate_gradient makes. Throws InputError when a term has one sample.
 int gradient_repeats(const Problem& problem);
 
-/// The gradient of the loss at theta. All repeats together use the experiment's samples once. Throws as above.
-GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                   const Poll& poll);
+/// The gradient of the loss at theta. All repeats together use the experiment's samples once. Throws as
+/// above.
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta,
+                                   const GatedImage& target, const Poll& poll);
 
 }  // namespace isochron

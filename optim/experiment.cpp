@@ -61,8 +61,10 @@ std::vector<double> read_centers(const YamlValue& value) {
     const double stop = stop_value.number(NumberRange::non_negative());
     const int count = static_cast<int>(map.require("count").integer(1, kMostGates));
     map.reject_unknown();
-    if (stop < start) stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
-    for (int i = 0; i < count; ++i) centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
+    if (stop < start)
+      stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
+    for (int i = 0; i < count; ++i)
+      centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
     return centers;
   }
   if (!value.is_list()) value.fail("is neither", "a list of numbers, or {start, stop, count}");
@@ -74,8 +76,8 @@ std::vector<double> read_centers(const YamlValue& value) {
 GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder) {
   YamlMap map = value.map();
   GateSpec gates;
-  constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar, GateKind::truncated_gaussian,
-                                 GateKind::tabulated};
+  constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar,
+                                 GateKind::truncated_gaussian, GateKind::tabulated};
   gates.kind =
       kKinds[map.require("kind").choice({"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"})];
   if (const auto unit = map.find("unit"))
@@ -86,7 +88,8 @@ GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder)
     gates.scene_unit_m = metres->number(NumberRange::positive());
   if (gates.kind != GateKind::steady) gates.centers = read_centers(map.require("centers"));
   const auto positive = [&](const char* key) { return map.require(key).number(NumberRange::positive()); };
-  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian) gates.sigma = positive("sigma");
+  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian)
+    gates.sigma = positive("sigma");
   if (gates.kind == GateKind::boxcar) gates.width = positive("width");
   if (gates.kind == GateKind::truncated_gaussian) gates.half_width = positive("half_width");
   if (gates.kind == GateKind::tabulated) {
@@ -108,7 +111,8 @@ GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder)
     const bool positive_values =
         std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
         std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
-    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive_values)
+    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) ||
+        !positive_values)
       value.fail("the table is no gate",
                  "two rows or more, offsets in rising order, values at least 0 and one of them above");
   }
@@ -140,7 +144,8 @@ Selection read_selection(const YamlValue& value) {
   return selection;
 }
 
-ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder, bool target_required) {
+ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder,
+                             bool target_required) {
   YamlMap map = value.map();
   ParameterSpec spec;
   spec.where.emplace("", value);
@@ -196,7 +201,8 @@ TargetSpec read_target(const YamlValue& value, const std::filesystem::path& fold
   if (const auto images = map.find("images")) {
     target.images = existing_file(*images, folder);
   } else {
-    if (const auto samples = map.find("samples")) target.samples = static_cast<int>(samples->integer(1, kMostSamples));
+    if (const auto samples = map.find("samples"))
+      target.samples = static_cast<int>(samples->integer(1, kMostSamples));
     if (const auto seed = map.find("seed"))
       target.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
   }
@@ -221,15 +227,19 @@ void read_settings(YamlMap& map, Experiment& experiment) {
   if (const auto value = map.find("estimator")) {
     YamlMap estimator = value->map();
     if (const auto sampling = estimator.find("sampling"))
-      experiment.estimator.sampling = static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
-    if (const auto antithetic = estimator.find("antithetic")) experiment.estimator.antithetic = antithetic->boolean();
+      experiment.estimator.sampling =
+          static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
+    if (const auto antithetic = estimator.find("antithetic"))
+      experiment.estimator.antithetic = antithetic->boolean();
     estimator.reject_unknown();
   }
   if (const auto value = map.find("gradient")) {
     YamlMap gradient = value->map();
     if (const auto method = gradient.find("method"))
-      experiment.gradient.method = static_cast<GradientMethod>(method->choice({"analytic", "finite_difference"}));
-    if (const auto step = gradient.find("step")) experiment.gradient.step = step->number(NumberRange::positive());
+      experiment.gradient.method =
+          static_cast<GradientMethod>(method->choice({"analytic", "finite_difference"}));
+    if (const auto step = gradient.find("step"))
+      experiment.gradient.step = step->number(NumberRange::positive());
     gradient.reject_unknown();
   }
   if (const auto value = map.find("optimizer")) {
@@ -240,7 +250,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
     if (const auto rate = optimizer.find("learning_rate"))
       experiment.optimizer.learning_rate = rate->number(NumberRange::positive());
     if (const auto iterations = optimizer.find("iterations"))
-      experiment.optimizer.iterations = static_cast<int>(iterations->integer(0, std::numeric_limits<int>::max() - 1));
+      experiment.optimizer.iterations =
+          static_cast<int>(iterations->integer(0, std::numeric_limits<int>::max() - 1));
     if (const auto tolerance = optimizer.find("tolerance"))
       experiment.optimizer.tolerance = tolerance->number(NumberRange::non_negative());
     optimizer.reject_unknown();
@@ -262,11 +273,14 @@ GateSet make_gates(const GateSpec& spec) {
   };
   const GateShape shape = [&] {
     switch (spec.kind) {
-      case GateKind::gaussian: return GateShape::gaussian(scale * spec.sigma);
-      case GateKind::boxcar: return GateShape::boxcar(scale * spec.width);
+      case GateKind::gaussian:
+        return GateShape::gaussian(scale * spec.sigma);
+      case GateKind::boxcar:
+        return GateShape::boxcar(scale * spec.width);
       case GateKind::truncated_gaussian:
         return GateShape::truncated_gaussian(scale * spec.sigma, scale * spec.half_width);
-      default: return GateShape::tabulated(scaled(spec.offsets), spec.values);
+      default:
+        return GateShape::tabulated(scaled(spec.offsets), spec.values);
     }
   }();
   return GateSet(shape, scaled(spec.centers));
@@ -275,8 +289,8 @@ GateSet make_gates(const GateSpec& spec) {
 void ParameterSpec::fail(const std::string& key, const std::string& wrong, const std::string& allowed) const {
   for (const std::string& place : {key, std::string()})
     if (const auto found = where.find(place); found != where.end()) found->second.fail(wrong, allowed);
-  throw InputError(fmt::format("parameter {}: {}: {}{}", name, key, wrong,
-                               allowed.empty() ? "" : " (" + allowed + ")"));
+  throw InputError(
+      fmt::format("parameter {}: {}: {}{}", name, key, wrong, allowed.empty() ? "" : " (" + allowed + ")"));
 }
 
 void SampleSpec::set_all(int n) {

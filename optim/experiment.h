@@ -31,10 +31,12 @@ struct GateSpec {
   double sigma = 0;             ///< gaussian, truncated_gaussian
   double width = 0;             ///< boxcar
   double half_width = 0;        ///< truncated_gaussian
-  std::vector<double> offsets, values;  ///< tabulated: relative to the centre; read from `file` or given inline
+  std::vector<double> offsets,
+      values;  ///< tabulated: relative to the centre; read from `file` or given inline
 };
 
-/// Gates in scene units. Throws std::invalid_argument when the shape cannot be made (for example a table of zeros).
+/// Gates in scene units. Throws std::invalid_argument when the shape cannot be made (for example a table of
+/// zeros).
 GateSet make_gates(const GateSpec& spec);
 
 enum class ParameterType { translation, rotation, vertices, albedo, roughness, emission };
@@ -48,8 +50,8 @@ struct Selection {
   Vec3 min, max;             ///< world space of the scene file, borders included
 };
 
-/// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene file;
-/// those of albedo, roughness and emission replace what the scene file says.
+/// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
+/// file; those of albedo, roughness and emission replace what the scene file says.
 struct ParameterSpec {
   std::string name;
   ParameterType type = ParameterType::translation;
@@ -57,20 +59,22 @@ struct ParameterSpec {
   std::string material;  ///< albedo, roughness
   Selection selection;
   VertexDirection direction_kind = VertexDirection::fixed;
-  Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
-  Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
-  Vec3 pivot;      ///< rotation; a fixed point of the world that no other parameter moves
-  std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be empty
-                                                      ///< (all but initial)
+  Vec3
+      direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
+  Vec3 axis;      ///< rotation, by the right-hand rule; only its direction matters
+  Vec3 pivot;     ///< rotation; a fixed point of the world that no other parameter moves
+  std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
+                                                      ///< empty (all but initial)
 
   /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
   std::map<std::string, YamlValue> where;
   /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
-  [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
+  [[noreturn]] void fail(const std::string& key, const std::string& wrong,
+                         const std::string& allowed = "") const;
 };
 
 struct TargetSpec {
-  std::string images;          ///< absolute path of an EXR; empty: render at the target values
+  std::string images;  ///< absolute path of an EXR; empty: render at the target values
   int samples = 4096;
   std::uint64_t seed = 7;
 };
@@ -112,13 +116,14 @@ struct Experiment {
   std::uint64_t seed = 1;
 };
 
-/// Reads and checks an experiment file, all that can be checked without the scene. `overrides` are KEY.PATH=VALUE
-/// strings, applied before the checks (see open_yaml).
-/// Throws InputError: one line that names file, line, column, key and what is allowed.
+/// Reads and checks an experiment file, all that can be checked without the scene. `overrides` are
+/// KEY.PATH=VALUE strings, applied before the checks (see open_yaml). Throws InputError: one line that names
+/// file, line, column, key and what is allowed.
 Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides = {});
 
-/// The experiment with everything resolved, as YAML that load_experiment reads back to the same values when it lies in
-/// `folder`: paths are written relative to it, tables and value files inline, numbers with all their digits.
+/// The experiment with everything resolved, as YAML that load_experiment reads back to the same values when
+/// it lies in `folder`: paths are written relative to it, tables and value files inline, numbers with all
+/// their digits.
 std::string resolved_yaml(const Experiment& experiment, const std::string& folder);
 
 /// Version of this program, as written into experiment.yaml and checkpoints.

@@ -26,7 +26,9 @@ std::string number_or_list(const std::vector<double>& values) {
   return values.size() == 1 ? exact(values[0]) : list(values);
 }
 
-std::string vector(const Vec3& v) { return fmt::format("[{}, {}, {}]", v.x, v.y, v.z); }
+std::string vector(const Vec3& v) {
+  return fmt::format("[{}, {}, {}]", v.x, v.y, v.z);
+}
 
 std::string gates_yaml(const GateSpec& gates) {
   constexpr const char* kKinds[] = {"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"};
@@ -53,11 +55,13 @@ std::string parameter_yaml(const ParameterSpec& spec) {
   if (selection.kind == Selection::Kind::list)
     fmt::format_to(out, "    selection: [{}]\n", fmt::join(selection.indices, ", "));
   if (selection.kind == Selection::Kind::box)
-    fmt::format_to(out, "    selection: {{box: {{min: {}, max: {}}}}}\n", vector(selection.min), vector(selection.max));
+    fmt::format_to(out, "    selection: {{box: {{min: {}, max: {}}}}}\n", vector(selection.min),
+                   vector(selection.max));
   if (spec.type == ParameterType::rotation)
     fmt::format_to(out, "    axis: {}\n    pivot: {}\n", vector(spec.axis), vector(spec.pivot));
   if (spec.direction_kind != VertexDirection::fixed)
-    fmt::format_to(out, "    direction: {}\n", spec.direction_kind == VertexDirection::normal ? "normal" : "free");
+    fmt::format_to(out, "    direction: {}\n",
+                   spec.direction_kind == VertexDirection::normal ? "normal" : "free");
   else if (spec.type == ParameterType::translation || spec.type == ParameterType::vertices)
     fmt::format_to(out, "    direction: {}\n", vector(spec.direction));
   fmt::format_to(out, "    initial: {}\n", number_or_list(spec.initial));
@@ -69,7 +73,9 @@ std::string parameter_yaml(const ParameterSpec& spec) {
 
 }  // namespace
 
-const char* program_version() { return ISOCHRON_VERSION; }
+const char* program_version() {
+  return ISOCHRON_VERSION;
+}
 
 const char* name(ParameterType type) {
   constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo", "roughness", "emission"};
@@ -82,9 +88,9 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
     return quote(std::filesystem::path(file).lexically_proximate(base).string());
   };
   constexpr const char* kSampling[] = {"auto", "standard", "ellipsoidal"};
-  std::string text = fmt::format("version: {}\nname: {}\nscene: {}\nmax_bounces: {}\ngates:\n{}",
-                                 quote(program_version()), quote(e.name), relative(e.scene), e.estimator.max_bounces,
-                                 gates_yaml(e.gates));
+  std::string text =
+      fmt::format("version: {}\nname: {}\nscene: {}\nmax_bounces: {}\ngates:\n{}", quote(program_version()),
+                  quote(e.name), relative(e.scene), e.estimator.max_bounces, gates_yaml(e.gates));
   auto out = std::back_inserter(text);
   text += e.parameters.empty() ? "parameters: []\n" : "parameters:\n";
   for (const ParameterSpec& spec : e.parameters) text += parameter_yaml(spec);
@@ -97,7 +103,8 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n",
                  kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic);
   fmt::format_to(out, "gradient:\n  method: {}\n  step: {}\n",
-                 e.gradient.method == GradientMethod::analytic ? "analytic" : "finite_difference", e.gradient.step);
+                 e.gradient.method == GradientMethod::analytic ? "analytic" : "finite_difference",
+                 e.gradient.step);
   fmt::format_to(out, "optimizer:\n  method: adam\n  learning_rate: {}\n  iterations: {}\n  tolerance: {}\n",
                  e.optimizer.learning_rate, e.optimizer.iterations, e.optimizer.tolerance);
   fmt::format_to(out, "seed: {}\n", e.seed);

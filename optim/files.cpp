@@ -75,6 +75,8 @@ void make_output_folder(const std::string& folder) {
   std::filesystem::remove(probe, error);
 }
 
-std::string exact(double value) { return fmt::format("{}", value); }
+std::string exact(double value) {
+  return fmt::format("{}", value);
+}
 
 }  // namespace isochron

@@ -5,8 +5,8 @@
 
 namespace isochron {
 
-/// Replaces `file` by `text` so that a reader sees the old text or the new one, also after a crash: temporary file,
-/// fsync, rename, fsync of the folder. Throws std::runtime_error.
+/// Replaces `file` by `text` so that a reader sees the old text or the new one, also after a crash: temporary
+/// file, fsync, rename, fsync of the folder. Throws std::runtime_error.
 void write_file_atomically(const std::string& file, const std::string& text);
 
 /// Whole content of a file; empty when it cannot be read.

@@ -21,7 +21,8 @@ std::string header(const Parameters& parameters) {
     if (block.count > kMostColumns) {
       text += fmt::format(",{}.norm", block.name);
     } else {
-      for (int i = 0; i < block.count; ++i) text += fmt::format(",{}", parameters.component_names()[block.begin + i]);
+      for (int i = 0; i < block.count; ++i)
+        text += fmt::format(",{}", parameters.component_names()[block.begin + i]);
     }
   }
   return text + "\n";
@@ -29,7 +30,8 @@ std::string header(const Parameters& parameters) {
 
 }  // namespace
 
-Log::Log(const std::string& file, const Parameters& parameters, int next) : name_(file), parameters_(parameters) {
+Log::Log(const std::string& file, const Parameters& parameters, int next)
+    : name_(file), parameters_(parameters) {
   std::string kept = header(parameters);
   if (const auto old = read_file(file)) {
     std::istringstream lines(*old);

@@ -1,5 +1,5 @@
-// DIR/log.csv. Row i is the state before step i (i counts from 0), as seen by the random numbers of iteration i; the
-// last row is the final state, after which no step was made.
+// DIR/log.csv. Row i is the state before step i (i counts from 0), as seen by the random numbers of iteration
+// i; the last row is the final state, after which no step was made.
 #pragma once
 #include <cstdio>
 #include <memory>
@@ -23,8 +23,8 @@ class Log {
   /// Opens the log to go on at row `next`: rows from there on, and a torn last line, are cut off. Throws
   /// std::runtime_error.
   Log(const std::string& file, const Parameters& parameters, int next);
-  /// Writes one line and flushes it to the disk. Parameters of more than 16 components are written as one column
-  /// NAME.norm, the Euclidean norm.
+  /// Writes one line and flushes it to the disk. Parameters of more than 16 components are written as one
+  /// column NAME.norm, the Euclidean norm.
   void append(const LogRow& row, const std::vector<double>& theta);
 
  private:

@@ -11,13 +11,15 @@ double mean_squared_error(const GatedImage& image, const GatedImage& target) {
     const double residual = image.data[i] - target.data[i];
     sum += residual * residual;
   }
-  return std::isfinite(sum) ? sum / static_cast<double>(image.data.size()) : std::numeric_limits<double>::quiet_NaN();
+  return std::isfinite(sum) ? sum / static_cast<double>(image.data.size())
+                            : std::numeric_limits<double>::quiet_NaN();
 }
 
 GatedImage loss_adjoint(const GatedImage& image, const GatedImage& target) {
   GatedImage adjoint = image;
   const double scale = 2.0 / static_cast<double>(image.data.size());
-  for (std::size_t i = 0; i < adjoint.data.size(); ++i) adjoint.data[i] = scale * (image.data[i] - target.data[i]);
+  for (std::size_t i = 0; i < adjoint.data.size(); ++i)
+    adjoint.data[i] = scale * (image.data[i] - target.data[i]);
   return adjoint;
 }
 

@@ -1,11 +1,11 @@
 // From the flat vector of all unknowns to a scene and its tangent.
 //
-// Parameters of one shape act in the listed order: a rotation turns what earlier parameters moved, so the tangents of
-// earlier parameters are carried through it. Directions (also `normal`: the area-weighted vertex normals of the loaded
-// mesh) and pivots are fixed in the world.
+// Parameters of one shape act in the listed order: a rotation turns what earlier parameters moved, so the
+// tangents of earlier parameters are carried through it. Directions (also `normal`: the area-weighted vertex
+// normals of the loaded mesh) and pivots are fixed in the world.
 //
-// Physical bounds, always applied besides the user's: albedo in [1e-4, 1], roughness in [1e-3, 1], emission at least
-// 1e-6 of its largest initial component (so that an emitter stays one).
+// Physical bounds, always applied besides the user's: albedo in [1e-4, 1], roughness in [1e-3, 1], emission
+// at least 1e-6 of its largest initial component (so that an emitter stays one).
 #pragma once
 #include <string>
 #include <vector>
@@ -17,13 +17,13 @@ namespace isochron {
 
 class Parameters {
  public:
-  /// Binds the parameters to a loaded scene, which must outlive this. Throws InputError (line and key) for a shape or
-  /// material that is not there, an empty selection, values of the wrong number or out of bounds.
+  /// Binds the parameters to a loaded scene, which must outlive this. Throws InputError (line and key) for a
+  /// shape or material that is not there, an empty selection, values of the wrong number or out of bounds.
   Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs);
 
   int size() const { return static_cast<int>(component_names_.size()); }  ///< scalar unknowns
-  /// NAME for a parameter of one component, else NAME[0], NAME[1], ...: vertices in the order of the selection with
-  /// x, y, z of each together when free; colours r, g, b.
+  /// NAME for a parameter of one component, else NAME[0], NAME[1], ...: vertices in the order of the
+  /// selection with x, y, z of each together when free; colours r, g, b.
   const std::vector<std::string>& component_names() const { return component_names_; }
 
   /// Components [begin, begin + count) of theta that belong to one parameter.
@@ -46,8 +46,8 @@ class Parameters {
   /// d(dof)/d(theta) at theta. Entries that are exactly zero are left out.
   TangentBasis tangent(const std::vector<double>& theta) const;
 
-  /// `text` is `initial`, `target`, or a list of NAME=VALUE (NAME[i] allowed) separated by commas, optionally after
-  /// one of those words; what is not named keeps its initial value. Throws InputError.
+  /// `text` is `initial`, `target`, or a list of NAME=VALUE (NAME[i] allowed) separated by commas, optionally
+  /// after one of those words; what is not named keeps its initial value. Throws InputError.
   std::vector<double> parse_point(const std::string& text) const;
 
  private:
@@ -56,8 +56,8 @@ class Parameters {
     ParameterType type;
     VertexDirection direction_kind;
     int first_component;
-    Vec3 direction, pivot;           ///< for rotations `direction` is the unit axis
-    std::vector<Vec3> normals;       ///< per selected vertex, for `normal`
+    Vec3 direction, pivot;      ///< for rotations `direction` is the unit axis
+    std::vector<Vec3> normals;  ///< per selected vertex, for `normal`
     std::vector<int> slot;
   };
   struct MaterialValue {

@@ -13,9 +13,12 @@ namespace isochron {
 
 Pass pass_of(Term term) {
   switch (term) {
-    case Term::interior: return Pass::interior;
-    case Term::visibility: return Pass::visibility;
-    case Term::path_length: return Pass::path_length;
+    case Term::interior:
+      return Pass::interior;
+    case Term::visibility:
+      return Pass::visibility;
+    case Term::path_length:
+      return Pass::path_length;
   }
   throw std::logic_error("unknown term");
 }
@@ -55,7 +58,8 @@ GatedImage Problem::read_target(const std::string& file) const {
     return fmt::format("{} x {} pixels, {} gates, {} channels", i.width, i.height, i.gates, i.channels);
   };
   if (!image.same_shape(wanted))
-    throw InputError(fmt::format("{}: target images have {}; the experiment has {}", file, shape(image), shape(wanted)));
+    throw InputError(
+        fmt::format("{}: target images have {}; the experiment has {}", file, shape(image), shape(wanted)));
   return image;
 }
 
@@ -76,8 +80,8 @@ GatedImage Problem::make_target(const Poll& poll) const {
   return mean.mean();
 }
 
-Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                             const Poll& poll, Share share) const {
+Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target,
+                             std::uint32_t iteration, const Poll& poll, Share share) const {
   const SampleSpec& samples = experiment_.samples;
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);

@@ -57,24 +57,26 @@ class Problem {
   /// Throws InputError when the experiment has no parameters: nothing to differentiate.
   void require_parameters() const;
 
-  Stream stream(Pass pass, std::uint32_t iteration = 0) const { return {experiment_.seed, iteration, pass_number(pass)}; }
+  Stream stream(Pass pass, std::uint32_t iteration = 0) const {
+    return {experiment_.seed, iteration, pass_number(pass)};
+  }
 
   /// Gated images at theta.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
-  /// The images that the optimisation aims at: rendered at the target values or read from a file. Throws InputError
-  /// when the file's shape is not that of this experiment's images.
+  /// The images that the optimisation aims at: rendered at the target values or read from a file. Throws
+  /// InputError when the file's shape is not that of this experiment's images.
   GatedImage make_target(const Poll& poll) const;
   /// Reads a target image and checks its shape against this experiment's.
   GatedImage read_target(const std::string& file) const;
 
-  /// Image, loss and gradient at theta from the random numbers of one iteration. Unbiased for image and gradient (the
-  /// loss has the variance of the image added to it).
+  /// Image, loss and gradient at theta from the random numbers of one iteration. Unbiased for image and
+  /// gradient (the loss has the variance of the image added to it).
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}) const;
 
-  /// Central difference of the images along one unknown with common random numbers. Where theta +- step leaves the
-  /// bounds, the difference is taken between the bound and the other side.
+  /// Central difference of the images along one unknown with common random numbers. Where theta +- step
+  /// leaves the bounds, the difference is taken between the bound and the other side.
   GatedImage finite_difference(const std::vector<double>& theta, int component, const Stream& stream,
                                SampleRange range) const;
 

@@ -43,8 +43,8 @@ double distance_to_target(const Parameters& parameters, const std::vector<double
 /// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run.
 void clear_run(const std::string& folder) {
   for (const char* file :
-       {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml", "target.exr",
-        "initial.exr", "final.exr", "target.png", "initial.png", "final.png", "rmse.png"})
+       {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml",
+        "target.exr", "initial.exr", "final.exr", "target.png", "initial.png", "final.png", "rmse.png"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
 }
 
@@ -98,14 +98,10 @@ class Run {
     for (;;) {
       poll();
       const auto start = std::chrono::steady_clock::now();
-      const Evaluation now = problem_.evaluate(state_.theta, target_, static_cast<std::uint32_t>(state_.iteration),
-                                               [this] { poll(); });
-      last_ = {state_.iteration,
-               state_.seconds + seconds_since(start),
-               now.loss,
-               std::sqrt(now.loss),
-               distance_to_target(parameters_, state_.theta),
-               norm(now.gradient)};
+      const Evaluation now = problem_.evaluate(
+          state_.theta, target_, static_cast<std::uint32_t>(state_.iteration), [this] { poll(); });
+      last_ = {state_.iteration,    state_.seconds + seconds_since(start),         now.loss,
+               std::sqrt(now.loss), distance_to_target(parameters_, state_.theta), norm(now.gradient)};
       if (state_.iteration == 0) {
         write_exr(path("initial.exr"), now.image);
         state_.loss_initial = last_.loss;
@@ -139,7 +135,8 @@ class Run {
       ++state_.rejected;
       ++state_.rejected_in_row;
       if (options_.warning)
-        options_.warning(fmt::format("iteration {}: loss or gradient is not finite, step rejected", state_.iteration));
+        options_.warning(
+            fmt::format("iteration {}: loss or gradient is not finite, step rejected", state_.iteration));
     }
     ++state_.iteration;
   }
@@ -153,11 +150,13 @@ class Run {
   }
 
   void write_summary(RunStatus status) const {
-    std::string text = fmt::format("status: {}\niterations: {}\nseconds: {}\nrejected_steps: {}\n", name(status),
-                                   state_.iteration, std::max(state_.seconds, last_.seconds), state_.rejected);
+    std::string text =
+        fmt::format("status: {}\niterations: {}\nseconds: {}\nrejected_steps: {}\n", name(status),
+                    state_.iteration, std::max(state_.seconds, last_.seconds), state_.rejected);
     auto out = std::back_inserter(text);
     const auto pair = [&](const char* key, double initial, double final) {
-      fmt::format_to(out, "{0}_initial: {1}\n{0}_final: {2}\n", key, optional_number(initial), optional_number(final));
+      fmt::format_to(out, "{0}_initial: {1}\n{0}_final: {2}\n", key, optional_number(initial),
+                     optional_number(final));
     };
     pair("loss", state_.loss_initial, last_.loss);
     pair("image_rmse", state_.image_rmse_initial, last_.image_rmse);
@@ -185,10 +184,14 @@ class Run {
 
 const char* name(RunStatus status) {
   switch (status) {
-    case RunStatus::converged: return "converged";
-    case RunStatus::iterations_reached: return "iterations_reached";
-    case RunStatus::diverged: return "diverged";
-    case RunStatus::interrupted: return "interrupted";
+    case RunStatus::converged:
+      return "converged";
+    case RunStatus::iterations_reached:
+      return "iterations_reached";
+    case RunStatus::diverged:
+      return "diverged";
+    case RunStatus::interrupted:
+      return "interrupted";
   }
   throw std::logic_error("unknown status");
 }
@@ -199,9 +202,10 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
   make_output_folder(options.folder);
   const std::string file = options.folder + "/experiment.yaml";
   if (std::filesystem::exists(file) && !options.force)
-    throw InputError(fmt::format("{0}: holds a run already (allowed: `isochron resume {0}` to go on with it, -o for "
-                                 "another folder, --force to start anew in this one)",
-                                 options.folder));
+    throw InputError(
+        fmt::format("{0}: holds a run already (allowed: `isochron resume {0}` to go on with it, -o for "
+                    "another folder, --force to start anew in this one)",
+                    options.folder));
   const std::string resolved = resolved_yaml(experiment, options.folder);
   clear_run(options.folder);
   write_file_atomically(file, resolved);

@@ -1,9 +1,10 @@
-// The optimisation loop and its folder. See checkpoint.h for what survives a kill, log.h for the rows of log.csv.
+// The optimisation loop and its folder. See checkpoint.h for what survives a kill, log.h for the rows of
+// log.csv.
 //
-// Order of writing: experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before them, in
-// iteration 0, initial.exr), at last final.exr and summary.yaml. Every random number depends on (seed, iteration, pass)
-// alone and the target is used as target.exr holds it (rounded to float), so a run that was killed anywhere and resumed
-// gives the same bits.
+// Order of writing: experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before
+// them, in iteration 0, initial.exr), at last final.exr and summary.yaml. Every random number depends on
+// (seed, iteration, pass) alone and the target is used as target.exr holds it (rounded to float), so a run
+// that was killed anywhere and resumed gives the same bits.
 #pragma once
 #include <functional>
 #include <string>
@@ -25,24 +26,24 @@ struct Progress {
 
 struct RunOptions {
   std::string folder;
-  bool force = false;                                  ///< start anew in a folder that holds a run
-  std::function<bool()> stop;                          ///< asked between passes; true: leave a checkpoint and return
-  std::function<void(const Progress&)> progress;       ///< after every row of the log
-  std::function<void(const std::string&)> warning;     ///< one line
+  bool force = false;          ///< start anew in a folder that holds a run
+  std::function<bool()> stop;  ///< asked between passes; true: leave a checkpoint and return
+  std::function<void(const Progress&)> progress;    ///< after every row of the log
+  std::function<void(const std::string&)> warning;  ///< one line
 };
 
-/// A step whose loss or gradient is not finite is rejected: parameters and optimiser stay as they were. So many in a row
-/// end the run as diverged.
+/// A step whose loss or gradient is not finite is rejected: parameters and optimiser stay as they were. So
+/// many in a row end the run as diverged.
 inline constexpr int kMostRejectedInRow = 5;
 /// A run that ends with more than this times the loss it began with has diverged.
 inline constexpr double kDivergedLossRatio = 10;
 
-/// Optimises from the initial values. Throws InputError, before any rendering, when the experiment does not fit its
-/// scene, has no parameters, or the folder cannot be written or holds a run already.
+/// Optimises from the initial values. Throws InputError, before any rendering, when the experiment does not
+/// fit its scene, has no parameters, or the folder cannot be written or holds a run already.
 RunStatus start_run(const Experiment& experiment, const RunOptions& options);
 
-/// Goes on from the last checkpoint of options.folder, or from the start when there is none yet. Throws InputError when
-/// the folder holds no run.
+/// Goes on from the last checkpoint of options.folder, or from the start when there is none yet. Throws
+/// InputError when the folder holds no run.
 RunStatus resume_run(const RunOptions& options);
 
 }  // namespace isochron

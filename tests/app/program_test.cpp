@@ -45,7 +45,8 @@ class Program : public testing::Test {
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, folder_.file("stderr").c_str(),
                                      O_WRONLY | O_CREAT | O_TRUNC, 0600);
     pid_t child = 0;
-    if (posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ) != 0) ADD_FAILURE() << "cannot start";
+    if (posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ) != 0)
+      ADD_FAILURE() << "cannot start";
     posix_spawn_file_actions_destroy(&actions);
     int status = 0;
     while (signal != 0 && waitpid(child, &status, WNOHANG) == 0) {
@@ -60,8 +61,8 @@ class Program : public testing::Test {
   }
 
   std::vector<std::string> run_command(const std::string& out, std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {"run", folder_.file("tiny.yaml"), "-o", folder_.file(out), "--no-plots",
-                                          "--quiet"};
+    std::vector<std::string> arguments = {
+        "run", folder_.file("tiny.yaml"), "-o", folder_.file(out), "--no-plots", "--quiet"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
@@ -158,13 +159,14 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error\nheight,0,", 0), 0u);
   EXPECT_NE(gradient.find("\npower,10,"), std::string::npos);
   const std::string cost = folder_.read("out/gradient.yaml");
-  for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"}) EXPECT_NE(cost.find(key), std::string::npos);
+  for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"})
+    EXPECT_NE(cost.find(key), std::string::npos);
 }
 
 TEST_F(Program, RunMovesTowardsTheTargetAndRefusesToOverwrite) {
   ASSERT_EQ(run(run_command("a")).status, 0);
-  for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml", "target.exr",
-                           "initial.exr", "final.exr", "summary.yaml"})
+  for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml",
+                           "target.exr", "initial.exr", "final.exr", "summary.yaml"})
     EXPECT_TRUE(folder_.has(std::string("a/") + name)) << name;
   EXPECT_EQ(rows("a"), 7);
   const Result again = run(run_command("a"));
@@ -233,9 +235,9 @@ TEST_F(Program, DamagedCheckpointFallsBack) {
 TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
   // The square of the images overflows.
   write_exr(folder_.file("black.exr"), GatedImage(8, 8, 2, 1));
-  const Result result = run(run_command(
-      "out", {"--set", "target={images: black.exr}", "--set", "optimizer.iterations=20", "--set",
-              "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
+  const Result result = run(
+      run_command("out", {"--set", "target={images: black.exr}", "--set", "optimizer.iterations=20", "--set",
+                          "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
   EXPECT_EQ(result.status, 1);
   const std::string summary = folder_.read("out/summary.yaml");
   EXPECT_NE(summary.find("status: diverged\niterations: 5\n"), std::string::npos) << summary;
@@ -245,10 +247,10 @@ TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
 
 TEST_F(Program, AnExplodedLossIsADivergence) {
   // From an emission far below the target one step of 500 leads far above it.
-  const Result result = run(run_command("out", {"--at", "height=0,power=2", "--set", "optimizer.learning_rate=500",
-                                                "--set", "parameters[0].upper=0.01", "--set",
-                                                "parameters[0].lower=0", "--set", "parameters[0].initial=0", "--set",
-                                                "optimizer.iterations=1"}));
+  const Result result =
+      run(run_command("out", {"--at", "height=0,power=2", "--set", "optimizer.learning_rate=500", "--set",
+                              "parameters[0].upper=0.01", "--set", "parameters[0].lower=0", "--set",
+                              "parameters[0].initial=0", "--set", "optimizer.iterations=1"}));
   EXPECT_EQ(result.status, 1) << result.errors;
   EXPECT_NE(folder_.read("out/summary.yaml").find("status: diverged"), std::string::npos);
 }
@@ -260,8 +262,8 @@ TEST_F(Program, StopsWhenTheImagesAgree) {
 }
 
 TEST_F(Program, DrawsItsPlots) {
-  const Result result = run({"run", folder_.file("tiny.yaml"), "-o", folder_.file("out"), "--set",
-                             "optimizer.iterations=1"});
+  const Result result =
+      run({"run", folder_.file("tiny.yaml"), "-o", folder_.file("out"), "--set", "optimizer.iterations=1"});
   EXPECT_EQ(result.status, 0) << result.errors;
   for (const char* name : {"target.png", "initial.png", "final.png", "rmse.png"})
     EXPECT_TRUE(folder_.has(std::string("out/") + name)) << name;

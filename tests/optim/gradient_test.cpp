@@ -14,8 +14,8 @@ TEST(Gradient, AgreesWithFiniteDifferences) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
-  const std::vector<std::string> samples = {"samples={primal: 2048, interior: 2048, visibility: 2048, path_length: 0}",
-                                            "parameters[1].initial=2"};
+  const std::vector<std::string> samples = {
+      "samples={primal: 2048, interior: 2048, visibility: 2048, path_length: 0}", "parameters[1].initial=2"};
   const Problem analytic(load_experiment(file, samples));
   std::vector<std::string> with_method = samples;
   with_method.push_back("gradient={method: finite_difference, step: 0.01}");
@@ -29,7 +29,8 @@ TEST(Gradient, AgreesWithFiniteDifferences) {
   for (int i = 0; i < 2; ++i) {
     // Student's t of 31 degrees of freedom exceeds 5 with probability 2e-5.
     const double error = std::hypot(a.gradient.standard_error[i], b.gradient.standard_error[i]);
-    EXPECT_LT(std::abs(a.gradient.mean[i] - b.gradient.mean[i]), 5 * error) << analytic.parameters().component_names()[i];
+    EXPECT_LT(std::abs(a.gradient.mean[i] - b.gradient.mean[i]), 5 * error)
+        << analytic.parameters().component_names()[i];
     // The test must be able to see a wrong factor.
     EXPECT_GT(std::abs(b.gradient.mean[i]), 12 * error) << analytic.parameters().component_names()[i];
   }
@@ -40,9 +41,9 @@ TEST(Gradient, OfAnEmissionIsKnown) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
-  const Problem problem(
-      load_experiment(file, {"samples={primal: 1024, interior: 1024, visibility: 0, path_length: 0}",
-                             "parameters[1].initial=2"}));
+  const Problem problem(load_experiment(
+      file,
+      {"samples={primal: 1024, interior: 1024, visibility: 0, path_length: 0}", "parameters[1].initial=2"}));
   const Poll go_on = [] {};
   const GatedImage target = problem.make_target(go_on);
   const std::vector<double> theta = problem.parameters().initial();
@@ -55,9 +56,9 @@ TEST(Gradient, OfAnEmissionIsKnown) {
 }
 
 TEST(Gradient, ResidualAndDerivativeAreIndependent) {
-  // At the target, with one sample per pixel, all that is left of the residual is noise. The gradient averages to zero,
-  // but to 2 Var(I) / e for the emission e if residual and derivative came from the same random numbers; the loss there
-  // is Var(I).
+  // At the target, with one sample per pixel, all that is left of the residual is noise. The gradient
+  // averages to zero, but to 2 Var(I) / e for the emission e if residual and derivative came from the same
+  // random numbers; the loss there is Var(I).
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());

@@ -128,8 +128,9 @@ TEST(Checkpoint, FallsBackToTheOneBefore) {
   EXPECT_EQ(load_checkpoint(folder.path(), parameters, nullptr)->iteration, 18);
 
   const std::string whole = folder.read("checkpoint.yaml");
-  const std::string damages[] = {whole.substr(0, whole.size() / 2), "", std::string(3, '\0'), whole.substr(0, whole.size() - 1),
-                                 std::string(whole).replace(whole.find("iteration: 18"), 13, "iteration: 19")};
+  const std::string damages[] = {
+      whole.substr(0, whole.size() / 2), "", std::string(3, '\0'), whole.substr(0, whole.size() - 1),
+      std::string(whole).replace(whole.find("iteration: 18"), 13, "iteration: 19")};
   for (const std::string& damaged : damages) {
     folder.write("checkpoint.yaml", damaged);
     std::string warning;

@@ -16,12 +16,26 @@ Scene two_shapes(bool grey) {
   Scene scene;
   scene.grey = grey;
   scene.materials = {{.name = "white"}, {.name = "metal", .type = MaterialType::rough_conductor}};
-  scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}, {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
-  scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0}, {{1, 2, 3}, 0}, {{4, 5, 6}, 1}, {{4, 6, 7}, 1}};
-  scene.shapes = {{.name = "tetra", .file = "", .material = 1, .emission = {}, .first_vertex = 0, .vertex_count = 4,
-                   .first_triangle = 0, .triangle_count = 4},
-                  {.name = "quad", .file = "", .material = 0, .emission = Rgb(5.0), .first_vertex = 4,
-                   .vertex_count = 4, .first_triangle = 4, .triangle_count = 2}};
+  scene.positions = {{0, 0, 0},   {1, 0, 0},  {0, 2, 0}, {0, 0, 3},
+                     {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
+  scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0},
+                     {{1, 2, 3}, 0}, {{4, 5, 6}, 1}, {{4, 6, 7}, 1}};
+  scene.shapes = {{.name = "tetra",
+                   .file = "",
+                   .material = 1,
+                   .emission = {},
+                   .first_vertex = 0,
+                   .vertex_count = 4,
+                   .first_triangle = 0,
+                   .triangle_count = 4},
+                  {.name = "quad",
+                   .file = "",
+                   .material = 0,
+                   .emission = Rgb(5.0),
+                   .first_vertex = 4,
+                   .vertex_count = 4,
+                   .first_triangle = 4,
+                   .triangle_count = 2}};
   return scene;
 }
 
@@ -99,7 +113,8 @@ TEST(Parameters, TangentIsTheDerivativeOfApply) {
           }
           if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
         }
-        EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
+        EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8)
+            << "row " << row << " column " << column;
       }
     }
   }
@@ -133,7 +148,8 @@ TEST(Parameters, ActInTheListedOrder) {
   specs[0].direction = {1, 0, 0};
   specs[1].axis = {0, 0, 2};
   specs[1].pivot = {0, 1, 0};
-  // (1, 0, 0) + (1, 0, 0) turned by 90 degrees about z through (0, 1, 0): (2, -1, 0) -> (1, 2, 0), plus the pivot.
+  // (1, 0, 0) + (1, 0, 0) turned by 90 degrees about z through (0, 1, 0): (2, -1, 0) -> (1, 2, 0), plus the
+  // pivot.
   const Vec3 moved_first = Parameters(scene, specs).apply({1, 90}).positions[1];
   EXPECT_NEAR(length(moved_first - Vec3{1, 3, 0}), 0, 1e-15 * 8);
   // Turned first: (1, -1, 0) -> (1, 1, 0), plus the pivot and the shift.
@@ -196,7 +212,8 @@ TEST(Parameters, RejectWhatDoesNotFitTheScene) {
   s = spec("p", ParameterType::roughness, "white", 0.2);
   EXPECT_EQ(message(s), "parameter p: material: material 'white' is diffuse and has no roughness");
   s = spec("p", ParameterType::albedo, "gold", 0.2);
-  EXPECT_EQ(message(s), "parameter p: material: there is no material 'gold' in the scene (allowed: white, metal)");
+  EXPECT_EQ(message(s),
+            "parameter p: material: there is no material 'gold' in the scene (allowed: white, metal)");
   s = spec("p", ParameterType::translation, "tetra", 0);
   s.selection = {Selection::Kind::box, {}, {5, 5, 5}, {6, 6, 6}};
   EXPECT_EQ(message(s), "parameter p: selection: selects no vertex of shape 'tetra'");
