@@ -1,0 +1,175 @@
+// Shared by the renderer's tests: motions of a scene, their tangent basis, and estimates with standard errors.
+#pragma once
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/render/renderer.h"
+#include "core/scene/scene_loader.h"
+
+namespace isochron::testing {
+
+/// One scalar unknown of a scene: how to set it, and its velocities at zero.
+struct Motion {
+  std::function<void(Scene&, double)> apply;
+  std::function<void(const Scene&, std::vector<std::pair<int, double>>&)> velocity;  ///< (dof, coefficient)
+};
+
+inline Motion move_vertices(const Scene& scene, const std::string& shape, std::function<bool(const Vec3&)> select,
+                            std::function<Vec3(const Vec3&, double)> place,
+                            std::function<Vec3(const Vec3&)> velocity) {
+  const Shape& s = scene.shapes[scene.find_shape(shape)];
+  std::vector<int> chosen;
+  for (int v = s.first_vertex; v < s.first_vertex + s.vertex_count; ++v)
+    if (select(scene.positions[v])) chosen.push_back(v);
+  return {[=](Scene& target, double t) {
+            for (int v : chosen) target.positions[v] = place(target.positions[v], t);
+          },
+          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
+            for (int v : chosen)
+              for (int axis = 0; axis < 3; ++axis)
+                if (const double c = velocity(source.positions[v])[axis]; c != 0) out.emplace_back(3 * v + axis, c);
+          }};
+}
+
+inline Motion translate(const Scene& scene, const std::string& shape, const Vec3& direction,
+                        std::function<bool(const Vec3&)> select = [](const Vec3&) { return true; }) {
+  return move_vertices(
+      scene, shape, select, [=](const Vec3& p, double t) { return p + direction * t; },
+      [=](const Vec3&) { return direction; });
+}
+
+/// Rotation about the vertical axis through `pivot`, per radian.
+inline Motion rotate_y(const Scene& scene, const std::string& shape, const Vec3& pivot) {
+  return move_vertices(
+      scene, shape, [](const Vec3&) { return true; },
+      [=](const Vec3& p, double t) {
+        const double c = std::cos(t), s = std::sin(t);
+        const Vec3 d = p - pivot;
+        return pivot + Vec3{c * d.x + s * d.z, d.y, -s * d.x + c * d.z};
+      },
+      [=](const Vec3& p) { return cross(Vec3{0, 1, 0}, p - pivot); });
+}
+
+inline Motion change_albedo(const Scene& scene, const std::string& material) {
+  const int m = scene.find_material(material);
+  return {[=](Scene& target, double t) {
+            for (int c = 0; c < 3; ++c) target.materials[m].albedo[c] += t;
+          },
+          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
+            for (int c = 0; c < 3; ++c) out.emplace_back(DofLayout(source).albedo(m, c), 1.0);
+          }};
+}
+
+inline Motion change_roughness(const Scene& scene, const std::string& material) {
+  const int m = scene.find_material(material);
+  return {[=](Scene& target, double t) { target.materials[m].roughness += t; },
+          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
+            out.emplace_back(DofLayout(source).roughness(m), 1.0);
+          }};
+}
+
+inline Motion change_emission(const Scene& scene, const std::string& shape) {
+  const int s = scene.find_shape(shape);
+  return {[=](Scene& target, double t) {
+            for (int c = 0; c < 3; ++c) target.shapes[s].emission[c] += t;
+          },
+          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
+            for (int c = 0; c < 3; ++c) out.emplace_back(DofLayout(source).emission(s, c), 1.0);
+          }};
+}
+
+inline TangentBasis make_basis(const Scene& scene, const std::vector<Motion>& motions) {
+  const int size = DofLayout(scene).size();
+  std::vector<std::vector<TangentBasis::Entry>> rows(size);
+  for (std::size_t column = 0; column < motions.size(); ++column) {
+    std::vector<std::pair<int, double>> entries;
+    motions[column].velocity(scene, entries);
+    for (const auto& [dof, coefficient] : entries) rows[dof].push_back({static_cast<int>(column), coefficient});
+  }
+  TangentBasis basis;
+  basis.columns = static_cast<int>(motions.size());
+  basis.row_begin.push_back(0);
+  for (const auto& row : rows) {
+    basis.entries.insert(basis.entries.end(), row.begin(), row.end());
+    basis.row_begin.push_back(static_cast<int>(basis.entries.size()));
+  }
+  return basis;
+}
+
+struct Estimate {
+  double mean = 0, standard_error = 0;
+};
+
+/// Running mean and standard error over independent batches.
+class Batches {
+ public:
+  void add(double x) {
+    ++count_;
+    const double d = x - mean_;
+    mean_ += d / count_;
+    squares_ += d * (x - mean_);
+  }
+  Estimate estimate() const { return {mean_, std::sqrt(squares_ / (count_ - 1) / count_)}; }
+
+ private:
+  int count_ = 0;
+  double mean_ = 0, squares_ = 0;
+};
+
+/// z-score of the difference of two independent estimates.
+inline double z_score(const Estimate& a, const Estimate& b) {
+  const double error = std::hypot(a.standard_error, b.standard_error);
+  return error > 0 ? (a.mean - b.mean) / error : (a.mean == b.mean ? 0.0 : INFINITY);
+}
+
+/// Image means per gate over `batches` batches of `samples` samples each.
+inline std::vector<Estimate> image_means(const Renderer& renderer, int gates, int samples, int batches,
+                                         Stream stream) {
+  std::vector<Batches> sums(gates);
+  for (int b = 0; b < batches; ++b) {
+    const GatedImage image = renderer.render(stream, {b * samples, (b + 1) * samples});
+    for (int g = 0; g < gates; ++g) sums[g].add(image.mean(g));
+  }
+  std::vector<Estimate> out;
+  for (const Batches& s : sums) out.push_back(s.estimate());
+  return out;
+}
+
+/// [column][gate] of one term.
+inline std::vector<std::vector<Estimate>> term_means(const Renderer& renderer, Term term, int columns, int gates,
+                                                     int samples, int batches, Stream stream) {
+  stream.pass = 1 + static_cast<std::uint32_t>(term);
+  std::vector<std::vector<Batches>> sums(columns, std::vector<Batches>(gates));
+  for (int b = 0; b < batches; ++b) {
+    const auto images = renderer.derive(term, stream, {b * samples, (b + 1) * samples});
+    for (int c = 0; c < columns; ++c)
+      for (int g = 0; g < gates; ++g) sums[c][g].add(images[c].mean(g));
+  }
+  std::vector<std::vector<Estimate>> out(columns);
+  for (int c = 0; c < columns; ++c)
+    for (const Batches& s : sums[c]) out[c].push_back(s.estimate());
+  return out;
+}
+
+/// Central difference of image means with common random numbers, [gate].
+inline std::vector<Estimate> finite_difference(const Scene& scene, const Motion& motion, double step,
+                                               const GateSet& gates, const EstimatorOptions& options, int samples,
+                                               int batches, Stream stream) {
+  Scene above = scene, below = scene;
+  motion.apply(above, step);
+  motion.apply(below, -step);
+  const Renderer renderer_above(above, gates, options), renderer_below(below, gates, options);
+  std::vector<Batches> sums(gates.size());
+  for (int b = 0; b < batches; ++b) {
+    const SampleRange range{b * samples, (b + 1) * samples};
+    const GatedImage plus = renderer_above.render(stream, range), minus = renderer_below.render(stream, range);
+    for (int g = 0; g < gates.size(); ++g) sums[g].add((plus.mean(g) - minus.mean(g)) / (2 * step));
+  }
+  std::vector<Estimate> out;
+  for (const Batches& s : sums) out.push_back(s.estimate());
+  return out;
+}
+
+}  // namespace isochron::testing
