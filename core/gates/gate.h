@@ -176,8 +176,11 @@ class GateSet {
       }
     }
   }
-  /// Density of a length drawn by choosing a gate uniformly and then a length from it. Zero for the steady
-  /// gate.
+  /// Length drawn by choosing a gate uniformly (`pick` in (0, 1)) and then a length from it. Not for steady gates.
+  double sample_mixture(double pick, double u) const {
+    return center(std::min(static_cast<int>(pick * size()), size() - 1)) + shape_.sample(u);
+  }
+  /// Density of `sample_mixture`. Zero for the steady gate.
   double mixture_pdf(double l) const;
 
  private:

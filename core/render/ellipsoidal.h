@@ -70,7 +70,7 @@ class EllipsoidalConnections {
     double tau[2] = {0, 0};
     bool present[2] = {false, false};
     bool pair = false;
-    int gate = 0;
+    int gate = 0;  ///< of a pair
     double scale = 0;
     double longest() const { return std::max(present[0] ? tau[0] : 0, present[1] ? tau[1] : 0); }
     double shortest() const { return present[0] && present[1] ? std::min(tau[0], tau[1]) : longest(); }
@@ -95,8 +95,7 @@ class EllipsoidalConnections {
     if (pass_.value) {
       const double pick = rng.uniform(), u = rng.uniform();
       Target t;
-      t.gate = std::min(static_cast<int>(pick * gates.size()), gates.size() - 1);
-      t.tau[0] = gates.center(t.gate) + shape.sample(u);
+      t.tau[0] = gates.sample_mixture(pick, u);
       t.present[0] = t.tau[0] > 0;
       if (t.present[0]) {
         t.scale = 1 / gates.mixture_pdf(t.tau[0]);

@@ -95,11 +95,13 @@ struct Renderer::Impl {
   void for_each_sample(int strand, int strands, const Stream& stream, SampleRange range, F&& sample) const {
     const int pixels = scene.camera.pixels();
     for (int block = strand * kPixelsPerBlock; block < pixels; block += strands * kPixelsPerBlock)
-      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel)
+      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) {
+        const Rng of_pixel(stream, static_cast<std::uint64_t>(pixel), 0);
         for (int s = range.begin; s < range.end; ++s) {
-          Rng rng(stream, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(s));
+          Rng rng = of_pixel.with_sample(static_cast<std::uint32_t>(s));
           sample(pixel, rng);
         }
+      }
   }
 
   void run_primal(Worker<PrimalSink>& worker, int strand, int strands, const Stream& stream, SampleRange range) const {
@@ -134,7 +136,7 @@ struct Renderer::Impl {
       for_each_sample(strand, strands, stream, range,
                       [&](int pixel, Rng& rng) { sample_standard(worker, pixel, scale, rng); });
     } else if (term == Term::visibility) {
-      SecondaryBoundary secondary(worker, edges);
+      SecondaryBoundary secondary(worker, edges, ellipsoidal);
       for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
         if (edges.has_primary()) sample_primary_boundary(worker, edges, splat_scale, rng);
         secondary.sample_from_edge(splat_scale, rng);

@@ -1,9 +1,11 @@
-// Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Three ways
+// Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Four ways
 // to find such segments, combined by multiple importance sampling (balance heuristic):
 //   - from the edge, direction within the wedge of grazing directions;
 //   - from the edge, aimed at a point on an emitter;
 //   - from the camera: D is a vertex of a camera path, y a point of a random edge. Finds what a narrow field of view
-//     or a glossy surface sees.
+//     or a glossy surface sees;
+//   - under narrow gates, from the camera at a length drawn from the gates: y is where the shadow of a random edge, cast
+//     from D onto an emitter's plane, is at the distance that is left.
 // From the edge, the D side walks on and connects to the camera at every vertex.
 #pragma once
 #include "core/render/boundary_edges.h"
@@ -14,8 +16,13 @@ namespace isochron {
 template <class Sink>
 class SecondaryBoundary {
  public:
-  SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges)
-      : worker_(worker), scene_(worker.scene), edges_(edges), light_path_(worker.options.max_bounces) {}
+  /// `narrow_gates`: use the technique that draws lengths from the gates.
+  SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, bool narrow_gates)
+      : worker_(worker),
+        scene_(worker.scene),
+        edges_(edges),
+        narrow_gates_(narrow_gates),
+        light_path_(worker.options.max_bounces) {}
 
   /// One segment from an edge; contributions are scaled by `scale` (one over the number of such segments).
   void sample_from_edge(double scale, Rng& rng) {
@@ -43,7 +50,7 @@ class SecondaryBoundary {
 
     connections_.clear();
     walk_to_camera(g, scale * g.sine / (g.y.pdf * direction_pdf(g)), rng);
-    finish(g, rng);
+    finish(g, Found::from_edge, rng);
   }
 
   /// One camera path through `pixel`, with a random edge point at each of its vertices.
@@ -51,9 +58,15 @@ class SecondaryBoundary {
     if (!edges_.has_secondary() || !worker_.start_camera_path(pixel, rng)) return;
     Path& path = worker_.path;
     Rgb throughput(1.0);
+    double tau = 0;
+    if (narrow_gates_) {
+      const double pick = rng.uniform(), u = rng.uniform();
+      tau = worker_.gates.sample_mixture(pick, u);
+    }
     for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
       if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
       connect_edge(pixel, throughput * scale, rng);
+      if (narrow_gates_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
       const SurfacePoint x = path.back();
       const Material& material = scene_.material_of(x.triangle);
       const Vec3 w_o = normalize(path.vertex[path.size() - 2].p - x.p);
@@ -95,10 +108,12 @@ class SecondaryBoundary {
   /// A way from D to the camera.
   struct Connection {
     int pixel;
-    int bounces;    ///< scattering vertices on the camera side, D included
-    Rgb value;
-    double length;  ///< camera to D
+    int bounces;              ///< scattering vertices on the camera side, D included
+    Rgb value;                ///< without multiple importance sampling
+    double length;            ///< camera to D
+    double camera_over_edge;  ///< density of finding the segment from the camera over that from the edge
   };
+  enum class Found { from_edge, from_camera };
   /// Light that leaves S towards D.
   struct Emission {
     Rgb value;
@@ -157,7 +172,7 @@ class SecondaryBoundary {
   }
 
   /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
-  double camera_over_edge(const Segment& g, const std::vector<SurfacePoint>& x, int k) const {
+  double camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k) const {
     double ratio = scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
                    solid_angle_to_area(x[0].p, x[1]) / scene_.camera.pixels();
     for (int j = 1; j < k; ++j)
@@ -193,9 +208,8 @@ class SecondaryBoundary {
           camera_side_.assign(1, eye);
           camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
           const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
-          const double weight = 1 / (1 + camera_over_edge(g, camera_side_, bounce));
-          connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale * weight),
-                                  walked + distance});
+          connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
+                                  walked + distance, camera_over_edge(g, camera_side_, bounce)});
         }
       }
       if (bounce == worker_.options.max_bounces) return;
@@ -215,30 +229,101 @@ class SecondaryBoundary {
 
   /// D is the last vertex of the worker's path: tries a random edge point.
   void connect_edge(int pixel, const Rgb& throughput, Rng& rng) {
-    const Path& path = worker_.path;
     Segment g;
     g.y = edges_.sample_secondary(rng.uniform());
+    if (join_camera_path(g, pixel, throughput)) finish(g, Found::from_camera, rng);
+  }
+
+  /// As `connect_edge`, for light straight from an emitter on paths of length tau.
+  void connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng) {
+    const double u_edge = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+    double pdf_area;
+    const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
+    Segment g;
+    g.y = edges_.sample_secondary(u_edge);
+    const double left = tau - worker_.path.length.back();
+    const ShadowLine line(scene_, worker_.path.back().p, *g.y.edge, emitter);
+    if (!(left > 0) || !(line.height > 0)) return;
+    // height^2 |p|^2 = left^2 (n.p)^2 with p = a + s c.
+    const double h2 = line.height * line.height, l2 = left * left;
+    const double an = dot(line.a, line.n), cn = dot(line.c, line.n);
+    const double q2 = h2 * dot(line.c, line.c) - l2 * cn * cn, q1 = h2 * dot(line.a, line.c) - l2 * an * cn,
+                 q0 = h2 * dot(line.a, line.a) - l2 * an * an;
+    const double discriminant = q1 * q1 - q0 * q2;
+    if (!(discriminant >= 0)) return;
+    const double q = -(q1 + std::copysign(std::sqrt(discriminant), q1));
+    for (const double s : {q / q2, q0 / q}) {
+      if (!(s > 0 && s < 1) || !line.casts(s)) continue;
+      g.y.s = s;
+      g.y.y = g.y.edge->point(s);
+      if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) continue;
+      const Connection& c = connections_[0];
+      const double rate = length_over_uniform(g, c.length);
+      const Rgb radiance = scene_.emitted(g.light, -g.w);
+      if (!(rate > 0) || radiance.is_black()) continue;
+      const LocalDifferential& differential = c.bounces == 1 ? pixel_flow_ : material_flow_;
+      if (differential.empty()) continue;
+      worker_.sink.bind(differential);
+      // The balance heuristic cancels this technique's own rate.
+      worker_.sink.add(pixel, c.value * radiance * (1 / (1 / c.camera_over_edge + 1 + rate)), tau, GateUse::value);
+    }
+  }
+
+  /// Where the line from D through an edge meets an emitter's plane: D + p (height / -(n.p)), p = a + s c.
+  struct ShadowLine {
+    Vec3 n, a, c;
+    double height;  ///< of D above the plane
+    ShadowLine(const PreparedScene& scene, const Vec3& d, const BoundaryEdge& edge, int emitter)
+        : n(scene.normal[emitter]),
+          a(edge.origin - d),
+          c(edge.end - edge.origin),
+          height(dot(n, d - scene.corner(emitter, 0))) {}
+    /// The edge lies between D and the plane.
+    bool casts(double s) const {
+      const double towards = -dot(n, a + c * s);
+      return towards > 0 && towards < height;
+    }
+    /// |d (distance from D to the plane) / ds|
+    double distance_rate(double s) const {
+      const Vec3 p = a + c * s;
+      const double towards = -dot(n, p), norm = length(p);
+      return std::abs(height * (dot(p, c) / (norm * towards) + norm * dot(n, c) / (towards * towards)));
+    }
+  };
+
+  /// Density of the edge point when the length is drawn from the gates, over that of a uniform one; S is on an emitter
+  /// and `before` is the length from the camera to D.
+  double length_over_uniform(const Segment& g, double before) const {
+    if (!narrow_gates_ || !scene_.emits(g.light.triangle)) return 0;
+    const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
+    const int t = g.light.triangle;
+    return scene_.emitter_pdf(t) * scene_.area[t] * worker_.gates.mixture_pdf(before + g.r_d + g.r_s) *
+           line.distance_rate(g.y.s);
+  }
+
+  /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.
+  bool join_camera_path(Segment& g, int pixel, const Rgb& throughput) {
+    const Path& path = worker_.path;
     g.camera_end = path.back();
     const Vec3 d = g.y.y - g.camera_end.p;
     g.r_d = length(d);
-    if (!(g.r_d > 0)) return;
+    if (!(g.r_d > 0)) return false;
     g.w = d / g.r_d;
     const int k = path.size() - 1;
     const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
     const Material& material = scene_.material_of(g.camera_end.triangle);
     const double scattered = s.lobe(material);
-    if (!(scattered > 0) || !g.orient() || !find_light_end(g) || !differentiate(g)) return;
+    if (!(scattered > 0) || !g.orient() || !find_light_end(g) || !differentiate(g)) return false;
     ++worker_.rays;
-    if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return;
-    const double ratio = camera_over_edge(g, path.vertex, k);
-    const double weight = std::isinf(ratio) ? 1 : ratio / (1 + ratio);
-    const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf) * scattered * weight;
-    connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back()});
-    finish(g, rng);
+    if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return false;
+    const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf) * scattered;
+    connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back(),
+                            camera_over_edge(g, path.vertex, k)});
+    return true;
   }
 
   /// Gathers the light that S sends towards D and joins it with every connection.
-  void finish(const Segment& g, Rng& rng) {
+  void finish(const Segment& g, Found found, Rng& rng) {
     if (connections_.empty()) return;
     double shortest = connections_[0].length, longest = shortest;
     int fewest = connections_[0].bounces;
@@ -265,15 +350,20 @@ class SecondaryBoundary {
       const LocalDifferential* differential = c.bounces == 1 ? &pixel_flow_ : &material_flow_;
       if (differential->empty()) continue;
       if (differential != bound) worker_.sink.bind(*(bound = differential));
-      for (const Emission& e : emissions_)
-        if (c.bounces + e.bounces <= worker_.options.max_bounces)
-          worker_.sink.add(c.pixel, c.value * e.value, c.length + e.length, GateUse::value);
+      const double ratio = c.camera_over_edge;
+      for (const Emission& e : emissions_) {
+        if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
+        const double rate = e.bounces == 0 ? length_over_uniform(g, c.length) : 0;
+        const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
+        worker_.sink.add(c.pixel, c.value * e.value * weight, c.length + e.length, GateUse::value);
+      }
     }
   }
 
   Worker<Sink>& worker_;
   const PreparedScene& scene_;
   const BoundaryEdges& edges_;
+  const bool narrow_gates_;
   Path light_path_;
   LocalDifferential pixel_flow_, material_flow_;
   std::vector<SurfacePoint> walk_, camera_side_;
