@@ -1,0 +1,140 @@
+// What a gradient costs: not more for ten thousand vertices than for one translation of them, and not much more for
+// 64 gates than for one. Processor time of one thread, in interleaved pairs; the median ratio counts, and a noisy
+// machine gets three tries.
+#include <gtest/gtest.h>
+#include <time.h>
+
+#include <numeric>
+
+#include "scene_building.h"
+#include "support.h"
+
+namespace isochron::testing {
+namespace {
+
+double processor_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+template <class F>
+double seconds(F&& f) {
+  const double start = processor_seconds();
+  f();
+  return processor_seconds() - start;
+}
+
+/// Median over pairs of time(a) / time(b).
+template <class A, class B>
+double time_ratio(int pairs, A&& a, B&& b) {
+  std::vector<double> ratios;
+  for (int i = 0; i < pairs; ++i) {
+    // Whoever comes second finds warm caches: take turns.
+    double time_a = 0, time_b = 0;
+    if (i % 2) time_a = seconds(a);
+    time_b = seconds(b);
+    if (i % 2 == 0) time_a = seconds(a);
+    ratios.push_back(time_a / time_b);
+  }
+  std::nth_element(ratios.begin(), ratios.begin() + pairs / 2, ratios.end());
+  return ratios[pairs / 2];
+}
+
+/// The bound holds in one of three tries: noise is one-sided, a real excess is not.
+template <class A, class B>
+void expect_cost_ratio_below(double bound, const std::string& what, A&& a, B&& b) {
+  a();
+  b();
+  double ratio = 0;
+  for (int attempt = 0; attempt < 3; ++attempt) {
+    ratio = time_ratio(7, a, b);
+    if (ratio <= bound) break;
+  }
+  ::testing::Test::RecordProperty(what, std::to_string(ratio));
+  EXPECT_LE(ratio, bound) << what;
+}
+
+/// A bumpy field of 100 x 100 vertices under a square lamp.
+Scene bumpy_scene() {
+  Scene scene;
+  scene.camera.position = {0.2, 2.5, 2.0};
+  scene.camera.look_at = {0, 0, 0};
+  scene.camera.width = scene.camera.height = 16;
+  const auto height = [](double x, double z) { return 0.08 * std::sin(9 * x) * std::cos(7 * z + x); };
+  add_shape(scene, "field", height_field(100, 100, -1, 1, height), diffuse(Rgb(0.6)));
+  add_shape(scene, "lamp", quad({-0.4, 1.6, -0.9}, {0.4, 1.6, -0.9}, {0.4, 1.6, -0.2}, {-0.4, 1.6, -0.2}),
+            diffuse(Rgb(0.0)), Rgb(10.0));
+  return scene;
+}
+
+class Cost : public ::testing::TestWithParam<Sampling> {
+ protected:
+  Cost() { set_thread_count(1); }
+  ~Cost() override { set_thread_count(0); }
+  /// Ellipses cross hundreds of triangles of the field: far fewer samples take as long.
+  static int samples(Term term) {
+    const bool ellipses = term == Term::path_length || (term == Term::interior && GetParam() == Sampling::ellipsoidal);
+    return ellipses ? 1 : 64;
+  }
+  static std::string sampling() { return GetParam() == Sampling::standard ? "standard" : "ellipsoidal"; }
+};
+
+TEST_P(Cost, IndependentOfTheNumberOfParameters) {
+  const Scene scene = bumpy_scene();
+  const TangentBasis translation = make_basis(scene, {translate(scene, "field", {0.3, 1, 0.2})});
+  const Shape& field = scene.shapes[0];
+  ASSERT_EQ(field.vertex_count, 10000);
+  std::vector<int> dofs(3 * field.vertex_count);
+  std::iota(dofs.begin(), dofs.end(), 3 * field.first_vertex);
+  const TangentBasis free = free_dofs(scene, dofs);
+  ASSERT_EQ(free.columns, 30000);
+
+  const GateSet gates(GateShape::truncated_gaussian(0.1, 0.25), {4.5, 4.8});
+  const EstimatorOptions options{.max_bounces = 2, .sampling = GetParam()};
+  const Renderer one(scene, gates, options, &translation), many(scene, gates, options, &free);
+  GatedImage adjoint = one.render({1, 0, 0}, {0, 1});
+  for (std::size_t i = 0; i < adjoint.data.size(); ++i) adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
+  std::vector<double> of_one(DofLayout(scene).size(), 0.0), of_many(of_one);
+  for (const Term term : kTerms) {
+    const auto gradient = [&](const Renderer& renderer, const TangentBasis& basis, std::vector<double>& sum) {
+      std::fill(sum.begin(), sum.end(), 0.0);
+      renderer.add_gradient(term, adjoint, {1, 0, 1}, {0, samples(term)}, sum);
+      return basis.transpose_apply(sum);
+    };
+    expect_cost_ratio_below(1.3, sampling() + ", " + name(term), [&] { gradient(many, free, of_many); },
+                            [&] { gradient(one, translation, of_one); });
+    // The same samples were taken, so the time was spent on the same work.
+    const double single = translation.transpose_apply(of_one)[0], from_all = translation.transpose_apply(of_many)[0];
+    EXPECT_NE(single, 0);
+    EXPECT_NEAR(from_all, single, 1e-9 * std::abs(single));
+  }
+}
+
+TEST_P(Cost, NearlyIndependentOfTheNumberOfGates) {
+  const Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  const TangentBasis basis = make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2})});
+  std::vector<double> centers;
+  for (int g = 0; g < 64; ++g) centers.push_back(5.3 + 0.005 * g);
+  const GateSet one_gate(GateShape::gaussian(0.3), {5.46}), many_gates(GateShape::gaussian(0.3), centers);
+  const EstimatorOptions options{.max_bounces = 3, .sampling = GetParam()};
+  const Renderer one(scene, one_gate, options, &basis), many(scene, many_gates, options, &basis);
+  const GatedImage like_one = one.render({1, 0, 0}, {0, 1});
+  GatedImage like_many = many.render({1, 0, 0}, {0, 1});
+  for (std::size_t i = 0; i < like_many.data.size(); ++i) like_many.data[i] = std::sin(1.0 + static_cast<double>(i));
+  std::vector<double> sum(DofLayout(scene).size(), 0.0);
+  const SampleRange range{0, GetParam() == Sampling::standard ? 64 : 16};
+  expect_cost_ratio_below(1.5, sampling() + ", 64 gates, primal", [&] { many.render({1, 0, 0}, range); },
+                          [&] { one.render({1, 0, 0}, range); });
+  for (const Term term : {Term::interior, Term::visibility})
+    expect_cost_ratio_below(1.5, sampling() + ", 64 gates, " + name(term),
+                            [&] { many.add_gradient(term, like_many, {1, 0, 1}, range, sum); },
+                            [&] { one.add_gradient(term, like_one, {1, 0, 1}, range, sum); });
+}
+
+INSTANTIATE_TEST_SUITE_P(, Cost, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
+  return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
+});
+
+}  // namespace
+}  // namespace isochron::testing
