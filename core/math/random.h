@@ -35,6 +35,8 @@ class Rng {
     key_ = {mixed[0], mixed[1]};
     counter_ = {0, static_cast<std::uint32_t>(index), sample, mixed[2]};
   }
+  /// The numbers of another sample of the same stream and index, without folding the key again.
+  Rng with_sample(std::uint32_t sample) const { return Rng(key_, {0, counter_[1], sample, counter_[3]}); }
 
   /// Uniform in the open interval (0, 1), with 32 random bits.
   double uniform() {
@@ -47,6 +49,9 @@ class Rng {
   }
 
  private:
+  Rng(const std::array<std::uint32_t, 2>& key, const std::array<std::uint32_t, 4>& counter)
+      : key_(key), counter_(counter) {}
+
   std::array<std::uint32_t, 2> key_;
   std::array<std::uint32_t, 4> counter_;
   std::array<std::uint32_t, 4> block_{};

@@ -6,26 +6,49 @@
 
 namespace isochron {
 
+/// Stack of fixed capacity. Pushing moves nothing: references to entries below stay valid.
+template <class T>
+class FixedStack {
+ public:
+  explicit FixedStack(std::size_t capacity) : items_(capacity) {}
+  void start(const T& first) {
+    items_[0] = first;
+    size_ = 1;
+  }
+  void push_back(const T& item) { items_[size_++] = item; }
+  void pop_back() { --size_; }
+  const T& back() const { return items_[size_ - 1]; }
+  const T& operator[](std::size_t i) const { return items_[i]; }
+  const T* data() const { return items_.data(); }
+  const T* begin() const { return data(); }
+  const T* end() const { return data() + size_; }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::vector<T> items_;
+  std::size_t size_ = 0;
+};
+
 /// A path under construction: vertices from the camera on. `vertex[0]` is the camera (or, for the light side of a
 /// boundary segment, the point that the walk looks from); its triangle is -1 for the camera.
 struct Path {
-  std::vector<SurfacePoint> vertex;
-  std::vector<double> length;  ///< length[k]: from vertex 0 to vertex k, plus what length[0] starts with
-  std::vector<char> moves;     ///< moves[k]: some vertex up to k can have a derivative
+  FixedStack<SurfacePoint> vertex;
+  FixedStack<double> length;  ///< length[k]: from vertex 0 to vertex k, plus what length[0] starts with
+  FixedStack<char> moves;     ///< moves[k]: some vertex up to k can have a derivative
 
-  explicit Path(int max_bounces) {
-    vertex.reserve(max_bounces + 3);
-    length.reserve(max_bounces + 3);
-    moves.reserve(max_bounces + 3);
-  }
+  explicit Path(int max_bounces) : vertex(max_bounces + 3), length(max_bounces + 3), moves(max_bounces + 3) {}
   void start(const SurfacePoint& origin, double length_so_far) {
-    vertex.assign(1, origin);
-    length.assign(1, length_so_far);
-    moves.assign(1, 0);
+    vertex.start(origin);
+    length.start(length_so_far);
+    moves.start(0);
   }
   void push(const PreparedScene& scene, const SurfacePoint& x) {
-    length.push_back(length.back() + isochron::length(x.p - vertex.back().p));
-    moves.push_back(moves.back() || scene.moving.triangle[x.triangle] || scene.moving.scatters[x.triangle]);
+    push(scene, x, isochron::length(x.p - vertex.back().p));
+  }
+  /// `distance`: of x from the last vertex.
+  void push(const PreparedScene& scene, const SurfacePoint& x, double distance) {
+    length.push_back(length.back() + distance);
+    moves.push_back(moves.back() || scene.moves(x.triangle));
     vertex.push_back(x);
   }
   void pop() {
@@ -48,13 +71,12 @@ struct Scattering {
   Vec3 w_o, w_i;
   double distance_o, distance_i;
   double cos_o, cos_i, cos_io;
-  Scattering(const Vec3& before, const SurfacePoint& x, const Vec3& after) {
-    w_o = before - x.p;
-    w_i = after - x.p;
-    distance_o = length(w_o);
-    distance_i = length(w_i);
-    w_o = w_o / distance_o;
-    w_i = w_i / distance_i;
+  Scattering(const Vec3& before, const SurfacePoint& x, const Vec3& after)
+      : Scattering(x, (before - x.p) * (1 / length(before - x.p)), length(before - x.p), after) {}
+  /// `towards_camera`: unit direction to the neighbour on the camera side, which is `distance` away.
+  Scattering(const SurfacePoint& x, const Vec3& towards_camera, double distance, const Vec3& after)
+      : w_o(towards_camera), w_i(after - x.p), distance_o(distance), distance_i(length(w_i)) {
+    w_i *= 1 / distance_i;
     cos_o = dot(x.n, w_o);
     cos_i = dot(x.n, w_i);
     cos_io = dot(w_o, w_i);

@@ -52,23 +52,32 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis)
   const std::size_t count = scene.triangles.size();
   normal.resize(count);
   area.resize(count);
-  emits_.assign(count, 0);
+  records_.resize(count);
   emitter_pdf_.assign(count, 0);
   std::vector<EllipsoidBvh::Input> all, moved, emitting;
   all.reserve(count);
   std::vector<double> power;
   for (std::size_t i = 0; i < count; ++i) {
     const int t = static_cast<int>(i);
-    const Vec3 m = cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
+    const Vec3 e1 = corner(t, 1) - corner(t, 0), e2 = corner(t, 2) - corner(t, 0), m = cross(e1, e2);
     const double doubled = length(m);
     area[t] = 0.5 * doubled;
+    TriangleRecord& record = records_[t];
+    record.origin = corner(t, 0);
+    record.shape = scene.triangles[t].shape;
+    record.material = &scene.materials[scene.shapes[record.shape].material];
+    record.moves = moving.triangle[t] || moving.scatters[t];
     // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
-    normal[t] = doubled > 0 ? m / doubled : Vec3{};
+    if (doubled > 0) {
+      normal[t] = record.normal = m / doubled;
+      record.to_b1 = cross(e2, record.normal) / doubled;
+      record.to_b2 = cross(record.normal, e1) / doubled;
+    }
     const EllipsoidBvh::Input input{{corner(t, 0), corner(t, 1), corner(t, 2)}, t};
     all.push_back(input);
-    if (moving.triangle[t] || moving.scatters[t]) moved.push_back(input);
+    if (record.moves) moved.push_back(input);
     if (!shape_of(t).emission.is_black() && area[t] > 0) {
-      emits_[t] = 1;
+      record.emits = true;
       emitters.push_back(t);
       emitting.push_back(input);
       power.push_back(area[t] * shape_of(t).emission.max());
@@ -106,45 +115,6 @@ SurfacePoint PreparedScene::sample_emitter(double u0, double u1, double u2, doub
   y.n = normal[t];
   pdf = emitter_pdf_[t];
   return y;
-}
-
-SurfacePoint PreparedScene::point_in_plane(int t, const Vec3& p) const {
-  const Vec3 e1 = corner(t, 1) - corner(t, 0), e2 = corner(t, 2) - corner(t, 0), d = p - corner(t, 0);
-  SurfacePoint x;
-  x.p = p;
-  x.n = normal[t];
-  x.triangle = t;
-  const double scale = 1 / (2 * area[t]);
-  x.b[1] = dot(cross(d, e2), x.n) * scale;
-  x.b[2] = dot(cross(e1, d), x.n) * scale;
-  x.b[0] = 1 - x.b[1] - x.b[2];
-  return x;
-}
-
-SurfacePoint PreparedScene::point_on_triangle(int t, const Vec3& origin, const Vec3& direction) const {
-  const double distance = dot(normal[t], corner(t, 0) - origin) / dot(normal[t], direction);
-  return point_in_plane(t, origin + direction * distance);
-}
-
-std::optional<SurfacePoint> PreparedScene::trace(const SurfacePoint& x, const Vec3& w) const {
-  const int t = caster.first_triangle(leave(x, w), w);
-  if (t < 0 || dot(normal[t], w) == 0) return std::nullopt;
-  return point_on_triangle(t, x.p, w);
-}
-
-std::optional<SurfacePoint> PreparedScene::trace_camera(const Vec3& direction) const {
-  const int t = caster.first_triangle(camera.position, direction);
-  if (t < 0 || dot(normal[t], direction) == 0) return std::nullopt;
-  return point_on_triangle(t, camera.position, direction);
-}
-
-bool PreparedScene::visible(const SurfacePoint& x, const SurfacePoint& y) const {
-  const Vec3 d = y.p - x.p;
-  return !caster.occluded(leave(x, d), leave(y, -d));
-}
-
-bool PreparedScene::visible_from_camera(const SurfacePoint& x) const {
-  return !caster.occluded(camera.position, leave(x, camera.position - x.p));
 }
 
 double PreparedScene::distance_to_emitters(const Vec3& p) const {

@@ -19,6 +19,18 @@ struct SurfacePoint {
   double b[3] = {0, 0, 0};
 };
 
+/// What a ray that meets a triangle asks for, side by side in memory: two cache lines, the first of which decides
+/// where the ray ends and how it goes on.
+struct alignas(64) TriangleRecord {
+  Vec3 normal;  ///< unit; zero when the triangle has no area
+  Vec3 origin;  ///< corner 0
+  const Material* material = nullptr;
+  int shape = -1;
+  bool emits = false;
+  bool moves = false;  ///< a path through the triangle can have a derivative
+  Vec3 to_b1, to_b2;   ///< barycentrics of p in the plane: b[i] = to_bi . (p - origin)
+};
+
 /// Discrete distribution by cumulative sums.
 class DiscreteDistribution {
  public:
@@ -58,31 +70,51 @@ class PreparedScene {
   std::vector<int> emitters;        ///< triangles that emit
   EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
 
-  const Shape& shape_of(int triangle) const { return scene.shapes[scene.triangles[triangle].shape]; }
-  const Material& material_of(int triangle) const { return scene.materials[shape_of(triangle).material]; }
+  const Shape& shape_of(int triangle) const { return scene.shapes[records_[triangle].shape]; }
+  const Material& material_of(int triangle) const { return *records_[triangle].material; }
   const Vec3& corner(int triangle, int i) const { return scene.positions[scene.triangles[triangle].vertex[i]]; }
 
   /// Radiance that leaves the point towards the unit direction w; black on the back of an emitter.
   Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
     return dot(x.n, w) > 0 ? shape_of(x.triangle).emission : Rgb();
   }
-  bool emits(int triangle) const { return emits_[triangle]; }
+  bool emits(int triangle) const { return records_[triangle].emits; }
+  /// Whether a path through the triangle can have a derivative because of it.
+  bool moves(int triangle) const { return records_[triangle].moves; }
 
   /// Uniform by area x radiance over the emitters; `pdf` per area.
   SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const;
   double emitter_pdf(int triangle) const { return emitter_pdf_[triangle]; }
 
   /// Point where the line from `origin` along `direction` (unit) meets the triangle's plane, in double precision.
-  SurfacePoint point_on_triangle(int triangle, const Vec3& origin, const Vec3& direction) const;
+  SurfacePoint point_on_triangle(int triangle, const Vec3& origin, const Vec3& direction) const {
+    const TriangleRecord& r = records_[triangle];
+    const double distance = dot(r.normal, r.origin - origin) / dot(r.normal, direction);
+    return point_in_plane(triangle, origin + direction * distance);
+  }
   /// The triangle's point nearest to being p: barycentrics of p, which lies in its plane.
-  SurfacePoint point_in_plane(int triangle, const Vec3& p) const;
+  SurfacePoint point_in_plane(int triangle, const Vec3& p) const {
+    const TriangleRecord& r = records_[triangle];
+    const Vec3 d = p - r.origin;
+    const double b1 = dot(r.to_b1, d), b2 = dot(r.to_b2, d);
+    return {p, r.normal, triangle, {1 - b1 - b2, b1, b2}};
+  }
 
   /// First surface point from `x` (offset off its surface) along the unit direction w.
-  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const;
+  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const {
+    return first_point(leave(x, w), x.p, w);
+  }
   /// First surface point along a ray from the camera.
-  std::optional<SurfacePoint> trace_camera(const Vec3& direction) const;
-  bool visible(const SurfacePoint& x, const SurfacePoint& y) const;
-  bool visible_from_camera(const SurfacePoint& x) const;
+  std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
+    return first_point(camera.position, camera.position, direction);
+  }
+  bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
+    const Vec3 d = y.p - x.p;
+    return !caster.occluded(leave(x, d), leave(y, -d));
+  }
+  bool visible_from_camera(const SurfacePoint& x) const {
+    return !caster.occluded(camera.position, leave(x, camera.position - x.p));
+  }
 
   /// `x.p` moved off its surface to the side of the unit direction w.
   Vec3 leave(const SurfacePoint& x, const Vec3& w) const {
@@ -96,7 +128,14 @@ class PreparedScene {
   struct Box {
     Vec3 low, high;
   };
-  std::vector<std::uint8_t> emits_;
+  /// First point on the ray that starts at `lifted`; it is put on the line through `origin`.
+  std::optional<SurfacePoint> first_point(const Vec3& lifted, const Vec3& origin, const Vec3& w) const {
+    const int t = caster.first_triangle(lifted, w);
+    if (t < 0 || dot(records_[t].normal, w) == 0) return std::nullopt;
+    return point_on_triangle(t, origin, w);
+  }
+
+  std::vector<TriangleRecord> records_;
   std::vector<double> emitter_pdf_;
   std::vector<Box> emitter_boxes_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;

@@ -1,7 +1,6 @@
 #include "core/render/ray_caster.h"
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 namespace isochron {
@@ -15,22 +14,6 @@ RTCDevice device() {
     return created;
   }();
   return shared;
-}
-
-RTCRay make_ray(const Vec3& origin, const Vec3& direction, float far) {
-  RTCRay ray;
-  ray.org_x = static_cast<float>(origin.x);
-  ray.org_y = static_cast<float>(origin.y);
-  ray.org_z = static_cast<float>(origin.z);
-  ray.dir_x = static_cast<float>(direction.x);
-  ray.dir_y = static_cast<float>(direction.y);
-  ray.dir_z = static_cast<float>(direction.z);
-  ray.tnear = 0;
-  ray.tfar = far;
-  ray.time = 0;
-  ray.mask = ~0u;
-  ray.flags = 0;
-  return ray;
 }
 
 }  // namespace
@@ -64,24 +47,5 @@ RayCaster::RayCaster(const Scene& scene) {
 }
 
 RayCaster::~RayCaster() { rtcReleaseScene(scene_); }
-
-int RayCaster::first_triangle(const Vec3& origin, const Vec3& direction) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  RTCRayHit query;
-  query.ray = make_ray(origin, direction, std::numeric_limits<float>::infinity());
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(scene_, &context, &query);
-  return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(query.hit.primID);
-}
-
-bool RayCaster::occluded(const Vec3& from, const Vec3& to) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  RTCRay ray = make_ray(from, to - from, 1.0f);
-  rtcOccluded1(scene_, &context, &ray);
-  return ray.tfar < 0;
-}
 
 }  // namespace isochron

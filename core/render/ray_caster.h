@@ -3,8 +3,8 @@
 #pragma once
 #include <embree3/rtcore.h>
 
-#include <memory>
-#include <vector>
+#include <cstring>
+#include <limits>
 
 #include "core/scene/scene.h"
 
@@ -18,15 +18,48 @@ class RayCaster {
   RayCaster& operator=(const RayCaster&) = delete;
 
   /// Index of the first triangle along (origin, direction), or -1.
-  int first_triangle(const Vec3& origin, const Vec3& direction) const;
+  int first_triangle(const Vec3& origin, const Vec3& direction) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit query;
+    set_ray(query.ray, origin, direction, std::numeric_limits<float>::infinity());
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(scene_, &context, &query);
+    return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1 : static_cast<int>(query.hit.primID);
+  }
   /// True when anything lies between the two points.
-  bool occluded(const Vec3& from, const Vec3& to) const;
+  bool occluded(const Vec3& from, const Vec3& to) const {
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay ray;
+    set_ray(ray, from, to - from, 1.0f);
+    rtcOccluded1(scene_, &context, &ray);
+    return ray.tfar < 0;
+  }
 
   /// How far a ray's start is moved off the surface it leaves, so that rounding to single precision does not put it
   /// behind that surface: a few rounding steps of the scene's largest coordinate.
   double offset() const { return offset_; }
 
+  /// The committed Embree scene, one geometry; its primitives are the scene's triangles.
+  RTCScene embree_scene() const { return scene_; }
+
  private:
+  using Float4 [[gnu::vector_size(16)]] = float;
+
+  /// Embree reads a ray in vectors of four, which would have to wait for the parts if these were stored one by one.
+  static void set_ray(RTCRay& ray, const Vec3& origin, const Vec3& direction, float far) {
+    const Float4 from{static_cast<float>(origin.x), static_cast<float>(origin.y), static_cast<float>(origin.z), 0};
+    const Float4 along{static_cast<float>(direction.x), static_cast<float>(direction.y),
+                       static_cast<float>(direction.z), 0};
+    std::memcpy(&ray.org_x, &from, sizeof from);    // and tnear = 0
+    std::memcpy(&ray.dir_x, &along, sizeof along);  // and time = 0
+    ray.tfar = far;
+    ray.mask = ~0u;
+    ray.flags = 0;
+  }
+
   RTCScene scene_ = nullptr;
   double offset_ = 0;
 };

@@ -20,32 +20,35 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
   const PreparedScene& scene = worker.scene;
   const int base = path.size();
   Rgb throughput(1.0);
+  // Towards the vertex before the last, and how far away it is.
+  Vec3 w_o = path.vertex[base - 2].p - path.back().p;
+  double distance_o = length(w_o);
+  w_o *= 1 / distance_o;
 
   const auto seen_emission = [&](double weight) {
     const SurfacePoint& x = path.back();
     if (!reach.holds(path.length.back()) || !visitor.wants()) return;
-    const Rgb radiance = scene.emitted(x, path.vertex[path.size() - 2].p - x.p);
+    const Rgb radiance = scene.emitted(x, w_o);
     if (!radiance.is_black()) visitor.take(throughput * radiance * weight);
   };
 
   if (scene.emits(path.back().triangle)) seen_emission(1);
   for (int bounce = 1; bounce <= max_bounces; ++bounce) {
     if (path.length.back() + scene.distance_to_emitters(path.back().p) > reach.upper) break;
-    const SurfacePoint x = path.back();
-    const Vec3 before = path.vertex[path.size() - 2].p;
+    const SurfacePoint& x = path.back();
     const Material& material = scene.material_of(x.triangle);
 
     // Next-event estimation.
     const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
     double pdf_area;
     const SurfacePoint y = scene.sample_emitter(u0, u1, u2, pdf_area);
-    const Scattering s(before, x, y.p);
+    const Scattering s(x, w_o, distance_o, y.p);
     const double scattered = s.lobe(material) * std::abs(s.cos_i);
     const double cos_y = -dot(y.n, s.w_i);
     if (scattered > 0 && cos_y > 0 && reach.holds(path.length.back() + s.distance_i)) {
       const double to_area = cos_y / (s.distance_i * s.distance_i);
       const double pdf_bsdf = s.pdf_towards_light(material) * to_area;
-      path.push(scene, y);
+      path.push(scene, y, s.distance_i);
       if (visitor.wants() && worker.visible(x, y))
         visitor.take(throughput * material.albedo * scene.shape_of(y.triangle).emission *
                      (scattered * to_area / (pdf_area + pdf_bsdf)));
@@ -54,15 +57,17 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
 
     // BSDF sampling.
     const double v0 = rng.uniform(), v1 = rng.uniform();
-    const auto next = sample_direction(material, x.n, s.w_o, v0, v1);
+    const auto next = sample_direction(material, x.n, w_o, v0, v1);
     if (!next) break;
     throughput *= material.albedo * next->weight;
     if (throughput.is_black()) break;
     const auto hit = worker.trace(x, next->direction);
     if (!hit) break;
-    path.push(scene, *hit);
+    w_o = -next->direction;
+    distance_o = length(hit->p - x.p);
+    path.push(scene, *hit, distance_o);
     if (scene.emits(hit->triangle)) {
-      const double pdf_bsdf = next->pdf * solid_angle_to_area(x.p, *hit);
+      const double pdf_bsdf = next->pdf * std::abs(dot(hit->n, w_o)) / (distance_o * distance_o);
       seen_emission(pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(hit->triangle)));
     }
     if (bounce < max_bounces && !survives(throughput, bounce, rng)) break;
