@@ -1,5 +1,7 @@
 #include "core/materials/material.h"
 
+#include "core/math/turn.h"
+
 namespace isochron {
 namespace {
 
@@ -15,16 +17,17 @@ struct Frame {
 /// the unit hemisphere, reflections of w_o by visible normals are uniform on the cap z > -w_o.z.
 Vec3 sample_visible_normal(double alpha, const Vec3& w_o, double u0, double u1) {
   const Vec3 v = normalize(Vec3{alpha * w_o.x, alpha * w_o.y, w_o.z});
-  const double phi = kTwoPi * u0;
+  const SineCosine phi = turn(u0);
   const double z = (1 - u1) * (1 + v.z) - v.z;
   const double r = std::sqrt(std::max((1 - z) * (1 + z), 0.0));
-  const Vec3 h{r * std::cos(phi) + v.x, r * std::sin(phi) + v.y, z + v.z};
+  const Vec3 h{r * phi.cosine + v.x, r * phi.sine + v.y, z + v.z};
   return normalize(Vec3{alpha * h.x, alpha * h.y, h.z});
 }
 
 Vec3 sample_cosine(double u0, double u1) {
-  const double r = std::sqrt(u0), phi = kTwoPi * u1;
-  return {r * std::cos(phi), r * std::sin(phi), std::sqrt(1 - u0)};
+  const double r = std::sqrt(u0);
+  const SineCosine phi = turn(u1);
+  return {r * phi.cosine, r * phi.sine, std::sqrt(1 - u0)};
 }
 
 }  // namespace
