@@ -189,13 +189,6 @@ GateSet::GateSet(GateShape shape, std::vector<double> centers)
   sorted_.insert(sorted_.end(), kBlock, sorted_.back());
 }
 
-std::pair<int, int> GateSet::reaching(double l) const {
-  const auto first = sorted_.begin(), last = first + size();
-  const auto begin = std::lower_bound(first, last, l - shape_.upper());
-  const auto end = std::upper_bound(begin, last, l - shape_.lower());
-  return {static_cast<int>(begin - first), static_cast<int>(end - first)};
-}
-
 double GateSet::mixture_pdf(double l) const {
   if (shape_.is_steady()) return 0;
   double sum = 0;

@@ -187,7 +187,25 @@ class GateSet {
   static constexpr int kBlock = 8;
 
   /// Range in `sorted_` of the gates whose support holds l.
-  std::pair<int, int> reaching(double l) const;
+  std::pair<int, int> reaching(double l) const {
+    const double first = l - shape_.upper(), last = l - shape_.lower();
+    return {count_if_prefix([first](double center) { return center < first; }),
+            count_if_prefix([last](double center) { return center <= last; })};
+  }
+
+  /// How many of the sorted centres fulfil a condition that the first ones do and the others do not: a binary search
+  /// without branches, since lengths are random and no branch could be foreseen.
+  template <class Condition>
+  int count_if_prefix(Condition&& condition) const {
+    const double* at = sorted_.data();
+    int left = size();
+    while (left > 1) {
+      const int half = left / 2;
+      at += condition(at[half - 1]) ? half : 0;
+      left -= half;
+    }
+    return static_cast<int>(at - sorted_.data()) + (condition(*at) ? 1 : 0);
+  }
 
   /// Calls f(gate, x, W) over a range of gaussian gates, a block at a time so that the exponentials
   /// vectorise.
