@@ -121,7 +121,7 @@ struct Renderer::Impl {
 
   /// Whether the term can be other than zero, so that a pass over it is worth while.
   bool has(Term term) const {
-    if (!scene.moving.any) return false;
+    if (!scene.moving.any || scene.emitters.empty()) return false;
     if (term == Term::interior) return true;
     if (term == Term::visibility) return scene.moving.geometry;
     return scene.moving.geometry && gates.shape().pair_mass(jump_part()) > 0;
@@ -172,6 +172,7 @@ long long Renderer::rays() const { return impl_->rays; }
 
 GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   GatedImage image = impl_->blank();
+  if (impl_->scene.emitters.empty()) return image;  // no lamp, or one that the parameters have flattened
   // Standard sampling adds to a path's own pixel alone, so that strands can share the image.
   const bool shared = !impl_->ellipsoidal;
   const int strands = shared ? kMostStrands : strand_count(image.data.size());
