@@ -1,0 +1,112 @@
+// Scenes and gates in which there is nothing to see, or in which parameters have gone too far.
+#include <gtest/gtest.h>
+
+#include "support.h"
+
+namespace isochron::testing {
+namespace {
+
+struct Everything {
+  std::vector<double> numbers;
+  int non_zero = 0, not_finite = 0;
+};
+
+Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling, const TangentBasis& basis,
+                          int samples = 16) {
+  const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = sampling}, &basis);
+  Everything all;
+  const GatedImage image = renderer.render({1, 0, 0}, {0, samples});
+  all.numbers = image.data;
+  GatedImage adjoint = image;
+  std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
+  for (const Term term : kTerms) {
+    for (const GatedImage& d : renderer.derive(term, {1, 0, 1}, {0, samples}))
+      all.numbers.insert(all.numbers.end(), d.data.begin(), d.data.end());
+    std::vector<double> gradient(DofLayout(scene).size(), 0.0);
+    renderer.add_gradient(term, adjoint, {1, 0, 1}, {0, samples}, gradient);
+    all.numbers.insert(all.numbers.end(), gradient.begin(), gradient.end());
+  }
+  for (double x : all.numbers) {
+    all.non_zero += x != 0;
+    all.not_finite += !std::isfinite(x);
+  }
+  return all;
+}
+
+class BadGeometry : public ::testing::TestWithParam<Sampling> {
+ protected:
+  BadGeometry() : scene_(load_scene(TEST_DATA "/validation/scene.yaml")) {
+    scene_.camera.width = scene_.camera.height = 8;
+  }
+  TangentBasis basis() const {
+    return make_basis(scene_, {translate(scene_, "block", {1, 0.3, 0}), translate(scene_, "panel", {0, 1, 0}),
+                               translate(scene_, "light", {0, 1, 0.5}), change_albedo(scene_, "grey")});
+  }
+  Scene scene_;
+};
+
+TEST_P(BadGeometry, GatesThatNoPathReachesAreExactlyDark) {
+  const GateShape shapes[] = {GateShape::boxcar(0.3), GateShape::gaussian(0.05), GateShape::truncated_gaussian(0.1, 0.2)};
+  for (const GateShape& shape : shapes)
+    // Shorter than any path, longer than any of three bounces, and partly below zero.
+    for (const std::vector<double>& centers : {std::vector<double>{1.0, 1.2}, {60.0}, {0.0, 0.1}, {-3.0}}) {
+      const GateSet gates(shape, centers);
+      const Everything all = run_everything(scene_, gates, GetParam(), basis());
+      EXPECT_EQ(all.not_finite, 0);
+      EXPECT_EQ(all.non_zero, 0) << "centre " << centers[0];
+    }
+}
+
+TEST_P(BadGeometry, FlattenedTrianglesGiveFiniteResults) {
+  const GateSet gates(GateShape::truncated_gaussian(0.2, 0.4), {4.9, 5.6});
+  const int lit = run_everything(scene_, gates, GetParam(), basis()).non_zero;
+  ASSERT_GT(lit, 100);
+  const Shape& panel = scene_.shapes[scene_.find_shape("panel")];
+  const Shape& block = scene_.shapes[scene_.find_shape("block")];
+  const Shape& light = scene_.shapes[scene_.find_shape("light")];
+  const Scene whole = scene_;
+  const auto check = [&](const char* what, bool dark = false) {
+    const Everything all = run_everything(scene_, gates, GetParam(), basis());
+    EXPECT_EQ(all.not_finite, 0) << what;
+    if (dark) {
+      EXPECT_EQ(all.non_zero, 0) << what;
+    } else {
+      EXPECT_GT(all.non_zero, 100) << what;
+    }
+    scene_ = whole;
+  };
+  scene_.positions[panel.first_vertex + 4] = scene_.positions[panel.first_vertex];
+  check("two corners at one place");
+  for (int axis = 0; axis < 3; ++axis)
+    scene_.positions[panel.first_vertex][axis] = 0.5 * (whole.positions[panel.first_vertex + 4][axis] +
+                                                        whole.positions[panel.first_vertex + 1][axis]);
+  check("a corner on the opposite edge");
+  for (int v = 0; v < block.vertex_count; ++v) scene_.positions[block.first_vertex + v].y = -0.5;
+  check("a block without height");
+  for (int v = 0; v < block.vertex_count; ++v) scene_.positions[block.first_vertex + v] = {-0.2, -0.5, 0.1};
+  check("a block that is a point");
+  scene_.positions[light.first_vertex + 2] = scene_.positions[light.first_vertex];
+  check("a lamp without area", true);
+  scene_.positions[light.first_vertex + 1] = scene_.positions[light.first_vertex];
+  check("half a lamp without area");
+  for (int v = 0; v < block.vertex_count; ++v) scene_.positions[block.first_vertex + v] += Vec3{0, 0, 1.6};
+  check("a block through the others");
+  // A camera on a surface sees nothing but that surface, at no distance: dark or not, but finite.
+  scene_.camera.position = whole.positions[panel.first_vertex];
+  EXPECT_EQ(run_everything(scene_, gates, GetParam(), basis()).not_finite, 0);
+}
+
+TEST_P(BadGeometry, SceneWithoutLampIsDark) {
+  scene_.shapes[scene_.find_shape("light")].emission = {};
+  const TangentBasis moving = basis();
+  EXPECT_EQ(run_everything(scene_, GateSet(GateShape::boxcar(0.5), {5.0}), GetParam(), moving).non_zero, 0);
+  EXPECT_EQ(run_everything(scene_, GateSet(GateShape::steady(), {0}), GetParam(), moving).non_zero, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(, BadGeometry, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
+                         [](const auto& test) {
+                           return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
+                         });
+
+}  // namespace
+}  // namespace isochron::testing
