@@ -39,7 +39,7 @@ void add_run(CLI::App& app, Action& action) {
   auto command = std::make_shared<RunCommand>();
   CLI::App* sub = app.add_subcommand("run", "Optimise from the initial values towards the target");
   add_experiment_options(*sub, command->common);
-  sub->add_flag("--force", command->force, "start anew in a folder that holds a run already");
+  sub->add_flag("--force", command->force, "overwrite the run that the folder holds (else it is moved to DIR.1, DIR.2, ...)");
   sub->footer(
       "Examples:\n"
       "  isochron run cube.yaml\n"

@@ -48,6 +48,21 @@ void clear_run(const std::string& folder) {
     std::filesystem::remove(std::filesystem::path(folder) / file);
 }
 
+/// Renames a folder to the first free of FOLDER.1, FOLDER.2, ... so that no run is ever overwritten by accident.
+std::string set_aside(const std::string& folder) {
+  const std::string base = std::filesystem::path(folder + "/").parent_path().string();
+  for (int i = 1;; ++i) {
+    const std::string kept = fmt::format("{}.{}", base, i);
+    if (std::filesystem::exists(kept)) continue;
+    std::error_code error;
+    std::filesystem::rename(base, kept, error);
+    if (error)
+      throw InputError(fmt::format("{}: holds a run already, which cannot be moved to {}: {} (allowed: -o for another "
+                                   "folder, --force to overwrite)", base, kept, error.message()));
+    return kept;
+  }
+}
+
 std::string optional_number(double value) {
   return std::isnan(value) ? "null" : std::isinf(value) ? (value > 0 ? ".inf" : "-.inf") : exact(value);
 }
@@ -200,14 +215,17 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
   const Problem problem(experiment);
   problem.require_parameters();
   make_output_folder(options.folder);
+  if (std::filesystem::exists(options.folder + "/experiment.yaml")) {
+    if (options.force) {
+      clear_run(options.folder);
+    } else {
+      const std::string kept = set_aside(options.folder);
+      if (options.warning) options.warning(fmt::format("{} held a run already: moved to {}", options.folder, kept));
+      make_output_folder(options.folder);
+    }
+  }
   const std::string file = options.folder + "/experiment.yaml";
-  if (std::filesystem::exists(file) && !options.force)
-    throw InputError(
-        fmt::format("{0}: holds a run already (allowed: `isochron resume {0}` to go on with it, -o for "
-                    "another folder, --force to start anew in this one)",
-                    options.folder));
   const std::string resolved = resolved_yaml(experiment, options.folder);
-  clear_run(options.folder);
   write_file_atomically(file, resolved);
   return Run(problem, options).execute();
 }

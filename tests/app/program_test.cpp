@@ -163,16 +163,21 @@ TEST_F(Program, CommandsWriteTheirFiles) {
     EXPECT_NE(cost.find(key), std::string::npos);
 }
 
-TEST_F(Program, RunMovesTowardsTheTargetAndRefusesToOverwrite) {
+TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
   ASSERT_EQ(run(run_command("a")).status, 0);
   for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml",
                            "target.exr", "initial.exr", "final.exr", "summary.yaml"})
     EXPECT_TRUE(folder_.has(std::string("a/") + name)) << name;
   EXPECT_EQ(rows("a"), 7);
-  const Result again = run(run_command("a"));
-  EXPECT_EQ(again.status, 2);
-  EXPECT_NE(again.errors.find("isochron resume"), std::string::npos);
+  const std::string first = log("a");
+  const Result again = run(run_command("a", {"--seed", "4"}));
+  EXPECT_EQ(again.status, 0);
+  EXPECT_NE(again.errors.find("a.1"), std::string::npos) << again.errors;
+  EXPECT_EQ(log("a.1"), first);
+  EXPECT_NE(log("a"), first);
   EXPECT_EQ(run(run_command("a", {"--force"})).status, 0);
+  EXPECT_EQ(log("a"), first);
+  EXPECT_FALSE(folder_.has("a.2"));
 }
 
 TEST_F(Program, ResultsDoNotDependOnThreads) {
