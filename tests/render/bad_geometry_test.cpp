@@ -11,8 +11,8 @@ struct Everything {
   int non_zero = 0, not_finite = 0;
 };
 
-Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling, const TangentBasis& basis,
-                          int samples = 16) {
+Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling,
+                          const TangentBasis& basis, int samples = 16) {
   const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = sampling}, &basis);
   Everything all;
   const GatedImage image = renderer.render({1, 0, 0}, {0, samples});
@@ -46,7 +46,8 @@ class BadGeometry : public ::testing::TestWithParam<Sampling> {
 };
 
 TEST_P(BadGeometry, GatesThatNoPathReachesAreExactlyDark) {
-  const GateShape shapes[] = {GateShape::boxcar(0.3), GateShape::gaussian(0.05), GateShape::truncated_gaussian(0.1, 0.2)};
+  const GateShape shapes[] = {GateShape::boxcar(0.3), GateShape::gaussian(0.05),
+                              GateShape::truncated_gaussian(0.1, 0.2)};
   for (const GateShape& shape : shapes)
     // Shorter than any path, longer than any of three bounces, and partly below zero.
     for (const std::vector<double>& centers : {std::vector<double>{1.0, 1.2}, {60.0}, {0.0, 0.1}, {-3.0}}) {
@@ -78,8 +79,8 @@ TEST_P(BadGeometry, FlattenedTrianglesGiveFiniteResults) {
   scene_.positions[panel.first_vertex + 4] = scene_.positions[panel.first_vertex];
   check("two corners at one place");
   for (int axis = 0; axis < 3; ++axis)
-    scene_.positions[panel.first_vertex][axis] = 0.5 * (whole.positions[panel.first_vertex + 4][axis] +
-                                                        whole.positions[panel.first_vertex + 1][axis]);
+    scene_.positions[panel.first_vertex][axis] =
+        0.5 * (whole.positions[panel.first_vertex + 4][axis] + whole.positions[panel.first_vertex + 1][axis]);
   check("a corner on the opposite edge");
   for (int v = 0; v < block.vertex_count; ++v) scene_.positions[block.first_vertex + v].y = -0.5;
   check("a block without height");

@@ -122,7 +122,8 @@ TEST(BoundaryEdges, DensityIsTheFrequency) {
   }
 }
 
-/// The side is right if points just off the edge, to either side of the grazing plane, lie in the solid or not.
+/// The side is right if points just off the edge, to either side of the grazing plane, lie in the solid or
+/// not.
 TEST(BoundaryEdges, OccluderSideOfACube) {
   const Scene scene = cube_scene();
   const PreparedScene prepared(scene, nullptr);
@@ -133,9 +134,13 @@ TEST(BoundaryEdges, OccluderSideOfACube) {
     const auto s = edges.sample_secondary(rng.uniform());
     const Vec3 w{2 * rng.uniform() - 1, 2 * rng.uniform() - 1, 2 * rng.uniform() - 1};
     const Vec3 n_b = normalize(cross(s.edge->tangent, w));
-    // A line through y grazes the cube exactly when it does not enter it; then one side of the plane holds the cube.
-    const auto inside = [](const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1; };
-    const Vec3 mid = s.edge->point(0.5), across = normalize(w - s.edge->tangent * dot(w, s.edge->tangent)) * 1e-6;
+    // A line through y grazes the cube exactly when it does not enter it; then one side of the plane holds
+    // the cube.
+    const auto inside = [](const Vec3& p) {
+      return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1;
+    };
+    const Vec3 mid = s.edge->point(0.5),
+               across = normalize(w - s.edge->tangent * dot(w, s.edge->tangent)) * 1e-6;
     const int side = BoundaryEdges::occluder_side(*s.edge, n_b);
     EXPECT_EQ(BoundaryEdges::occluder_side(*s.edge, -n_b), -side);
     if (inside(mid + across) || inside(mid - across)) {

@@ -1,6 +1,6 @@
-// What a gradient costs: not more for ten thousand vertices than for one translation of them, and not much more for
-// 64 gates than for one. Processor time of one thread, in interleaved pairs; the median ratio counts, and a noisy
-// machine gets three tries.
+// What a gradient costs: not more for ten thousand vertices than for one translation of them, and not much
+// more for 64 gates than for one. Processor time of one thread, in interleaved pairs; the median ratio
+// counts, and a noisy machine gets three tries.
 #include <gtest/gtest.h>
 #include <time.h>
 
@@ -74,7 +74,8 @@ class Cost : public ::testing::TestWithParam<Sampling> {
   ~Cost() override { set_thread_count(0); }
   /// Ellipses cross hundreds of triangles of the field: far fewer samples take as long.
   static int samples(Term term) {
-    const bool ellipses = term == Term::path_length || (term == Term::interior && GetParam() == Sampling::ellipsoidal);
+    const bool ellipses =
+        term == Term::path_length || (term == Term::interior && GetParam() == Sampling::ellipsoidal);
     return ellipses ? 1 : 64;
   }
   static std::string sampling() { return GetParam() == Sampling::standard ? "standard" : "ellipsoidal"; }
@@ -94,7 +95,8 @@ TEST_P(Cost, IndependentOfTheNumberOfParameters) {
   const EstimatorOptions options{.max_bounces = 2, .sampling = GetParam()};
   const Renderer one(scene, gates, options, &translation), many(scene, gates, options, &free);
   GatedImage adjoint = one.render({1, 0, 0}, {0, 1});
-  for (std::size_t i = 0; i < adjoint.data.size(); ++i) adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
+  for (std::size_t i = 0; i < adjoint.data.size(); ++i)
+    adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
   std::vector<double> of_one(DofLayout(scene).size(), 0.0), of_many(of_one);
   for (const Term term : kTerms) {
     const auto gradient = [&](const Renderer& renderer, const TangentBasis& basis, std::vector<double>& sum) {
@@ -102,10 +104,12 @@ TEST_P(Cost, IndependentOfTheNumberOfParameters) {
       renderer.add_gradient(term, adjoint, {1, 0, 1}, {0, samples(term)}, sum);
       return basis.transpose_apply(sum);
     };
-    expect_cost_ratio_below(1.3, sampling() + ", " + name(term), [&] { gradient(many, free, of_many); },
-                            [&] { gradient(one, translation, of_one); });
+    expect_cost_ratio_below(
+        1.3, sampling() + ", " + name(term), [&] { gradient(many, free, of_many); },
+        [&] { gradient(one, translation, of_one); });
     // The same samples were taken, so the time was spent on the same work.
-    const double single = translation.transpose_apply(of_one)[0], from_all = translation.transpose_apply(of_many)[0];
+    const double single = translation.transpose_apply(of_one)[0],
+                 from_all = translation.transpose_apply(of_many)[0];
     EXPECT_NE(single, 0);
     EXPECT_NEAR(from_all, single, 1e-9 * std::abs(single));
   }
@@ -121,20 +125,33 @@ TEST_P(Cost, NearlyIndependentOfTheNumberOfGates) {
   const Renderer one(scene, one_gate, options, &basis), many(scene, many_gates, options, &basis);
   const GatedImage like_one = one.render({1, 0, 0}, {0, 1});
   GatedImage like_many = many.render({1, 0, 0}, {0, 1});
-  for (std::size_t i = 0; i < like_many.data.size(); ++i) like_many.data[i] = std::sin(1.0 + static_cast<double>(i));
+  for (std::size_t i = 0; i < like_many.data.size(); ++i)
+    like_many.data[i] = std::sin(1.0 + static_cast<double>(i));
   std::vector<double> sum(DofLayout(scene).size(), 0.0);
   const SampleRange range{0, GetParam() == Sampling::standard ? 64 : 16};
-  expect_cost_ratio_below(1.5, sampling() + ", 64 gates, primal", [&] { many.render({1, 0, 0}, range); },
-                          [&] { one.render({1, 0, 0}, range); });
+  expect_cost_ratio_below(
+      1.5, sampling() + ", 64 gates, primal",
+      [&] {
+        many.render({1, 0, 0}, range);
+      },
+      [&] {
+        one.render({1, 0, 0}, range);
+      });
   for (const Term term : {Term::interior, Term::visibility})
-    expect_cost_ratio_below(1.5, sampling() + ", 64 gates, " + name(term),
-                            [&] { many.add_gradient(term, like_many, {1, 0, 1}, range, sum); },
-                            [&] { one.add_gradient(term, like_one, {1, 0, 1}, range, sum); });
+    expect_cost_ratio_below(
+        1.5, sampling() + ", 64 gates, " + name(term),
+        [&] {
+          many.add_gradient(term, like_many, {1, 0, 1}, range, sum);
+        },
+        [&] {
+          one.add_gradient(term, like_one, {1, 0, 1}, range, sum);
+        });
 }
 
-INSTANTIATE_TEST_SUITE_P(, Cost, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
-  return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
-});
+INSTANTIATE_TEST_SUITE_P(, Cost, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
+                         [](const auto& test) {
+                           return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
+                         });
 
 }  // namespace
 }  // namespace isochron::testing

@@ -1,6 +1,7 @@
-// The primal against closed forms: directly seen emitters, one bounce off a floor by quadrature, and the white furnace.
-// Statistical limits: |z| < 4.5 with 38 batches each (Student's t: 6e-5 a comparison); about 500 comparisons with fixed
-// seeds, so that a change of the random numbers alone makes one of them fail in 3 % of cases.
+// The primal against closed forms: directly seen emitters, one bounce off a floor by quadrature, and the
+// white furnace. Statistical limits: |z| < 4.5 with 38 batches each (Student's t: 6e-5 a comparison); about
+// 500 comparisons with fixed seeds, so that a change of the random numbers alone makes one fail 3 times in
+// 100.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -52,10 +53,14 @@ struct PlainGate {
   bool jumps() const { return kind == boxcar || kind == truncated; }
   GateShape shape() const {
     switch (kind) {
-      case steady: return GateShape::steady();
-      case gaussian: return GateShape::gaussian(sigma);
-      case boxcar: return GateShape::boxcar(2 * half_width);
-      default: return GateShape::truncated_gaussian(sigma, half_width);
+      case steady:
+        return GateShape::steady();
+      case gaussian:
+        return GateShape::gaussian(sigma);
+      case boxcar:
+        return GateShape::boxcar(2 * half_width);
+      default:
+        return GateShape::truncated_gaussian(sigma, half_width);
     }
   }
 };
@@ -98,9 +103,11 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
   scene.camera = {{0.1, 0.2, 1.0}, {0, 0, 0}, {0, 1, 0}, 60, 4, 3};
   const Rgb radiance(3, 5, 7);
   scene.grey = false;
-  add_shape(scene, "light", quad({-3, -3, -0.5}, {3, -3, 0.4}, {3, 3, 0.4}, {-3, 3, -0.5}), diffuse(Rgb(0.5)), radiance);
+  add_shape(scene, "light", quad({-3, -3, -0.5}, {3, -3, 0.4}, {3, 3, 0.4}, {-3, 3, -0.5}), diffuse(Rgb(0.5)),
+            radiance);
   const Vec3 normal = normalize(cross(Vec3{6, 0, 0.9}, Vec3{0, 6, 0}));
-  const GateSet gates(gate.shape(), gate.kind == PlainGate::steady ? std::vector<double>{0} : std::vector<double>{1.0, 1.3});
+  const GateSet gates(
+      gate.shape(), gate.kind == PlainGate::steady ? std::vector<double>{0} : std::vector<double>{1.0, 1.3});
   const PlainCamera camera(scene.camera);
   const int cells = 400;
   for (const Sampling sampling : samplings(gate)) {
@@ -112,7 +119,8 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
         for (int g = 0; g < gates.size(); ++g) {
           batches[pixel * gates.size() + g].add(image.at(pixel, g, 0));
           for (int c = 1; c < 3; ++c)
-            EXPECT_NEAR(image.at(pixel, g, c) * 3, image.at(pixel, g, 0) * radiance[c], 1e-12 * radiance[c] * 30);
+            EXPECT_NEAR(image.at(pixel, g, c) * 3, image.at(pixel, g, 0) * radiance[c],
+                        1e-12 * radiance[c] * 30);
         }
     }
     for (int pixel = 0; pixel < 12; ++pixel)
@@ -138,7 +146,8 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
   }
 }
 
-/// A diffuse floor (y = 0) that fills the image, lit by a horizontal rectangle [-0.4, 0.5] x [-0.3, 0.4] at y = 0.9.
+/// A diffuse floor (y = 0) that fills the image, lit by a horizontal rectangle [-0.4, 0.5] x [-0.3, 0.4] at y
+/// = 0.9.
 constexpr double kLightHeight = 0.9, kLightX[] = {-0.4, 0.5}, kLightZ[] = {-0.3, 0.4};
 
 Scene floor_scene() {
@@ -153,8 +162,8 @@ Scene floor_scene() {
   return scene;
 }
 
-/// Image mean by quadrature of `n` points a dimension. Along the innermost one, the light's z, the gate's jumps are
-/// found in closed form.
+/// Image mean by quadrature of `n` points a dimension. Along the innermost one, the light's z, the gate's
+/// jumps are found in closed form.
 double floor_mean(const Scene& scene, const PlainGate& gate, double center, int n) {
   const Rule rule = gauss_legendre(n), inner = gauss_legendre(12);
   const PlainCamera camera(scene.camera);
@@ -205,7 +214,8 @@ TEST_P(ClosedForm, DirectLightOnAFloor) {
       const double expected = floor_mean(scene, gate, centers[g], n);
       const double coarse = floor_mean(scene, gate, centers[g], 3 * n / 4);
       ASSERT_NEAR(coarse, expected, 1e-3 * expected) << "the quadrature itself";
-      EXPECT_NEAR(means[g].mean, expected, kLimit * means[g].standard_error + 1e-3 * expected) << "gate " << g;
+      EXPECT_NEAR(means[g].mean, expected, kLimit * means[g].standard_error + 1e-3 * expected)
+          << "gate " << g;
       EXPECT_GT(expected, 0.01);
       EXPECT_LT(means[g].standard_error, 8e-3 * expected) << "gate " << g;
     }
@@ -215,7 +225,8 @@ TEST_P(ClosedForm, DirectLightOnAFloor) {
 INSTANTIATE_TEST_SUITE_P(, ClosedForm, ::testing::ValuesIn(kGates),
                          [](const auto& test) { return std::string(test.param.name); });
 
-/// A closed box whose walls all emit 1 and reflect `albedo`: after n bounces the radiance anywhere is a geometric sum.
+/// A closed box whose walls all emit 1 and reflect `albedo`: after n bounces the radiance anywhere is a
+/// geometric sum.
 Scene furnace(double albedo) {
   Scene scene;
   scene.camera = {{0.1, 0.2, 0.3}, {0.5, -0.2, -1}, {0, 1, 0}, 70, 4, 4};
@@ -289,8 +300,8 @@ TEST_P(Agreement, OfStandardAndEllipsoidalPerBlock) {
     const int samples = sampling == Sampling::standard ? 32 : 24;
     std::vector<Batches> sums((blocks + 1) * gates.size());
     for (int b = 0; b < kBatches; ++b) {
-      const GatedImage image = renderer.render({sampling == Sampling::standard ? 1u : 2u, 0, 0},
-                                               {b * samples, (b + 1) * samples});
+      const GatedImage image =
+          renderer.render({sampling == Sampling::standard ? 1u : 2u, 0, 0}, {b * samples, (b + 1) * samples});
       for (int g = 0; g < gates.size(); ++g) {
         std::vector<double> mean(blocks, 0.0);
         for (int pixel = 0; pixel < image.pixels(); ++pixel)
@@ -305,8 +316,9 @@ TEST_P(Agreement, OfStandardAndEllipsoidalPerBlock) {
   }
   for (std::size_t i = 0; i < results[0].size(); ++i) {
     EXPECT_LT(std::abs(z_score(results[0][i], results[1][i])), kLimit)
-        << "block " << i / gates.size() << " gate " << i % gates.size() << ": " << results[0][i].mean << " +- "
-        << results[0][i].standard_error << " and " << results[1][i].mean << " +- " << results[1][i].standard_error;
+        << "block " << i / gates.size() << " gate " << i % gates.size() << ": " << results[0][i].mean
+        << " +- " << results[0][i].standard_error << " and " << results[1][i].mean << " +- "
+        << results[1][i].standard_error;
   }
   for (int g = 0; g < gates.size(); ++g)
     for (const auto& r : results) {

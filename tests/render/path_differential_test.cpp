@@ -1,5 +1,6 @@
-// The differential of a path against automatic differentiation (ceres::Jet) of ln F and l written anew from theory
-// section 2: as functions of all vertices, albedos, roughnesses and radiances, one degree of freedom at a time.
+// The differential of a path against automatic differentiation (ceres::Jet) of ln F and l written anew from
+// theory section 2: as functions of all vertices, albedos, roughnesses and radiances, one degree of freedom
+// at a time.
 #include "core/render/path_differential.h"
 
 #include <ceres/jet.h>
@@ -15,8 +16,8 @@ namespace {
 
 using Jet = ceres::Jet<double, 1>;
 
-/// A path: camera, the pixel's ray, and per surface vertex its triangle and barycentrics (those of x1 follow from the
-/// ray). The last triangle emits.
+/// A path: camera, the pixel's ray, and per surface vertex its triangle and barycentrics (those of x1 follow
+/// from the ray). The last triangle emits.
 struct PathSpec {
   Vec3 camera, ray;
   std::vector<int> triangle;
@@ -33,7 +34,8 @@ Vec3T<T> constant(const Vec3& v) {
   return {T(v.x), T(v.y), T(v.z)};
 }
 
-/// Textbook GGX with height-correlated Smith masking, by half vector and angles; n on the side of both directions.
+/// Textbook GGX with height-correlated Smith masking, by half vector and angles; n on the side of both
+/// directions.
 template <class T>
 T ggx(const T& alpha, const Vec3T<T>& n, const Vec3T<T>& w_i, const Vec3T<T>& w_o) {
   using std::sqrt;
@@ -137,7 +139,8 @@ std::vector<SurfacePoint> surface_points(const PreparedScene& scene, const PathS
   return x;
 }
 
-Gradients by_hand(const PreparedScene& scene, const PathSpec& spec, bool length_only, LocalDifferential& raw) {
+Gradients by_hand(const PreparedScene& scene, const PathSpec& spec, bool length_only,
+                  LocalDifferential& raw) {
   const std::vector<SurfacePoint> x = surface_points(scene, spec);
   differentiate_path(scene, x.data(), static_cast<int>(x.size()), length_only, raw);
   Gradients result;
@@ -205,8 +208,8 @@ Mesh triangle_about(const Vec3& p, const Vec3& n, const std::array<double, 3>& b
   return mesh;
 }
 
-/// `count` surface vertices at random places, each on a triangle of its own that faces both neighbours (or neither,
-/// where it is two-sided), with random materials.
+/// `count` surface vertices at random places, each on a triangle of its own that faces both neighbours (or
+/// neither, where it is two-sided), with random materials.
 void random_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
   std::vector<Vec3> x(count + 1);
   for (int k = 0; k <= count; ++k) x[k] = numbers.vector() * 0.7 + Vec3{k % 2 ? 1.5 : 0.0, 0.4 * k, 0.0};
@@ -228,8 +231,8 @@ void random_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
   }
 }
 
-/// Two triangles that share an edge, like an open book, and a path that goes to and fro between them: vertices and
-/// materials occur again and again.
+/// Two triangles that share an edge, like an open book, and a path that goes to and fro between them:
+/// vertices and materials occur again and again.
 void book_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
   Mesh mesh;
   mesh.positions = {numbers.vector() * 0.1 + Vec3{0, -1, 0}, numbers.vector() * 0.1 + Vec3{0, 1, 0},

@@ -25,8 +25,10 @@ inline Material conductor(const Rgb& reflectance, double roughness, bool two_sid
   return m;
 }
 
-/// Adds a mesh as it is (no welding) with a material of its own, both called `name`. Returns the shape's index.
-inline int add_shape(Scene& scene, const std::string& name, const Mesh& mesh, Material material, const Rgb& emission = {}) {
+/// Adds a mesh as it is (no welding) with a material of its own, both called `name`. Returns the shape's
+/// index.
+inline int add_shape(Scene& scene, const std::string& name, const Mesh& mesh, Material material,
+                     const Rgb& emission = {}) {
   material.name = name;
   Shape shape;
   shape.name = name;
