@@ -76,15 +76,17 @@ struct QuadraticForm {
   }
 };
 
-struct Shell {
+}  // namespace
+
+struct EllipsoidBvh::Shell {
   Vec3 center, axis;
   QuadraticForm high, low;
   double inside;    ///< Q_high of points that may be inside the outer ellipsoid is at most this
   double outside;   ///< Q_low of points that may be outside the inner ellipsoid is at least this
+  /// Where Q_low exceeds the first and Q_high is below the second, points are strictly between the two ellipsoids.
+  double between_low, between_high;
   Ellipsoid outer;  ///< the outer ellipsoid, grown by the round-off of positions
 };
-
-}  // namespace
 
 struct EllipsoidBvh::Impl {
   std::vector<Node> nodes;  ///< the root first; empty for a flat list of blocks
@@ -111,7 +113,12 @@ struct EllipsoidBvh::Impl {
   int make_block(const std::vector<Input>& triangles, const Range& range);
   int make_node(const std::vector<Input>& triangles, const Range& range, int depth);
 
+  // With `kSurfaces` what lies strictly between the two ellipsoids is left out.
+  template <bool kSurfaces>
+  void visit(const Shell& shell, std::vector<int>& ids) const;
+  template <bool kSurfaces>
   void test_block(const Block& block, const Shell& shell, std::vector<int>& ids) const;
+  template <bool kSurfaces>
   int test_node(const Node& node, const Shell& shell, int* hits) const;
   void prefetch(int entry) const;
 };
@@ -211,32 +218,43 @@ int EllipsoidBvh::Impl::make_node(const std::vector<Input>& triangles, const Ran
   return static_cast<int>(self);
 }
 
+template <bool kSurfaces>
 void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std::vector<int>& ids) const {
   const Vec3 c = shell.center, u = shell.axis;
   const QuadraticForm high = shell.high, low = shell.low;
-  Wide lowest_bound, lowest_vertex, highest_vertex;
+  Wide lowest_bound, lowest_vertex, highest_vertex, lowest_of_low, highest_of_high;
   for (int i = 0; i < kWidth; ++i) {
     const Vec3 r0 = block.vertex[0].get(i) - c, r1 = block.vertex[1].get(i) - c,
                r2 = block.vertex[2].get(i) - c;
     const double x0 = dot(r0, u), x1 = dot(r1, u), x2 = dot(r2, u);
     const double s0 = dot(r0, r0), s1 = dot(r1, r1), s2 = dot(r2, r2);
-    const double q0 = high(s0, x0 * x0), q1 = high(s1, x1 * x1), q2 = high(s2, x2 * x2);
+    const double s01 = dot(r0, r1), s12 = dot(r1, r2), s20 = dot(r2, r0);
     // Q lies above its tangent plane at each vertex v, 2 B(v, p) - Q(v) with B the bilinear form of Q, and a
     // plane over a triangle is lowest at a vertex: a bound that is exact to second order in the triangle's
     // size.
-    const double b01 = 2 * high(dot(r0, r1), x0 * x1), b12 = 2 * high(dot(r1, r2), x1 * x2),
-                 b20 = 2 * high(dot(r2, r0), x2 * x0);
-    const double nearest = min(min(q0, q1), q2);
-    const double tangent = max(max(min(b01, b20) - q0, min(b01, b12) - q1), min(b12, b20) - q2);
+    const auto tangent_bound = [&](const QuadraticForm& q, double q0, double q1, double q2) {
+      const double b01 = 2 * q(s01, x0 * x1), b12 = 2 * q(s12, x1 * x2), b20 = 2 * q(s20, x2 * x0);
+      return max(max(min(b01, b20) - q0, min(b01, b12) - q1), min(b12, b20) - q2);
+    };
+    const double h0 = high(s0, x0 * x0), h1 = high(s1, x1 * x1), h2 = high(s2, x2 * x2);
+    const double l0 = low(s0, x0 * x0), l1 = low(s1, x1 * x1), l2 = low(s2, x2 * x2);
+    const double nearest = min(min(h0, h1), h2);
     lowest_vertex.lane[i] = nearest;
-    lowest_bound.lane[i] = min(tangent, nearest);
-    highest_vertex.lane[i] = max(max(low(s0, x0 * x0), low(s1, x1 * x1)), low(s2, x2 * x2));
+    lowest_bound.lane[i] = min(tangent_bound(high, h0, h1, h2), nearest);
+    highest_vertex.lane[i] = max(max(l0, l1), l2);
+    if constexpr (kSurfaces) {
+      lowest_of_low.lane[i] = min(tangent_bound(low, l0, l1, l2), min(min(l0, l1), l2));
+      highest_of_high.lane[i] = max(max(h0, h1), h2);
+    }
   }
   // Which lanes report is unpredictable, so no branches here but for the few uncertain ones.
   bool reported[kWidth];
   int uncertain = 0;
   for (int i = 0; i < kWidth; ++i) {
     reported[i] = (lowest_bound.lane[i] <= shell.inside) & (highest_vertex.lane[i] >= shell.outside);
+    if constexpr (kSurfaces)
+      reported[i] &=
+          !((lowest_of_low.lane[i] > shell.between_low) & (highest_of_high.lane[i] < shell.between_high));
     uncertain += reported[i] & (lowest_vertex.lane[i] > shell.inside);
   }
   for (int i = 0; uncertain > 0; ++i) {
@@ -255,10 +273,11 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
   ids.insert(ids.end(), found, found + count);
 }
 
+template <bool kSurfaces>
 int EllipsoidBvh::Impl::test_node(const Node& node, const Shell& shell, int* hits) const {
   const Vec3 c = shell.center, u = shell.axis;
   const QuadraticForm high = shell.high, low = shell.low;
-  Wide lowest, highest;
+  Wide lowest, highest, lowest_of_low, highest_of_high;
   for (int i = 0; i < kWidth; ++i) {
     const Vec3 r = node.center.get(i) - c, h = node.half.get(i);
     const double x = dot(r, u), squared = dot(r, r);
@@ -269,13 +288,21 @@ int EllipsoidBvh::Impl::test_node(const Node& node, const Shell& shell, int* hit
       return 2 * (std::abs(half_gradient.x) * h.x + std::abs(half_gradient.y) * h.y +
                   std::abs(half_gradient.z) * h.z);
     };
-    lowest.lane[i] = high(squared, x * x) - slope(high);
-    highest.lane[i] = low(squared + dot(h, h), x * x) + slope(low);
+    const double slope_high = slope(high), slope_low = slope(low), farthest = squared + dot(h, h);
+    lowest.lane[i] = high(squared, x * x) - slope_high;
+    highest.lane[i] = low(farthest, x * x) + slope_low;
+    if constexpr (kSurfaces) {
+      lowest_of_low.lane[i] = low(squared, x * x) - slope_low;
+      highest_of_high.lane[i] = high(farthest, x * x) + slope_high;
+    }
   }
   int count = 0;
   for (int i = 0; i < kWidth; ++i) {
     hits[count] = node.child[i];
-    count += (lowest.lane[i] <= shell.inside) & (highest.lane[i] >= shell.outside);
+    bool meets = (lowest.lane[i] <= shell.inside) & (highest.lane[i] >= shell.outside);
+    if constexpr (kSurfaces)
+      meets &= !((lowest_of_low.lane[i] > shell.between_low) & (highest_of_high.lane[i] < shell.between_high));
+    count += meets;
   }
   for (int i = 0; i < count; ++i) prefetch(hits[i]);
   return count;
@@ -325,13 +352,45 @@ bool EllipsoidBvh::empty() const {
   return !impl_;
 }
 
+template <bool kSurfaces>
+void EllipsoidBvh::Impl::visit(const Shell& shell, std::vector<int>& ids) const {
+  if (nodes.empty()) {
+    for (const Block& block : blocks) test_block<kSurfaces>(block, shell, ids);
+    return;
+  }
+  int stack[kStack];  // a visit replaces one entry by up to eight
+  int size = 0;
+  stack[size++] = 0;
+  while (size > 0) {
+    const int entry = stack[--size];
+    if (entry < 0)
+      test_block<kSurfaces>(blocks[static_cast<std::size_t>(~entry)], shell, ids);
+    else
+      size += test_node<kSurfaces>(nodes[static_cast<std::size_t>(entry)], shell, stack + size);
+  }
+}
+
 void EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
                          std::vector<int>& ids) const {
+  if (const auto shell = make_shell(a, b, tau_low, tau_high)) impl_->visit<false>(*shell, ids);
+}
+
+void EllipsoidBvh::query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
+                                  std::vector<int>& ids) const {
+  const auto shell = make_shell(a, b, tau_low, tau_high);
+  if (!shell) return;
+  // Nothing is between equal lengths, and of a coarse mesh's triangles few are: the simpler tests do.
+  const bool fine = impl_->blocks.size() > kWidth;
+  tau_low < tau_high && fine ? impl_->visit<true>(*shell, ids) : impl_->visit<false>(*shell, ids);
+}
+
+std::optional<EllipsoidBvh::Shell> EllipsoidBvh::make_shell(const Vec3& a, const Vec3& b, double tau_low,
+                                                            double tau_high) const {
   const Ellipsoid outer(a, b, tau_high);
   const Ellipsoid inner(a, b, tau_low);
-  if (!impl_ || !(outer.valid() || tau_high == kInfinity)) return;
+  if (!impl_ || !(outer.valid() || tau_high == kInfinity)) return std::nullopt;
   const Vec3& axis = outer.valid() ? outer.axis : inner.axis;
-  Shell shell{outer.center, axis, QuadraticForm(outer), QuadraticForm(inner), 0, 0, outer};
+  Shell shell{outer.center, axis, QuadraticForm(outer), QuadraticForm(inner), 0, 0, 0, 0, outer};
 
   // Positions relative to the centre carry the round-off of all coordinates involved, here counted generously
   // as a change of tau; |dQ/dtau| <= major / minor^2 on the surface turns it into a change of Q, and the
@@ -346,22 +405,10 @@ void EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double ta
   };
   shell.inside = 1 + slack(shell.high);
   shell.outside = inner.valid() ? 1 - slack(shell.low) : -kInfinity;
+  shell.between_low = inner.valid() ? 1 + slack(shell.low) : -kInfinity;
+  shell.between_high = 1 - slack(shell.high);
   shell.outer = Ellipsoid(a, b, tau_high + round_off * magnitude);
-
-  if (impl_->nodes.empty()) {
-    for (const Block& block : impl_->blocks) impl_->test_block(block, shell, ids);
-    return;
-  }
-  int stack[kStack];  // a visit replaces one entry by up to eight
-  int size = 0;
-  stack[size++] = 0;
-  while (size > 0) {
-    const int entry = stack[--size];
-    if (entry < 0)
-      impl_->test_block(impl_->blocks[static_cast<std::size_t>(~entry)], shell, ids);
-    else
-      size += impl_->test_node(impl_->nodes[static_cast<std::size_t>(entry)], shell, stack + size);
-  }
+  return shell;
 }
 
 }  // namespace isochron

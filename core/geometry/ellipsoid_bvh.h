@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/math/vec.h"
@@ -28,8 +29,13 @@ class EllipsoidBvh {
   /// are not finite are never reported, those without area may be. The order depends on the hierarchy only.
   /// Safe to call from several threads.
   void query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
+  /// The same for the two ellipsoids of total lengths tau_low and tau_high alone: leaves out nearly all triangles
+  /// strictly between them, of which a fine mesh has many. The others come in the order of `query`.
+  void query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
 
  private:
+  struct Shell;
+  std::optional<Shell> make_shell(const Vec3& a, const Vec3& b, double tau_low, double tau_high) const;
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

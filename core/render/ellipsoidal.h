@@ -147,14 +147,13 @@ class EllipsoidalConnections {
     const Ellipsoid ellipsoids[2] = {{x.p, y.p, target.tau[0] - before}, {x.p, y.p, target.tau[1] - before}};
     const EllipsoidBvh& bvh = ends_are_static(y.triangle) ? scene_.moving_triangles : scene_.all_triangles;
     worker_.candidates.clear();
-    bvh.query(x.p, y.p, low, high, worker_.candidates);
+    bvh.query_surfaces(x.p, y.p, low, high, worker_.candidates);
 
     const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
     ArcPair chosen;
     double total = 0, chosen_weight = 0;
     for (const int t : worker_.candidates) {
-      const Vec3& n = scene_.normal[t];
-      const double side_x = dot(n, x.p - scene_.corner(t, 0)), side_y = dot(n, y.p - scene_.corner(t, 0));
+      const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
       const bool two_sided = scene_.material_of(t).two_sided;
       if (!((side_x > 0 && side_y > 0) || (two_sided && side_x < 0 && side_y < 0))) continue;
       ArcPair arcs;

@@ -86,6 +86,11 @@ class PreparedScene {
   SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const;
   double emitter_pdf(int triangle) const { return emitter_pdf_[triangle]; }
 
+  /// Signed distance of p from the triangle's plane, positive on the normal's side.
+  double height_over(int triangle, const Vec3& p) const {
+    const TriangleRecord& r = records_[triangle];
+    return dot(r.normal, p - r.origin);
+  }
   /// Point where the line from `origin` along `direction` (unit) meets the triangle's plane, in double precision.
   SurfacePoint point_on_triangle(int triangle, const Vec3& origin, const Vec3& direction) const {
     const TriangleRecord& r = records_[triangle];

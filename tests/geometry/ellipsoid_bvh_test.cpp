@@ -57,17 +57,25 @@ Triangles rippled_sphere(int rings, double radius) {
 
 struct Tally {
   int crossing = 0, missed = 0, extra = 0, twice = 0;
+  int between = 0, between_reported = 0;  ///< by `query_surfaces`, in meshes that are not small
 };
 
 /// Compares a query with a scan over all triangles. What must be found: triangles with arcs at either end of
 /// the shell or in between, and those with a vertex in it. What may be found: those that reach out of the
-/// inner ellipsoid (lengths are convex: at a vertex) and into the outer one (at a vertex, or in an arc).
+/// inner ellipsoid (lengths are convex: at a vertex) and into the outer one (at a vertex, or in an arc). The query
+/// for the two surfaces must find those with arcs at either end, nothing that the whole query does not, and it is
+/// to leave out those that lie strictly between.
 void compare(const Triangles& triangles, const EllipsoidBvh& bvh, const Vec3& a, const Vec3& b,
              double tau_low, double tau_high, Tally& tally) {
   std::vector<int> ids;
   bvh.query(a, b, tau_low, tau_high, ids);
   const std::set<int> found(ids.begin(), ids.end());
   tally.twice += ids.size() != found.size();
+  std::vector<int> surface_ids;
+  bvh.query_surfaces(a, b, tau_low, tau_high, surface_ids);
+  const std::set<int> on_surfaces(surface_ids.begin(), surface_ids.end());
+  tally.twice += surface_ids.size() != on_surfaces.size();
+  tally.extra += !std::includes(found.begin(), found.end(), on_surfaces.begin(), on_surfaces.end());
   const auto arcs_at = [&](const EllipsoidBvh::Input& t, double tau) {
     EllipseArcs arcs;
     return clip_ellipse(Ellipsoid(a, b, tau), t.vertex[0], t.vertex[1], t.vertex[2], arcs);
@@ -80,7 +88,12 @@ void compare(const Triangles& triangles, const EllipsoidBvh& bvh, const Vec3& a,
     const bool may = longest >= tau_low && reaches_in;
     bool must = arcs_at(t, tau_low) || arcs_at(t, tau_high) || arcs_at(t, (tau_low + tau_high) / 2);
     for (const double x : s) must = must || (x >= tau_low && x <= tau_high);
-    const bool reported = found.contains(t.id);
+    const bool reported = found.contains(t.id), surface = arcs_at(t, tau_low) || arcs_at(t, tau_high);
+    tally.missed += surface && !on_surfaces.contains(t.id);
+    if (triangles.size() > 100 && !surface && shortest > tau_low && longest < tau_high) {
+      ++tally.between;
+      tally.between_reported += on_surfaces.contains(t.id);
+    }
     tally.crossing += must, tally.missed += must && !reported, tally.extra += reported && !may;
   }
 }
@@ -107,6 +120,8 @@ TEST(EllipsoidBvh, FindsWhatAScanFinds) {
   EXPECT_EQ(tally.missed, 0);
   EXPECT_EQ(tally.twice, 0);
   EXPECT_GT(tally.crossing, 20000);
+  EXPECT_GT(tally.between, 1000);
+  EXPECT_LT(tally.between_reported, tally.between / 20);  // bounds of large triangles are not tight
   EXPECT_LT(tally.extra, tally.crossing / 1000);  // round-off: lengths that pass through a vertex
 }
 
