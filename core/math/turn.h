@@ -8,8 +8,9 @@ struct SineCosine {
   double sine, cosine;
 };
 
-/// Sine and cosine of 2 pi u for |u| up to 2^20, absolute error below 3e-16. A full turn needs no reduction by an irrational
-/// number: the nearest quarter turn is exact, and Taylor polynomials do the rest, |x| <= pi/4. No branches.
+/// Sine and cosine of 2 pi u for |u| up to 2^20, absolute error below 3e-16. A full turn needs no reduction
+/// by an irrational number: the nearest quarter turn is exact, and Taylor polynomials do the rest, |x| <=
+/// pi/4. No branches.
 inline SineCosine turn(double u) {
   constexpr double kRound = 0x1.8p52;  // adding it leaves round(4u) in the low bits of the sum
   const double quarter = (4 * u + kRound) - kRound;

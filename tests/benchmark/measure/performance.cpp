@@ -1,0 +1,196 @@
+// The project's performance figures: isochron_measure CSV [ROUNDS]. Prints a table and writes it as CSV.
+//
+// Every figure is a ratio of two measurements that alternate, A B A B ..., so that whatever else the machine
+// does strikes both; reported is the median of the pairs' ratios. Single-thread figures use the thread's CPU
+// time.
+#include <time.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/render/renderer.h"
+#include "tests/benchmark/rays.h"
+#include "tests/benchmark/scenes.h"
+
+namespace isochron::benchmarks {
+namespace {
+
+double seconds(clockid_t clock) {
+  timespec t;
+  clock_gettime(clock, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct Pair {
+  double first, second;  ///< median seconds
+  double ratio;          ///< median of first / second
+};
+
+/// Alternates the two; each returns what its time is divided by (rays, samples).
+Pair measure_pair(int rounds, clockid_t clock, const std::function<double()>& first,
+                  const std::function<double()>& second) {
+  const auto time = [clock](const std::function<double()>& work) {
+    const double start = seconds(clock);
+    const double amount = work();
+    return (seconds(clock) - start) / amount;
+  };
+  first();
+  second();
+  std::vector<double> a, b, ratio;
+  for (int round = 0; round < rounds; ++round) {
+    a.push_back(time(first));
+    b.push_back(time(second));
+    ratio.push_back(a.back() / b.back());
+  }
+  return {median(a), median(b), median(ratio)};
+}
+
+class Report {
+ public:
+  explicit Report(const char* file) : csv_(std::fopen(file, "w")) {
+    if (!csv_) {
+      std::fprintf(stderr, "isochron_measure: cannot write %s\n", file);
+      std::exit(1);
+    }
+    std::fprintf(csv_, "figure,case,value,unit,goal\n");
+  }
+  ~Report() { std::fclose(csv_); }
+  Report(const Report&) = delete;
+  Report& operator=(const Report&) = delete;
+
+  void add(const std::string& figure, const std::string& what, double value, const char* unit,
+           const char* goal = "") {
+    std::printf("%-34s %-62s %9.3f %-8s %s\n", figure.c_str(), what.c_str(), value, unit, goal);
+    std::fprintf(csv_, "%s,%s,%.4g,%s,%s\n", figure.c_str(), what.c_str(), value, unit, goal);
+    std::fflush(stdout);
+    std::fflush(csv_);
+  }
+
+ private:
+  std::FILE* csv_;
+};
+
+struct NamedScene {
+  std::string name;
+  Scene scene;
+};
+
+constexpr SampleRange kSamples{0, 16};
+
+GatedImage unit_adjoint(const Scene& scene, const GateSet& gates) {
+  GatedImage adjoint(scene.camera.width, scene.camera.height, gates.size(), scene.grey ? 1 : 3);
+  std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
+  return adjoint;
+}
+
+/// Rays per second of a rendering over those of bare Embree on the same rays.
+void measure_forward(const NamedScene& s, int rounds, Report& report) {
+  const GateSet gates = wide_gates();
+  for (const int bounces : {3, 8}) {
+    const PreparedScene prepared(s.scene, nullptr);
+    const auto rays = record_rays(prepared, gates, bounces, kSamples.count());
+    const Renderer renderer(s.scene, gates, {.max_bounces = bounces, .sampling = Sampling::standard});
+    const Pair pair = measure_pair(
+        rounds, CLOCK_THREAD_CPUTIME_ID,
+        [&] {
+          trace_bare(prepared.caster.embree_scene(), rays);
+          return static_cast<double>(rays.size());
+        },
+        [&] {
+          const long long before = renderer.rays();
+          renderer.render({.seed = 3}, kSamples);
+          return static_cast<double>(renderer.rays() - before);
+        });
+    const std::string what = s.name + " " + std::to_string(bounces) + " bounces";
+    report.add("Embree alone", what, 1e-6 / pair.first, "Mrays/s");
+    report.add("render", what, 1e-6 / pair.second, "Mrays/s");
+    report.add("render / Embree alone", what, pair.ratio, "", ">= 0.5");
+  }
+}
+
+/// Time of one term's gradient pass over the primal pass's at the same number of samples.
+void measure_gradient(const NamedScene& s, int rounds, Report& report) {
+  for (const bool narrow : {false, true}) {
+    const GateSet gates = narrow ? narrow_gates() : wide_gates();
+    const EstimatorOptions options{.max_bounces = 3,
+                                   .sampling = narrow ? Sampling::ellipsoidal : Sampling::standard};
+    const SampleRange samples{0, narrow ? 2 : 16};
+    for (const bool vertices : {false, true}) {
+      const TangentBasis basis = vertices ? all_vertices(s.scene) : translation(s.scene);
+      const Renderer renderer(s.scene, gates, options, &basis);
+      const GatedImage adjoint = unit_adjoint(s.scene, gates);
+      std::vector<double> gradient(DofLayout(s.scene).size());
+      for (const Term term : {Term::interior, Term::visibility}) {
+        const Pair pair = measure_pair(
+            rounds, CLOCK_THREAD_CPUTIME_ID,
+            [&] {
+              renderer.add_gradient(term, adjoint, {.seed = 3, .pass = 1}, samples, gradient);
+              return 1.0;
+            },
+            [&] {
+              renderer.render({.seed = 3}, samples);
+              return 1.0;
+            });
+        report.add(std::string(name(term)) + " gradient / render",
+                   s.name + (narrow ? " ellipsoidal" : " standard") +
+                       (vertices ? " all vertices" : " one translation"),
+                   pair.ratio, "", term == Term::interior ? "<= 3" : "");
+      }
+    }
+  }
+}
+
+/// Wall time with one thread over that with two.
+void measure_threads(const NamedScene& s, int rounds, Report& report) {
+  const TangentBasis basis = all_vertices(s.scene);
+  const GateSet gates = wide_gates();
+  const Renderer renderer(s.scene, gates, {.max_bounces = 8, .sampling = Sampling::standard}, &basis);
+  const GatedImage adjoint = unit_adjoint(s.scene, gates);
+  std::vector<double> gradient(DofLayout(s.scene).size());
+  const auto speed_up = [&](const std::function<void()>& work) {
+    const auto with = [&](int threads) {
+      return [&work, threads] {
+        set_thread_count(threads);
+        work();
+        return 1.0;
+      };
+    };
+    return measure_pair(rounds, CLOCK_MONOTONIC, with(1), with(2)).ratio;
+  };
+  const SampleRange samples{0, 64};
+  report.add("one thread / two", s.name + " render", speed_up([&] { renderer.render({.seed = 3}, samples); }),
+             "", ">= 1.9");
+  report.add("one thread / two", s.name + " interior gradient", speed_up([&] {
+               renderer.add_gradient(Term::interior, adjoint, {.seed = 3, .pass = 1}, samples, gradient);
+             }),
+             "", ">= 1.9");
+  set_thread_count(1);
+}
+
+}  // namespace
+}  // namespace isochron::benchmarks
+
+int main(int argc, char** argv) {
+  using namespace isochron::benchmarks;
+  if (argc < 2 || argc > 3) {
+    std::fprintf(stderr, "usage: isochron_measure CSV [ROUNDS]\n");
+    return 2;
+  }
+  const int rounds = argc > 2 ? std::max(std::atoi(argv[2]), 1) : 15;
+  isochron::set_thread_count(1);
+  Report report(argv[1]);
+  const std::vector<NamedScene> scenes{{"small", small_scene()}, {"large", large_scene()}};
+  for (const NamedScene& s : scenes) measure_forward(s, rounds, report);
+  for (const NamedScene& s : scenes) measure_gradient(s, rounds, report);
+  for (const NamedScene& s : scenes) measure_threads(s, rounds, report);
+}
