@@ -114,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"glossy_gaussian_ellipsoidal", true, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 250},
         Case{"glossy_boxcar_ellipsoidal", true, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 400},
         Case{"glossy_truncated_standard", true, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60, 400}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace isochron::testing

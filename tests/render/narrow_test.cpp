@@ -147,7 +147,7 @@ INSTANTIATE_TEST_SUITE_P(
                       std::tuple(Case{"boxcar_narrow", GateShape::boxcar(0.0228), 2e-3}, Sampling::ellipsoidal),
                       std::tuple(Case{"gaussian_wide", GateShape::gaussian(0.1), 5e-4}, Sampling::standard),
                       std::tuple(Case{"boxcar_wide", GateShape::boxcar(0.2), 2e-3}, Sampling::standard)),
-    [](const auto& info) { return std::get<0>(info.param).name; });
+    [](const auto& test) { return std::get<0>(test.param).name; });
 
 }  // namespace
 }  // namespace isochron::testing

@@ -107,7 +107,7 @@ INSTANTIATE_TEST_SUITE_P(
                            GateShape::gaussian(0.3), Sampling::ellipsoidal},
                       Case{"truncated_ellipsoidal", {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
                            GateShape::truncated_gaussian(0.3, 0.3), Sampling::ellipsoidal}),
-    [](const auto& info) { return info.param.kind; });
+    [](const auto& test) { return test.param.kind; });
 
 }  // namespace
 }  // namespace isochron::testing
