@@ -124,7 +124,7 @@ void measure_gradient(const NamedScene& s, int rounds, Report& report) {
     const GateSet gates = narrow ? narrow_gates() : wide_gates();
     const EstimatorOptions options{.max_bounces = 3,
                                    .sampling = narrow ? Sampling::ellipsoidal : Sampling::standard};
-    const SampleRange samples{0, narrow ? 2 : 16};
+    const SampleRange samples{0, narrow ? 4 : 16};
     for (const bool vertices : {false, true}) {
       const TangentBasis basis = vertices ? all_vertices(s.scene) : translation(s.scene);
       const Renderer renderer(s.scene, gates, options, &basis);
@@ -192,5 +192,8 @@ int main(int argc, char** argv) {
   const std::vector<NamedScene> scenes{{"small", small_scene()}, {"large", large_scene()}};
   for (const NamedScene& s : scenes) measure_forward(s, rounds, report);
   for (const NamedScene& s : scenes) measure_gradient(s, rounds, report);
+  // Unlike the figures above, wall times need both cores. The load counts this program itself.
+  if (double load; getloadavg(&load, 1) == 1 && load > 1.5)
+    std::fprintf(stderr, "The machine is busy (load %.1f): the figures for threads are not worth much.\n", load);
   for (const NamedScene& s : scenes) measure_threads(s, rounds, report);
 }
