@@ -16,15 +16,16 @@ struct Mesh {
 };
 
 /// Reads OBJ, OFF, PLY (text or binary) or STL (text or binary), chosen by the file's extension. Vertices and
-/// faces are those of the file, in its order; polygons become fans around their first corner, which is right
-/// where they are convex. Text is read in double precision, binary PLY in float. Throws InputError
+/// faces are those of the file, in its order, manifold or not; polygons become fans around their first
+/// corner, which is right where they are convex, and triangles with a corner twice are left out. Of STL,
+/// vertices at equal positions are one already. Coordinates are rounded to float. Throws InputError
 /// `FILE[:LINE]: what is wrong`.
 Mesh read_mesh(const std::string& file);
 
 /// The mesh on which shapes are built:
 /// - vertices at exactly equal positions (0 and -0 are equal) become one, so that seams of texture
-/// coordinates or normals
-///   are no borders;
+/// coordinates or
+///   normals are no borders;
 /// - degenerate faces (two equal corners, or exactly no area) and repetitions of a face are dropped;
 /// - vertices of no remaining face are dropped; the others are in the order of their first appearance in
 /// `mesh`. Throws InputError when no face is left, or when two faces have the same corners but opposite

@@ -1,45 +1,29 @@
-// What the readers of mesh files share. Text is read here and not by OpenMesh, whose readers turn NaN into
-// zero, skip vertices they cannot read and pass on indices of vertices that do not exist.
+// Meshes are read by OpenMesh (mesh_file.cpp), after a check (mesh_check.cpp) for what OpenMesh would get
+// wrong without saying so: it takes what is not a number for zero, skips vertices, which shifts the indices
+// of those behind, passes on indices of vertices that do not exist, and takes colors or comments for data.
 #pragma once
+#include <array>
+#include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
-
-#include "core/scene/mesh.h"
 
 namespace isochron {
 
-/// Walks through the lines of a text file. Comments (from `comment` to the end of the line) and blank lines
-/// are skipped. Errors name the file and the line, counted from one.
-class LineReader {
- public:
-  LineReader(const std::string& file, std::string_view text, char comment)
-      : file_(file), text_(text), comment_(comment) {}
-
-  bool next();              ///< goes to the next line that is not blank; false at the end
-  void require_next();      ///< as `next`; throws at the end
-  std::string_view word();  ///< the next word of the line; empty at its end
-  double number();          ///< the next word, which must be a finite number
-  long long integer();      ///< the next word, which must be an integer
-  Vec3 point();             ///< the next three numbers
-  int line() const { return line_; }
-  [[noreturn]] void fail(const std::string& what) const;
-
- private:
-  const std::string& file_;
-  std::string_view text_, current_;
-  char comment_;
-  std::size_t at_ = 0;
-  int line_ = 0;
+/// What OpenMesh has to find in a file.
+struct CheckedMeshFile {
+  std::string contents;                  ///< of text only what OpenMesh has to see
+  bool binary = false;                   ///< of PLY or STL
+  std::optional<std::size_t> vertices;   ///< not known of STL: OpenMesh joins equal ones
+  std::optional<std::size_t> triangles;  ///< as of `add_fan`; not known of binary PLY
+  std::optional<std::size_t> polygons;   ///< known of binary PLY
 };
 
-/// Adds a polygon as a fan of triangles.
-void add_polygon(const std::vector<int>& corners, Mesh& mesh);
+/// Checks that every coordinate of a text file or of binary STL is a finite float, and every index of a text
+/// file that of a vertex; of binary PLY only the header. `extension` is ".obj", ".off", ".ply" or ".stl".
+/// Throws InputError `FILE[:LINE]: what is wrong`, with lines counted from one.
+CheckedMeshFile check_mesh_file(const std::string& file, const std::string& extension, std::string contents);
 
-/// A face of `corners` vertices read from the current line, each an index from 0 to `vertices` - 1.
-void read_indexed_face(LineReader& lines, long long corners, std::size_t vertices, Mesh& mesh);
-
-/// Text PLY is read from `contents`, binary PLY by OpenMesh.
-Mesh read_ply(const std::string& file, const std::string& contents);
+/// Appends the fan of triangles around a polygon's first corner, but for those that have a corner twice.
+void add_fan(const std::vector<int>& corners, std::vector<std::array<int, 3>>& triangles);
 
 }  // namespace isochron

@@ -172,9 +172,9 @@ TEST_F(MeshFile, EveryFormatGivesTheSameCube) {
   EXPECT_EQ(chatter.str(), "");
 }
 
-TEST_F(MeshFile, TextIsReadInDoublePrecision) {
+TEST_F(MeshFile, TextIsRoundedToTheNearestFloat) {
   const Mesh mesh = read("m.obj", "v 0.1 +1e-3 -2.5E1\nv 1 0 0 1 0.5 0.5 0.5\nv 0 1 1e-400\nf -3 -2 -1\n");
-  EXPECT_EQ(mesh.positions[0], (Vec3{0.1, 1e-3, -25}));
+  EXPECT_EQ(mesh.positions[0], (Vec3{0.1f, 1e-3f, -25}));
   EXPECT_EQ(mesh.positions[1], (Vec3{1, 0, 0}));
   EXPECT_EQ(mesh.positions[2], (Vec3{0, 1, 0}));
   EXPECT_EQ(mesh.faces, (std::vector<Face>{{0, 1, 2}}));
@@ -185,12 +185,90 @@ TEST_F(MeshFile, PolygonsBecomeFans) {
   EXPECT_EQ(mesh.faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}, {0, 3, 4}}));
 }
 
+TEST_F(MeshFile, CornersTwiceCostNoOtherTriangle) {
+  const std::string points = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  const std::vector<Face> expected{{0, 1, 2}, {0, 1, 3}};
+  EXPECT_EQ(read("m.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 2 3\nf 1 2 4 1\nf 1 1 2\n").faces,
+            expected);
+  EXPECT_EQ(read("m.off", "OFF\n4 3 0\n" + points + "4 0 1 1 2\n4 0 1 3 0\n3 0 0 1\n").faces, expected);
+}
+
+TEST_F(MeshFile, CommentsAndAttributesAreNotTakenForData) {
+  // Each of these makes OpenMesh alone lose or invent faces or vertices.
+  const std::vector<Vec3> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  const std::vector<Face> faces{{0, 1, 2}, {1, 3, 2}};
+  const auto expect_same = [&](const std::string& name, const std::string& contents) {
+    const Mesh mesh = read(name, contents);
+    EXPECT_EQ(mesh.positions, positions) << contents;
+    EXPECT_EQ(mesh.faces, faces) << contents;
+  };
+  expect_same("m.obj",
+              "v 0 0 0\nvt 0.5\nv 1 0 0 # 7\nv 0 1 0\nf 1 2 3 # the 4 th\n\nv 1 1 0\nf -3 4//1 3/1\n");
+  expect_same("m.off",
+              "OFF # a\n# 1\n4 2\n0 0 0\n# 2\n1 0 0\n\n0 1 0\n1 1 0\n3 0 1 2 255 0 0\n3 1 3 2 # 3\n");
+  expect_same("m.off",
+              "CNOFF\n4 2 5\n0 0 0 0 0 1 9 9 9 1\n1 0 0 0 0 1 9 9 9 1\n0 1 0 0 0 1 9 9 9 1\n"
+              "1 1 0 0 0 1 9 9 9 1\n3 0 1 2 0.5 0 0 1\n3 1 3 2\n");
+  expect_same("m.ply",
+              "ply\nformat ascii 1.0\nobj_info x\nelement camera 1\nproperty list int int views\n"
+              "element vertex 4\nproperty int red\nproperty double x\nproperty double y\n"
+              "property double z\nelement face 2\nproperty list uchar float texcoord\n"
+              "property list uchar int vertex_index\nproperty float nx\nend_header\n2 8 9\n0.5 0 0 0\n"
+              "0.5 1 0 0\n1 0 1 0\n1 1 1 0\n6 0 0 1 0 0 1 3 0 1 2 nan\n0 3 1 3 2 0\n");
+  const std::string stl =
+      "solid s\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n\nvertex 1 0 0\nvertex 0 1 0\n"
+      "endloop\nendfacet\nfacet normal nan 0 0\nouter loop\nvertex 1 0 0\nvertex 1 1 0\n"
+      "vertex 0 1 0\nendloop\nendfacet\nendsolid\n";
+  expect_same("m.stl", stl);
+}
+
+TEST_F(MeshFile, MeshesThatAreNoManifoldAreReadAsTheyAre) {
+  // An edge of three faces, a neighbor of opposite orientation, and a face that shares only a vertex. Where
+  // OpenMesh links faces it gives the third, the fourth and the last vertices of their own. The last vertex
+  // has no face.
+  const std::vector<Vec3> positions{{0, 0, 0},   {0, 0, 1}, {1, 0, 0}, {0, 1, 0},
+                                    {-1, -1, 0}, {5, 0, 1}, {5, 1, 1}, {9, 9, 9}};
+  const std::vector<Face> faces{{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {0, 2, 4}, {1, 5, 6}};
+  std::string obj, points, indices, stl = "solid\n";
+  for (const Vec3& p : positions) {
+    points += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+    obj += fmt::format("v {} {} {}\n", p.x, p.y, p.z);
+  }
+  for (const Face& f : faces) {
+    indices += fmt::format("3 {} {} {}\n", f[0], f[1], f[2]);
+    obj += fmt::format("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1);
+    stl += "facet\nouter loop\n";
+    for (const int v : f)
+      stl += fmt::format("vertex {} {} {}\n", positions[v].x, positions[v].y, positions[v].z);
+    stl += "endloop\nendfacet\n";
+  }
+  const std::string counts = fmt::format("OFF\n{} {} 0\n", positions.size(), faces.size());
+  const std::string header = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+      "property float z\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+      positions.size(), faces.size());
+  const Mesh meshes[] = {read("m.obj", obj), read("m.off", counts + points + indices),
+                         read("m.ply", header + points + indices), read("m.stl", stl)};
+  for (const Mesh& mesh : meshes) {
+    const bool soup = &mesh == &meshes[3];  // holds no vertices without faces
+    EXPECT_EQ(mesh.positions.size(), positions.size() - soup);
+    EXPECT_EQ(mesh.faces, faces);
+    const Mesh clean = clean_mesh(mesh);
+    EXPECT_EQ(clean.positions, std::vector<Vec3>(positions.begin(), positions.end() - 1));
+    EXPECT_EQ(clean.faces, faces);
+    EXPECT_EQ(error_of([&] { build_edges(clean); }),
+              "the edge from (0, 0, 0) to (0, 0, 1) has 3 faces (at most two are allowed)");
+  }
+}
+
 TEST_F(MeshFile, ObjErrors) {
   const std::string three = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
   EXPECT_EQ(error("m.obj", "v 0 0\n"), "m.obj:1: '' is not a finite number");
   EXPECT_EQ(error("m.obj", "# c\n\nv 0 inf 0\n"), "m.obj:3: 'inf' is not a finite number");
   EXPECT_EQ(error("m.obj", "v 0 1e999 0\n"), "m.obj:1: '1e999' is not a finite number");
   EXPECT_EQ(error("m.obj", "v 0 0.1x 0\n"), "m.obj:1: '0.1x' is not a finite number");
+  EXPECT_EQ(error("m.obj", "v 0 0x1 0\n"), "m.obj:1: '0x1' is not a finite number");
+  EXPECT_EQ(error("m.obj", "v 0 1e39 0\n"), "m.obj:1: '1e39' is not a finite number");
   EXPECT_EQ(error("m.obj", three + "f 1 2\n"), "m.obj:4: a face of 2 vertices (at least three)");
   EXPECT_EQ(error("m.obj", three + "f 0 1 2\n"),
             "m.obj:4: '0' is not a vertex of a face (an index from 1, or from -1 down to -3)");
