@@ -1,0 +1,90 @@
+// Cost of one unit of precision against gate width: isochron_gate_width CSV [BATCHES]. For the cube of
+// experiments/cube.yaml (direct light dominates) and the reference box (diffuse, with shadow edges), gaussian gates
+// from 10 % to 0.1 % of the path: variance of the mean image or of its derivative by a vertical motion, times the CPU
+// seconds spent. Lower is better; standard against ellipsoidal sampling,
+// coupled and uncoupled.
+#include <time.h>
+
+#include <cstdio>
+#include <cstdlib>
+
+#include "tests/render/support.h"
+
+namespace isochron::benchmarks {
+namespace {
+
+using testing::Estimate;
+
+double cpu_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+struct Setting {
+  const char* name;
+  std::string file;
+  const char* moving;
+  double center;
+  int max_bounces;
+  int samples;  ///< per pixel and batch, standard sampling
+};
+
+struct Method {
+  const char* name;
+  Sampling sampling;
+  bool antithetic;
+};
+
+void measure(const Setting& setting, int batches, std::FILE* csv) {
+  const Scene scene = load_scene(setting.file);
+  const TangentBasis basis = testing::make_basis(scene, {testing::translate(scene, setting.moving, {0, 1, 0})});
+  for (const double width : {0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001}) {
+    const GateSet gates(GateShape::gaussian(width * setting.center), {setting.center});
+    for (const Method& method : {Method{"standard", Sampling::standard, true},
+                                 Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
+                                 Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true}}) {
+      EstimatorOptions options;
+      options.max_bounces = setting.max_bounces;
+      options.sampling = method.sampling;
+      options.antithetic = method.antithetic;
+      const Renderer renderer(scene, gates, options, &basis);
+      const int samples = method.sampling == Sampling::standard ? setting.samples : (setting.samples + 3) / 4;
+      const auto report = [&](const char* quantity, auto&& estimate) {
+        const double start = cpu_seconds();
+        const Estimate e = estimate();
+        const double cost = e.standard_error * e.standard_error * (cpu_seconds() - start);
+        std::fprintf(csv, "%s,%g,\"%s\",%s,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity, e.mean,
+                     e.standard_error, cost);
+        std::printf("%-5s %6g  %-28s %-9s mean % .4e +- %.1e   variance x seconds %.2e\n", setting.name, width,
+                    method.name, quantity, e.mean, e.standard_error, cost);
+      };
+      report("image", [&] { return testing::image_means(renderer, 1, samples, batches, {1, 0, 0})[0]; });
+      report("interior",
+             [&] { return testing::term_means(renderer, Term::interior, 1, 1, samples, batches, {1, 0, 0})[0][0]; });
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isochron::benchmarks
+
+int main(int argc, char** argv) {
+  using namespace isochron::benchmarks;
+  if (argc < 2 || argc > 3) {
+    std::fprintf(stderr, "usage: isochron_gate_width CSV [BATCHES]\n");
+    return 2;
+  }
+  const int batches = argc == 3 ? std::max(2, std::atoi(argv[2])) : 64;
+  std::FILE* csv = std::fopen(argv[1], "w");
+  if (!csv) {
+    std::fprintf(stderr, "isochron_gate_width: cannot write %s\n", argv[1]);
+    return 1;
+  }
+  std::fprintf(csv, "scene,relative_width,method,quantity,mean,standard_error,variance_seconds\n");
+  isochron::set_thread_count(1);
+  measure({"cube", PROJECT_ROOT "/scenes/cube/scene.yaml", "cube", 5.4, 4, 4}, batches, csv);
+  measure({"box", PROJECT_ROOT "/tests/data/reference/scene.yaml", "block", 6.0, 3, 16}, batches, csv);
+  std::fclose(csv);
+  return 0;
+}
