@@ -24,8 +24,7 @@ Mesh read_mesh(const std::string& file);
 
 /// The mesh on which shapes are built:
 /// - vertices at exactly equal positions (0 and -0 are equal) become one, so that seams of texture
-/// coordinates or
-///   normals are no borders;
+///   coordinates or normals are no borders;
 /// - degenerate faces (two equal corners, or exactly no area) and repetitions of a face are dropped;
 /// - vertices of no remaining face are dropped; the others are in the order of their first appearance in
 /// `mesh`. Throws InputError when no face is left, or when two faces have the same corners but opposite
