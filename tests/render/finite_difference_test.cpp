@@ -3,8 +3,8 @@
 //
 // Statistics: 2 gates x 7 or 8 parameters per case, each a z-test at 4 standard errors of the difference (false
 // alarms: 16 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below 5 % of the
-// derivative's scale: the terms' root mean square over gates and over all motions, which have comparable speeds; over
-// gates for a material's parameter. The steps are small enough that their bias, of second order, stays below that.
+// derivative's scale (15 % in the glossy scene): the terms' root mean square over gates and over all motions, which have
+// comparable speeds; over gates for a material's parameter. The steps are small enough that their bias, of second order, stays below that.
 // ISOCHRON_TEST_SAMPLES=16 in the environment takes 16 times the samples, for errors four times smaller.
 #include <gtest/gtest.h>
 
@@ -34,7 +34,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
       Material& m = scene.materials[scene.find_material(name)];
       m.type = MaterialType::rough_conductor;
       m.albedo = Rgb(0.9);
-      m.roughness = 0.3;
+      m.roughness = 0.5;
     }
   const Vec3 corner = scene.positions[scene.shapes[scene.find_shape("block")].first_vertex + 2];
   const Vec3 middle = scene.positions[scene.shapes[scene.find_shape("panel")].first_vertex + 4];
@@ -97,7 +97,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
       EXPECT_LT(std::abs(z_score(total, difference[g])), 4)
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
-      EXPECT_LT(error, 0.05 / std::sqrt(factor) * scale)
+      EXPECT_LT(error, (c.glossy ? 0.15 : 0.05) / std::sqrt(factor) * scale)
           << parameters[p].name << ", gate " << g << ": ours " << total.standard_error << ", finite difference "
           << difference[g].standard_error;
     }

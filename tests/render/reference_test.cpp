@@ -4,7 +4,7 @@
 //
 // Statistics: 9 gates x 2 parameters x 5 rows per sampling, each a z-test at 4 standard errors of the difference
 // (ours and the reference's): false alarms 90 x 6e-5 = 0.6 % per sampling if all were independent; seeds are fixed.
-// The standard error must be below 2 % of the derivative's scale (the terms' root mean square over the gates; 3 % for
+// The standard error must be below 4 % of the derivative's scale (the terms' root mean square over the gates; 6 % for
 // the ellipsoidal runs, which have fewer samples), so that a flipped sign, a dropped term or a factor of two in any
 // term that matters fails.
 #include <gtest/gtest.h>
@@ -90,7 +90,7 @@ TEST_P(Reference, EveryTerm) {
       agrees("path_length", length, row.at("path_length"));
       const Estimate total = sum(sum(in, vis), length);
       agrees("total", total, row.at("total"));
-      EXPECT_LT(total.standard_error, (standard ? 0.02 : 0.03) * scale) << c.names[g] << " parameter " << p;
+      EXPECT_LT(total.standard_error, (standard ? 0.04 : 0.06) * scale) << c.names[g] << " parameter " << p;
     }
   }
 }
