@@ -19,6 +19,7 @@ int thread_count = 0;
 /// Work is cut into strands, each worked through in order with accumulators of its own, and merged in order: results
 /// do not depend on which thread takes which strand. Their number depends on the accumulators' size alone.
 constexpr int kMostStrands = 32, kFewestStrands = 8;
+constexpr int kSharedStrands = 256;  // where strands need no accumulators of their own
 constexpr std::size_t kStrandBudget = std::size_t{512} << 20;  // bytes, all strands together
 constexpr int kPixelsPerBlock = 8;
 
@@ -175,7 +176,7 @@ GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   if (impl_->scene.emitters.empty()) return image;  // no lamp, or one that the parameters have flattened
   // Standard sampling adds to a path's own pixel alone, so that strands can share the image.
   const bool shared = !impl_->ellipsoidal;
-  const int strands = shared ? kMostStrands : strand_count(image.data.size());
+  const int strands = shared ? kSharedStrands : strand_count(image.data.size());
   std::vector<std::vector<double>> films(shared ? 0 : strands);
   parallel(strands, [&](int strand) {
     GatedImage own;
