@@ -12,7 +12,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-TITLES = {"image": "gated image", "interior": "interior derivative, vertical motion"}
+TITLES = {"image": "gated image", "interior": "interior derivative"}
 SCENES = {"cube": "glossy cube", "box": "diffuse box with shadows"}
 STYLES = {"standard": "C3o-", "ellipsoidal, uncoupled": "C1s-", "ellipsoidal, coupled pairs": "C0D-"}
 
@@ -23,7 +23,7 @@ def main():
     with open(sys.argv[1], newline="") as file:
         rows = list(csv.DictReader(file))
     figure, axes = plt.subplots(len(SCENES), len(TITLES), figsize=(11, 8), sharex=True, constrained_layout=True)
-    figure.suptitle("What one unit of precision costs as gates get narrower")
+    figure.suptitle("What precision costs as gates get narrower (mean over the image; derivative by a vertical motion)")
     for line, (scene, scene_title) in zip(axes, SCENES.items()):
         for axis, (quantity, title) in zip(line, TITLES.items()):
             for method, style in STYLES.items():
@@ -34,7 +34,7 @@ def main():
                     label = "ellipsoidal" if quantity == "image" and method != "standard" else method
                     axis.loglog(*zip(*points), style, markersize=5, label=label)
             axis.set_title(f"{scene_title}: {title}")
-            axis.set_ylabel("variance x CPU seconds (squared units of the mean)")
+            axis.set_ylabel("variance x CPU seconds")
             axis.grid(True, which="both", alpha=0.2)
             axis.legend()
     for axis in axes[-1]:
