@@ -50,17 +50,8 @@ class EllipsoidalConnections {
         connect_emitter(target, pixel, throughput * scale, rng);
         if (bounce < max_bounces) connect_surface(target, pixel, throughput * scale, rng);
       }
-      if (!reachable || bounce == max_bounces) return;
-      const SurfacePoint x = path.back();
-      const Material& material = scene_.material_of(x.triangle);
-      const double v0 = rng.uniform(), v1 = rng.uniform();
-      const auto next = sample_direction(material, x.n, normalize(path.vertex[path.size() - 2].p - x.p), v0, v1);
-      if (!next) return;
-      throughput *= material.albedo * next->weight;
-      if (throughput.is_black() || !survives(throughput, bounce, rng)) return;
-      const auto hit = worker_.trace(x, next->direction);
-      if (!hit) return;
-      path.push(scene_, *hit);
+      if (!reachable || bounce == max_bounces || !survives(throughput, bounce, rng)) return;
+      if (!extend(worker_, path, throughput, rng)) return;
     }
   }
 

@@ -67,17 +67,8 @@ class SecondaryBoundary {
       if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
       connect_edge(pixel, throughput * scale, rng);
       if (narrow_gates_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
-      const SurfacePoint x = path.back();
-      const Material& material = scene_.material_of(x.triangle);
-      const Vec3 w_o = normalize(path.vertex[path.size() - 2].p - x.p);
-      const double v0 = rng.uniform(), v1 = rng.uniform();
-      const auto next = sample_direction(material, x.n, w_o, v0, v1);
-      if (!next || bounce == worker_.options.max_bounces) return;
-      throughput *= material.albedo * next->weight;
-      if (throughput.is_black() || !survives(throughput, bounce, rng)) return;
-      const auto hit = worker_.trace(x, next->direction);
-      if (!hit) return;
-      path.push(scene_, *hit);
+      if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
+      if (!extend(worker_, path, throughput, rng)) return;
     }
   }
 
@@ -212,18 +203,13 @@ class SecondaryBoundary {
                                   walked + distance, camera_over_edge(g, camera_side_, bounce)});
         }
       }
-      if (bounce == worker_.options.max_bounces) return;
-      const double v0 = rng.uniform(), v1 = rng.uniform();
-      const auto next = sample_direction(material, x.n, from, v0, v1);
+      if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
+      const auto next = step(worker_, x, from, throughput, rng);
       if (!next) return;
-      throughput *= material.albedo * next->weight;
-      if (throughput.is_black() || !survives(throughput, bounce, rng)) return;
-      const auto hit = worker_.trace(x, next->direction);
-      if (!hit) return;
       from = -next->direction;
-      walked += length(hit->p - x.p);
-      if (walked + g.r_d + g.r_s + length(hit->p - camera.position) > worker_.gates.upper()) return;
-      walk_.push_back(*hit);
+      walked += length(next->point.p - x.p);
+      if (walked + g.r_d + g.r_s + length(next->point.p - camera.position) > worker_.gates.upper()) return;
+      walk_.push_back(next->point);
     }
   }
 

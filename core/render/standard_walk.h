@@ -56,19 +56,14 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
     }
 
     // BSDF sampling.
-    const double v0 = rng.uniform(), v1 = rng.uniform();
-    const auto next = sample_direction(material, x.n, w_o, v0, v1);
+    const auto next = step(worker, x, w_o, throughput, rng);
     if (!next) break;
-    throughput *= material.albedo * next->weight;
-    if (throughput.is_black()) break;
-    const auto hit = worker.trace(x, next->direction);
-    if (!hit) break;
     w_o = -next->direction;
-    distance_o = length(hit->p - x.p);
-    path.push(scene, *hit, distance_o);
-    if (scene.emits(hit->triangle)) {
-      const double pdf_bsdf = next->pdf * std::abs(dot(hit->n, w_o)) / (distance_o * distance_o);
-      seen_emission(pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(hit->triangle)));
+    distance_o = length(next->point.p - x.p);
+    path.push(scene, next->point, distance_o);
+    if (scene.emits(next->point.triangle)) {
+      const double pdf_bsdf = next->pdf * std::abs(dot(next->point.n, w_o)) / (distance_o * distance_o);
+      seen_emission(pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(next->point.triangle)));
     }
     if (bounce < max_bounces && !survives(throughput, bounce, rng)) break;
   }

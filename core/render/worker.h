@@ -71,6 +71,35 @@ struct Worker {
   }
 };
 
+struct Step {
+  SurfacePoint point;
+  Vec3 direction;  ///< unit, from the vertex before to the point
+  double pdf;      ///< per solid angle
+};
+
+/// Goes on from x, which looks back along the unit vector w_o, by BSDF sampling. Empty when the walk ends.
+template <class W>
+std::optional<Step> step(W& worker, const SurfacePoint& x, const Vec3& w_o, Rgb& throughput, Rng& rng) {
+  const Material& material = worker.scene.material_of(x.triangle);
+  const double u0 = rng.uniform(), u1 = rng.uniform();
+  const auto next = sample_direction(material, x.n, w_o, u0, u1);
+  if (!next) return std::nullopt;
+  throughput *= material.albedo * next->weight;
+  if (throughput.is_black()) return std::nullopt;
+  const auto hit = worker.trace(x, next->direction);
+  if (!hit) return std::nullopt;
+  return Step{*hit, next->direction, next->pdf};
+}
+
+/// The same from the last vertex of a path, which grows by the new point.
+template <class W>
+bool extend(W& worker, Path& path, Rgb& throughput, Rng& rng) {
+  const SurfacePoint x = path.back();
+  const auto next = step(worker, x, normalize(path.vertex[path.size() - 2].p - x.p), throughput, rng);
+  if (next) path.push(worker.scene, next->point);
+  return next.has_value();
+}
+
 /// Counts towards Russian roulette from this bounce on.
 inline constexpr int kRouletteBounce = 3;
 
