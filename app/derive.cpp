@@ -7,7 +7,6 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "core/image/image.h"
-#include "core/math/error.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 
@@ -22,21 +21,6 @@ struct DeriveCommand {
 /// Images held at a time; more unknowns are done in groups, each with the same random numbers.
 constexpr double kMostBytes = 1e9;
 
-/// Unknowns [begin, begin + count) that --parameter names.
-Parameters::Block chosen(const Parameters& parameters, const std::string& name) {
-  if (name.empty()) return {"", 0, parameters.size()};
-  std::string known;
-  for (const Parameters::Block& block : parameters.blocks()) {
-    if (block.name == name) return block;
-    known += (known.empty() ? "" : ", ") + block.name;
-  }
-  const auto& names = parameters.component_names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    throw InputError(fmt::format("--parameter {}: there is no such parameter (allowed: {})", name, known));
-  return {name, static_cast<int>(found - names.begin()), 1};
-}
-
 int derive(const DeriveCommand& command) {
   begin_session(command.common);
   const Problem problem(read_experiment(command.common));
@@ -44,7 +28,7 @@ int derive(const DeriveCommand& command) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta =
       parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
-  const Parameters::Block block = chosen(parameters, command.parameter);
+  const Parameters::Block block = chosen_parameter(parameters, command.parameter);
   const std::string folder = output_folder(command.common, problem.experiment());
   make_output_folder(folder);
   catch_interrupts();
@@ -83,8 +67,7 @@ void add_derive(CLI::App& app, Action& action) {
   auto command = std::make_shared<DeriveCommand>();
   CLI::App* sub = app.add_subcommand("derive", "Render derivative images, term by term");
   add_experiment_options(*sub, command->common);
-  sub->add_option("--parameter", command->parameter, "only this parameter (NAME or NAME[INDEX]); default all")
-      ->type_name("NAME");
+  add_parameter_option(*sub, command->parameter);
   sub->footer(
       "Examples:\n"
       "  isochron derive cube.yaml --samples 256\n"

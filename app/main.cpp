@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
   isochron::add_render(app, action);
   isochron::add_derive(app, action);
   isochron::add_gradient(app, action);
+  isochron::add_check(app, action);
   try {
     app.parse(argc, argv);
     return action();

@@ -1,10 +1,13 @@
 #include "app/options.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <limits>
 #include <thread>
 
+#include "core/math/error.h"
 #include "core/render/renderer.h"
 
 namespace isochron {
@@ -57,6 +60,25 @@ Experiment read_experiment(const CommonOptions& options) {
 
 std::string output_folder(const CommonOptions& options, const Experiment& experiment) {
   return options.output.empty() ? "runs/" + experiment.name : options.output;
+}
+
+void add_parameter_option(CLI::App& command, std::string& name) {
+  command.add_option("--parameter", name, "only this parameter (NAME or NAME[INDEX]); default all")
+      ->type_name("NAME");
+}
+
+Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name) {
+  if (name.empty()) return {"", 0, parameters.size()};
+  std::string known;
+  for (const Parameters::Block& block : parameters.blocks()) {
+    if (block.name == name) return block;
+    known += (known.empty() ? "" : ", ") + block.name;
+  }
+  const auto& names = parameters.component_names();
+  const auto found = std::find(names.begin(), names.end(), name);
+  if (found == names.end())
+    throw InputError(fmt::format("--parameter {}: there is no such parameter (allowed: {})", name, known));
+  return {name, static_cast<int>(found - names.begin()), 1};
 }
 
 int thread_count(const CommonOptions& options) {

@@ -41,6 +41,11 @@ Experiment read_experiment(const CommonOptions& options);
 /// The -o folder or runs/NAME.
 std::string output_folder(const CommonOptions& options, const Experiment& experiment);
 
+/// --parameter, of the commands that can look at one parameter alone.
+void add_parameter_option(CLI::App& command, std::string& name);
+/// Unknowns [begin, begin + count) that --parameter names; all for an empty name. Throws InputError.
+Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name);
+
 /// Number of threads that renderers use.
 int thread_count(const CommonOptions& options);
 

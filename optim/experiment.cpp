@@ -238,8 +238,10 @@ void read_settings(YamlMap& map, Experiment& experiment) {
     if (const auto method = gradient.find("method"))
       experiment.gradient.method =
           static_cast<GradientMethod>(method->choice({"analytic", "finite_difference"}));
-    if (const auto step = gradient.find("step"))
+    if (const auto step = gradient.find("step")) {
       experiment.gradient.step = step->number(NumberRange::positive());
+      experiment.gradient.step_given = true;
+    }
     gradient.reject_unknown();
   }
   if (const auto value = map.find("optimizer")) {

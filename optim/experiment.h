@@ -94,6 +94,7 @@ enum class GradientMethod { analytic, finite_difference };
 struct GradientSpec {
   GradientMethod method = GradientMethod::analytic;
   double step = 0.01;  ///< finite_difference: half the distance of the two images, in units of the parameter
+  bool step_given = false;  ///< whether the file gives it
 };
 
 struct OptimizerSpec {

@@ -102,9 +102,10 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
                  e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
   fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n",
                  kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic);
-  fmt::format_to(out, "gradient:\n  method: {}\n  step: {}\n",
-                 e.gradient.method == GradientMethod::analytic ? "analytic" : "finite_difference",
-                 e.gradient.step);
+  const bool analytic = e.gradient.method == GradientMethod::analytic;
+  fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
+  // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.
+  if (!analytic || e.gradient.step_given) fmt::format_to(out, "  step: {}\n", e.gradient.step);
   fmt::format_to(out, "optimizer:\n  method: adam\n  learning_rate: {}\n  iterations: {}\n  tolerance: {}\n",
                  e.optimizer.learning_rate, e.optimizer.iterations, e.optimizer.tolerance);
   fmt::format_to(out, "seed: {}\n", e.seed);

@@ -131,7 +131,7 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
 }
 
 TEST_F(Program, HelpShowsExamples) {
-  for (const char* command : {"run", "resume", "render", "derive", "gradient"}) {
+  for (const char* command : {"run", "resume", "render", "derive", "gradient", "check"}) {
     EXPECT_EQ(run({command, "--help"}).status, 0);
     EXPECT_NE(folder_.read("stdout").find(std::string("  isochron ") + command), std::string::npos);
   }
@@ -161,6 +161,23 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   const std::string cost = folder_.read("out/gradient.yaml");
   for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"})
     EXPECT_NE(cost.find(key), std::string::npos);
+}
+
+TEST_F(Program, CheckAgreesWithFiniteDifferences) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  // False alarm: 1 %, seed fixed.
+  const Result result = run({"check", file, "-o", out, "--samples", "256"});
+  EXPECT_EQ(result.status, 0) << result.errors << folder_.read("stdout");
+  const std::string table = folder_.read("out/check.csv");
+  EXPECT_EQ(table.rfind("parameter,gate,interior,visibility,path_length,total,standard_error,"
+                        "finite_difference,finite_difference_error,z\nheight,0,",
+                        0),
+            0u);
+  EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 5);
+  EXPECT_EQ(std::count(table.begin(), table.end(), ','), 5 * 9);
+  EXPECT_NE(folder_.read("stdout").find("0 of 4 differ"), std::string::npos);
+  ASSERT_EQ(run({"check", file, "-o", out, "--samples", "256", "--parameter", "power"}).status, 0);
+  EXPECT_EQ(folder_.read("out/check.csv").find("height"), std::string::npos);
 }
 
 TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {

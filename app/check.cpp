@@ -1,0 +1,106 @@
+#include "optim/check.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+struct CheckCommand {
+  CommonOptions common;
+  std::string parameter;  ///< empty: all
+};
+
+/// Components of one parameter that are looked at; more of them are thinned out evenly.
+constexpr int kMostComponents = 32;
+
+std::vector<int> components_to_check(const Parameters& parameters, const Parameters::Block& chosen) {
+  std::vector<int> components;
+  for (const Parameters::Block& block : parameters.blocks()) {
+    const int begin = std::max(block.begin, chosen.begin);
+    const int count = std::min(block.begin + block.count, chosen.begin + chosen.count) - begin;
+    const int kept = std::min(count, kMostComponents);
+    if (kept < count) fmt::print("{}: {} of {} components, evenly spread\n", block.name, kept, count);
+    for (int i = 0; i < kept; ++i)
+      components.push_back(begin + static_cast<int>(static_cast<long long>(count) * i / kept));
+  }
+  return components;
+}
+
+void print_table(const std::vector<Comparison>& table, double limit) {
+  std::size_t width = std::string_view("parameter").size();
+  for (const Comparison& row : table) width = std::max(width, row.parameter.size());
+  fmt::print("{:<{}} {:>4} {:>11} {:>11} {:>11} {:>23} {:>23} {:>7}  verdict\n", "parameter", width, "gate",
+             "interior", "visibility", "path_length", "total +- se", "finite diff. +- se", "z");
+  for (const Comparison& row : table)
+    fmt::print(
+        "{:<{}} {:>4} {:>11.4g} {:>11.4g} {:>11.4g} {:>11.4g} +- {:>8.2g} {:>11.4g} +- {:>8.2g} "
+        "{:>7.2f}  {}\n",
+        row.parameter, width, row.gate, row.terms[0], row.terms[1], row.terms[2], row.total,
+        row.standard_error, row.finite_difference, row.finite_difference_error, row.z,
+        disagreements({row}, limit).empty() ? "ok" : "DIFFERS");
+}
+
+int check(const CheckCommand& command) {
+  begin_session(command.common);
+  std::vector<std::string> notes;
+  const Problem problem(check_experiment(read_experiment(command.common), notes));
+  problem.require_parameters();
+  const Parameters& parameters = problem.parameters();
+  const std::vector<double> theta =
+      parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
+  const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
+  const std::string folder = output_folder(command.common, problem.experiment());
+  make_output_folder(folder);
+  catch_interrupts();
+  for (const std::string& note : notes) fmt::print("{}\n", note);
+  const std::vector<int> components = components_to_check(parameters, chosen);
+  for (int component : components)
+    check_step(problem, theta, component);  // fails before anything is rendered
+
+  std::vector<Comparison> table;
+  for (int component : components) {
+    const auto rows = check_derivative(problem, theta, component, poll_interrupt);
+    table.insert(table.end(), rows.begin(), rows.end());
+  }
+  const int comparisons = static_cast<int>(table.size());
+  const double limit = false_alarm_limit(comparisons, check_batches(problem) - 1);
+  print_table(table, limit);
+  const std::size_t wrong = disagreements(table, limit).size();
+  fmt::print("{} of {} differ; limit |z| = {:.2f} (1 % chance of a false alarm in the whole table)\n", wrong,
+             comparisons, limit);
+  if (wrong > 0)
+    fmt::print(
+        "Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
+  write_file_atomically(folder + "/check.csv", check_csv(table));
+  spdlog::info("wrote {}/check.csv", folder);
+  return wrong == 0 ? 0 : 1;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, Action& action) {
+  auto command = std::make_shared<CheckCommand>();
+  CLI::App* sub = app.add_subcommand(
+      "check", "Compare the derivatives with finite differences; exit status 1 if they differ");
+  add_experiment_options(*sub, command->common);
+  add_parameter_option(*sub, command->parameter);
+  sub->footer(
+      "Every term takes the same number of samples: --samples, else the largest of the experiment.\n"
+      "gradient.step is the largest of the three steps; without it, one that suits scene, gates and value.\n"
+      "Examples:\n"
+      "  isochron check cube.yaml --samples 64\n"
+      "  isochron check cube.yaml --parameter height --at height=0.1 -o check\n"
+      "  isochron check cube.yaml --set gradient.step=0.02");
+  sub->callback([&action, command] { action = [command] { return check(*command); }; });
+}
+
+}  // namespace isochron

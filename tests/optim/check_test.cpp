@@ -1,0 +1,105 @@
+// The comparison of derivatives with finite differences: its numbers, and that it sees a wrong derivative.
+#include "optim/check.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/optim/tiny_scene.h"
+
+namespace isochron {
+namespace {
+
+TEST(Check, LimitIsStudentsQuantile) {
+  // Two-sided quantiles of published tables, to the digits given there.
+  EXPECT_NEAR(false_alarm_limit(1, 1), 63.657, 5e-4);
+  EXPECT_NEAR(false_alarm_limit(1, 2), 9.925, 5e-4);
+  EXPECT_NEAR(false_alarm_limit(1, 3), 5.841, 5e-4);
+  EXPECT_NEAR(false_alarm_limit(1, 30), 2.750, 5e-4);
+  EXPECT_NEAR(false_alarm_limit(10, 30), 3.646, 5e-4);
+  EXPECT_NEAR(false_alarm_limit(5, 31, 0.25), 2.040, 5e-4);
+}
+
+TEST(Check, ExtrapolationIsExactForSixthDegree) {
+  const auto f = [](double x) { return 3 + x * (0.7 + x * (1 + x * (-2 + x * (5 + x * (4 + x * 6))))); };
+  const auto central = [&](double h) { return (f(h) - f(-h)) / (2 * h); };
+  EXPECT_NEAR(extrapolate(central(0.5), central(0.25), central(0.125)), 0.7, 1e-14);
+}
+
+class CheckTiny : public testing::Test {
+ protected:
+  CheckTiny() {
+    write_tiny_scene(folder_);
+    file_ = folder_.write("tiny.yaml", tiny_experiment());
+  }
+  TemporaryFolder folder_;
+  std::string file_;
+};
+
+TEST_F(CheckTiny, SeesAFactorOfTwoAndAMissingTerm) {
+  std::vector<std::string> notes;
+  const Problem problem(check_experiment(
+      load_experiment(file_, {"samples={primal: 65536, interior: 16, visibility: 0, path_length: 0}"}),
+      notes));
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("visibility"), std::string::npos);
+  EXPECT_EQ(problem.experiment().samples.interior, 65536);
+  EXPECT_EQ(problem.experiment().samples.path_length, 0);  // a gaussian has no jumps
+  std::vector<Comparison> table;
+  for (int component : {0, 1})
+    for (const Comparison& row : check_derivative(problem, problem.parameters().initial(), component, [] {}))
+      table.push_back(row);
+  ASSERT_EQ(table.size(), 4u);
+  const double limit = false_alarm_limit(4, check_batches(problem) - 1);
+  EXPECT_TRUE(disagreements(table, limit).empty());  // false alarm: 1 %, seed fixed
+  EXPECT_NE(table[0].terms[1], 0);
+  for (const Comparison& row : table) {
+    EXPECT_NEAR(row.total, row.terms[0] + row.terms[1] + row.terms[2], 1e-12 * std::abs(row.total));
+    const auto differs = [&](double total) {
+      Comparison wrong = row;
+      wrong.z = z_score(total, row.standard_error, row.finite_difference, row.finite_difference_error);
+      return disagreements({wrong}, limit).size() == 1;
+    };
+    EXPECT_TRUE(differs(2 * row.total)) << row.parameter << " gate " << row.gate;
+    EXPECT_TRUE(differs(-row.total)) << row.parameter << " gate " << row.gate;
+    if (row.parameter == "height") {
+      EXPECT_TRUE(differs(row.terms[0])) << "visibility left out";
+    }
+    EXPECT_FALSE(differs(row.total));
+  }
+}
+
+TEST_F(CheckTiny, NumbersWithoutErrorOrValue) {
+  EXPECT_EQ(z_score(0, 0, 0, 0), 0);
+  EXPECT_EQ(z_score(3, 3, -2, 4), 1);
+  Comparison row;
+  row.z = z_score(1, 0, 2, 0);
+  EXPECT_EQ(disagreements({row}, 4).size(), 1u);
+  row.z = std::nan("");
+  EXPECT_EQ(disagreements({row}, 4).size(), 1u);
+}
+
+TEST_F(CheckTiny, TermsAndStepsFollowTheExperiment) {
+  std::vector<std::string> notes;
+  const Problem boxcar(
+      check_experiment(load_experiment(file_, {"gates={kind: boxcar, centers: [4.5], width: 0.6}"}), notes));
+  EXPECT_EQ(boxcar.experiment().samples.path_length, 16);
+  EXPECT_EQ(notes.size(), 1u);
+  const std::vector<double> theta = boxcar.parameters().initial();
+  // The scene's box is 4 x 2 x 4: its diagonal is 6.
+  EXPECT_NEAR(check_step(boxcar, theta, 0), 0.06, 1e-12);
+  EXPECT_NEAR(check_step(boxcar, theta, 1), 0.05 * 8, 1e-12);
+  const Problem given(check_experiment(load_experiment(file_, {"gradient={step: 0.02}"}), notes));
+  EXPECT_EQ(check_step(given, theta, 0), 0.02);
+  EXPECT_EQ(check_step(given, theta, 1), 0.02);
+  const Problem narrow(check_experiment(
+      load_experiment(file_, {"gates.sigma=0.01", "parameters[0].direction=[0, 2, 0]"}), notes));
+  EXPECT_NEAR(check_step(narrow, theta, 0), 0.0025, 1e-12);
+  EXPECT_THROW(check_experiment(load_experiment(file_, {"samples={primal: 1, interior: 1, visibility: 1, "
+                                                        "path_length: 1}"}),
+                                notes),
+               std::runtime_error);
+}
+
+}  // namespace
+}  // namespace isochron
