@@ -7,9 +7,9 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import cube
+from scenes import bunny, cube, tree
 
-SCENES = {"cube": cube.write}
+SCENES = {"bunny": bunny.write, "cube": cube.write, "tree": tree.write}
 
 
 def main(arguments):

@@ -33,6 +33,57 @@ def rotate_y(mesh, degrees):
     return vertices @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T, triangles
 
 
+def rotate_z(mesh, degrees):
+    """Turned about the z axis through the origin, by the right-hand rule: x towards y."""
+    vertices, triangles = mesh
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return vertices @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T, triangles
+
+
+def rounded(mesh):
+    """Coordinates rounded to 1e-5: the last bits of another processor's arithmetic do not show."""
+    vertices, triangles = mesh
+    return np.round(vertices, 5), triangles
+
+
+def prism(sides, rings):
+    """A closed solid of revolution with few sides around the vertical. rings: (height, radius, x, z), upwards; x and
+    z shift the ring's centre."""
+    angles = 2 * np.pi * np.arange(sides) / sides
+    circle = np.stack([np.cos(angles), np.zeros(sides), -np.sin(angles)], 1)
+    vertices = np.concatenate([circle * r + (x, y, z) for y, r, x, z in rings])
+    last = sides * (len(rings) - 1)
+    triangles = [(0, i + 1, i) for i in range(1, sides - 1)] + [(last, last + i, last + i + 1) for i in range(1, sides - 1)]
+    for start in range(0, last, sides):
+        for i in range(sides):
+            a, b = start + i, start + (i + 1) % sides
+            triangles += [(a, b, b + sides), (a, b + sides, a + sides)]
+    return vertices, np.array(triangles)
+
+
+def icosphere():
+    """A unit icosahedron with every face cut into four: 42 vertices, 80 triangles, outwards."""
+    g = 0.5 * (1 + 5**0.5)
+    corners = [(x, y, 0) for y in (-g, g) for x in (-1, 1)]
+    vertices = np.array([np.roll(c, k) for k in range(3) for c in corners], dtype=float)
+    near = lambda i, j: i != j and ((vertices[i] - vertices[j]) ** 2).sum() < 5  # edges have the length 2
+    faces = [(i, j, k) for i in range(12) for j in range(i + 1, 12) for k in range(j + 1, 12)
+             if near(i, j) and near(j, k) and near(i, k)]
+    middles = {}
+
+    def middle(i, j):
+        return middles.setdefault((min(i, j), max(i, j)), 12 + len(middles))
+
+    triangles = []
+    for i, j, k in faces:
+        if np.linalg.det(vertices[[i, j, k]]) < 0:
+            j, k = k, j
+        a, b, c = middle(i, j), middle(j, k), middle(k, i)
+        triangles += [(i, a, c), (a, j, b), (c, b, k), (a, b, c)]
+    vertices = np.concatenate([vertices] + [[vertices[i] + vertices[j]] for i, j in middles])
+    return vertices / np.linalg.norm(vertices, axis=1, keepdims=True), np.array(triangles)
+
+
 def join(*meshes):
     """One mesh of several; vertices at the same position become one."""
     offsets = np.cumsum([0] + [len(v) for v, _ in meshes[:-1]])

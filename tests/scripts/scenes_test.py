@@ -19,6 +19,12 @@ def read_obj(path):
     return vertices[triangles]
 
 
+def read_triangles(path):
+    """Vertex indices of the faces, as in the file."""
+    lines = path.read_text().splitlines()
+    return np.array([[int(i) - 1 for i in line.split()[1:]] for line in lines if line.startswith("f ")])
+
+
 def area_vectors(corners):
     return 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
@@ -39,6 +45,30 @@ class ScenesTest(unittest.TestCase):
         volume = np.einsum("ij,ij->i", corners.mean(1), area_vectors(corners)).sum() / 3
         self.assertAlmostEqual(volume, 0.8**3, places=7)
         np.testing.assert_allclose(area_vectors(corners).sum(0), 0, atol=1e-8)
+
+    def test_bunny_and_tree_are_closed_manifolds_facing_outwards_without_slivers(self):
+        # name, number of closed parts, volume between, flattest triangle's height over its longest edge
+        for name, parts, (least, most), flattest in (("bunny", 1, (0.25, 0.45), 0.2), ("tree", 8, (0.4, 1), 0.025)):
+            with self.subTest(name):
+                path = ROOT / f"scenes/{name}/{name}.obj"
+                triangles, corners = read_triangles(path), read_obj(path)
+                edges = [(t[k], t[(k + 1) % 3]) for t in triangles.tolist() for k in range(3)]
+                self.assertEqual(len(edges), len(set(edges)), "an edge of more than two faces, or windings differ")
+                self.assertEqual(set(edges), {(b, a) for a, b in edges}, "an open edge")
+                # Euler: every part is a sphere.
+                vertices = len(np.unique(triangles))
+                self.assertEqual(vertices - len(edges) // 2 + len(triangles), 2 * parts)
+                volume = np.einsum("ij,ij->i", corners.mean(1), area_vectors(corners)).sum() / 3
+                self.assertTrue(least < volume < most, volume)
+                longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(1)
+                heights = 2 * np.linalg.norm(area_vectors(corners), axis=1) / longest
+                self.assertGreater((heights / longest).min(), flattest)
+
+    def test_nothing_touches_in_the_box_of_the_bunny(self):
+        bunny = read_obj(ROOT / "scenes/bunny/bunny.obj").reshape(-1, 3)
+        lamp = read_obj(ROOT / "scenes/bunny/lamp.obj").reshape(-1, 3)
+        self.assertTrue((bunny.min(0) > (-0.99, 0.05, -0.99)).all() and (bunny.max(0) < (0.99, 1.9, 0.99)).all())
+        self.assertTrue((lamp[:, 1] > bunny[:, 1].max()).all() and (lamp[:, 1] < 2).all())
 
     def test_room_and_lamp_face_the_cube(self):
         for name, areas in (("room", {1: 8 * 5.6, 2: 8 * 3}), ("lamp", {1: -0.8 * 0.8})):
