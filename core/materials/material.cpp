@@ -33,6 +33,8 @@ Vec3 sample_cosine(double u0, double u1) {
 }  // namespace
 
 LobeDerivative lobe_derivative(const Material& material, double cos_i, double cos_o, double cos_io) {
+  if (material.type == MaterialType::rough_dielectric)
+    return detail::dielectric_lobe_derivative(material, cos_i, cos_o, cos_io);
   const double side = material.two_sided && cos_o < 0 ? -1 : 1;
   if (!detail::face_forward(material, cos_i, cos_o)) return {};
   if (material.type == MaterialType::diffuse) return {.value = kInvPi};
@@ -58,27 +60,30 @@ LobeDerivative lobe_derivative(const Material& material, double cos_i, double co
   return result;
 }
 
-std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o,
-                                                double u0, double u1) {
-  const double facing = dot(n, w_o);
-  if (facing == 0 || (facing < 0 && !material.two_sided)) return std::nullopt;
+std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& given, double u0,
+                                                double u1, double u2, Walk walk) {
+  const double facing = dot(n, given);
+  const bool two_sided = material.two_sided || material.type == MaterialType::rough_dielectric;
+  if (facing == 0 || (facing < 0 && !two_sided)) return std::nullopt;
   const Frame frame(facing < 0 ? -n : n);
 
   DirectionSample result{};
   if (material.type == MaterialType::diffuse) {
     result.direction = frame.to_world(sample_cosine(u0, u1));
   } else {
-    const Vec3 h = frame.to_world(sample_visible_normal(material.roughness, frame.to_local(w_o), u0, u1));
-    result.direction = 2 * dot(w_o, h) * h - w_o;
+    const Vec3 h = frame.to_world(sample_visible_normal(material.roughness, frame.to_local(given), u0, u1));
+    if (material.type == MaterialType::rough_dielectric)
+      return detail::dielectric_sample(material, n, given, h, u2, walk);
+    result.direction = 2 * dot(given, h) * h - given;
   }
   const double cos_i = dot(frame.n, result.direction), cos_o = std::abs(facing);
   if (!(cos_i > 0)) return std::nullopt;
 
-  result.pdf = direction_pdf(material, dot(n, result.direction), facing, dot(w_o, result.direction));
+  result.pdf = direction_pdf(material, dot(n, result.direction), facing, dot(given, result.direction));
   if (!(result.pdf > 0)) return std::nullopt;
   if (material.type == MaterialType::diffuse) {
     result.weight = 1;
-  } else {  // G2 / G1(w_o): the half vector's density cancels
+  } else {  // G2 / G1(given): the half vector's density cancels
     const double a2 = material.roughness * material.roughness;
     const double root_i = detail::smith_root(a2, cos_i), root_o = detail::smith_root(a2, cos_o);
     result.weight = cos_i * (cos_o + root_o) / (cos_o * root_i + cos_i * root_o);

@@ -3,6 +3,13 @@
 //
 // The rough conductor is a single-scattering GGX with Smith's height-correlated masking-shadowing (Heitz
 // 2014) and a constant reflectance: lobe = D G2 / (4 cos_i cos_o).
+//
+// The rough dielectric is the boundary of a solid of index `ior`: the front of its faces is outside (index 1), the
+// back inside. Cosines of equal sign mean reflection, of opposite sign refraction. It is the single-scattering GGX
+// of Walter et al. 2007 with unpolarised Fresnel reflectance and separable masking-shadowing G1 G1. The lobe is that
+// of radiance that travels from w_i to w_o: by refraction it changes with the square of the index of its medium.
+// As in that model, the refracting lobe ends with a jump where the half vector lies in the surface, at alpha^4 of its
+// peak; derivatives of the lobe leave out the motion of that jump.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -14,14 +21,14 @@
 
 namespace isochron {
 
-enum class MaterialType { diffuse, rough_conductor };
+enum class MaterialType { diffuse, rough_conductor, rough_dielectric };
 
 struct Material {
   std::string name;
   MaterialType type = MaterialType::diffuse;
-  Rgb albedo{0.5};         ///< diffuse albedo, or the conductor's reflectance
+  Rgb albedo{0.5};         ///< diffuse albedo, or the conductor's reflectance; 1 for a dielectric
   double roughness = 0.2;  ///< GGX alpha
-  double ior = 1.5;
+  double ior = 1.5;        ///< index of refraction behind a dielectric's face; above 0 and other than 1
   bool two_sided = false;  ///< reflects on both sides of the face
 };
 
@@ -29,12 +36,19 @@ struct Material {
 struct LobeDerivative {
   double value = 0;                                                ///< 1/sr
   double d_cos_i = 0, d_cos_o = 0, d_cos_io = 0, d_roughness = 0;  ///< of ln(value)
+  double d_ior = 0;                                                ///< of ln(value)
+};
+
+/// Which way a walk goes, and so which of the two directions is drawn given the other.
+enum class Walk {
+  towards_light,  ///< w_i is drawn, w_o given
+  towards_camera  ///< w_o is drawn, w_i given
 };
 
 struct DirectionSample {
   Vec3 direction;  ///< unit, world space
   double pdf;      ///< per solid angle
-  double weight;   ///< lobe * |cos_i| / pdf
+  double weight;   ///< lobe * |cosine of the direction| / pdf
 };
 
 namespace detail {
@@ -67,11 +81,21 @@ inline bool face_forward(const Material& material, double& cos_i, double& cos_o)
   return cos_i > 0 && cos_o > 0;
 }
 
+// The rough dielectric's part of the functions below.
+double dielectric_lobe(const Material& material, double cos_i, double cos_o, double cos_io);
+LobeDerivative dielectric_lobe_derivative(const Material& material, double cos_i, double cos_o, double cos_io);
+double dielectric_pdf(const Material& material, double cos_i, double cos_o, double cos_io);
+/// Reflects or refracts the unit vector `given` at a microfacet with unit normal h on its side.
+std::optional<DirectionSample> dielectric_sample(const Material& material, const Vec3& n, const Vec3& given,
+                                                 const Vec3& h, double u, Walk walk);
+
 }  // namespace detail
 
 /// Lobe value in 1/sr, without cosine and albedo; zero where nothing is scattered (below the surface). For
 /// `two_sided` materials a pair of negative cosines counts as a pair of positive ones.
 inline double lobe(const Material& material, double cos_i, double cos_o, double cos_io) {
+  if (material.type == MaterialType::rough_dielectric)
+    return detail::dielectric_lobe(material, cos_i, cos_o, cos_io);
   if (!detail::face_forward(material, cos_i, cos_o)) return 0;
   if (material.type == MaterialType::diffuse) return kInvPi;
   const double a2 = material.roughness * material.roughness;
@@ -86,8 +110,10 @@ inline double lobe(const Material& material, double cos_i, double cos_o, double 
 LobeDerivative lobe_derivative(const Material& material, double cos_i, double cos_o, double cos_io);
 
 /// Density per solid angle with which `sample_direction` draws w_i given w_o. Integrates to less than one
-/// where some draws end below the surface and are dropped.
+/// where some draws end below the surface and are dropped. With cos_i and cos_o exchanged: the density of w_o given w_i.
 inline double direction_pdf(const Material& material, double cos_i, double cos_o, double cos_io) {
+  if (material.type == MaterialType::rough_dielectric)
+    return detail::dielectric_pdf(material, cos_i, cos_o, cos_io);
   if (!detail::face_forward(material, cos_i, cos_o)) return 0;
   if (material.type == MaterialType::diffuse) return cos_i * kInvPi;
   // Visible normals: D G1(w_o) / (4 cos_o), G1 = 2 cos_o / (cos_o + root_o).
@@ -95,10 +121,11 @@ inline double direction_pdf(const Material& material, double cos_i, double cos_o
   return detail::GgxDensity(a2, cos_i, cos_o, cos_io).value / (2 * (cos_o + detail::smith_root(a2, cos_o)));
 }
 
-/// Draws w_i given w_o (both point away from the surface with unit normal n): cosine-weighted for diffuse,
-/// visible GGX normals (Heitz 2018, by the spherical caps of Dupuy and Benyoub 2023) for rough conductors.
-/// Empty when nothing is scattered. A two-sided material seen from behind scatters to the side of w_o.
-std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& w_o,
-                                                double u0, double u1);
+/// Draws one direction given the other (both point away from the surface with unit normal n): cosine-weighted for
+/// diffuse, visible GGX normals (Heitz 2018, by the spherical caps of Dupuy and Benyoub 2023) for rough conductors and
+/// dielectrics; a dielectric reflects or refracts, by `u2` and in proportion to Fresnel's reflectance. Empty when
+/// nothing is scattered. A two-sided material seen from behind scatters to the side of the given direction.
+std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& given, double u0,
+                                                double u1, double u2 = 0.5, Walk walk = Walk::towards_light);
 
 }  // namespace isochron
