@@ -13,17 +13,22 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
   const PreparedScene& scene = worker.scene;
   int front = -1;
   double front_slope = 0;
+  Vec3 into_front;
   for (int i = 0; i < edge.faces(); ++i) {
     const double across = dot(edge.inward[i], side);
     if (!(across > 0)) continue;
     const double slope = dot(edge.inward[i], d) / across;  // depth gained per distance beside the edge
-    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope;
+    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope, into_front = edge.inward[i];
   }
-  if (front >= 0) return scene.point_in_plane(front, y);
+  // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the edge
+  // start within a surface, or behind one.
+  const double offset = scene.caster.offset();
+  if (front >= 0) return scene.point_in_plane(front, y + into_front * offset);
   ++worker.rays;
-  const int t = scene.caster.first_triangle(y + side * scene.caster.offset(), d);
-  if (t < 0 || dot(scene.normal[t], d) == 0) return std::nullopt;
-  return scene.point_on_triangle(t, scene.camera.position, d);
+  const Vec3 beside = normalize(y + side * offset - scene.camera.position);
+  const int t = scene.caster.first_triangle(scene.camera.position, beside);
+  if (t < 0 || dot(scene.normal[t], beside) == 0) return std::nullopt;
+  return scene.point_on_triangle(t, scene.camera.position, beside);
 }
 
 /// One edge point; contributions are scaled by `scale` (one over the number of edge points).

@@ -74,6 +74,7 @@ class SecondaryBoundary {
 
  private:
   static constexpr double kAimedShare = 0.5;
+  static constexpr double kTowardsCamera = 32;  ///< rays within 1 / 32 of a touched surface miss it
 
   /// The boundary segment: from D (camera side) through the edge point along the unit direction w to S (light side).
   struct Segment {
@@ -92,8 +93,9 @@ class SecondaryBoundary {
       side = BoundaryEdges::occluder_side(*y.edge, n_b);
       return side != 0;
     }
-    /// The edge point moved off the occluder.
-    Vec3 lifted(double offset) const { return y.y - n_b * (side * offset); }
+    /// The edge point moved off the occluder, and some more towards D: where the edge lies in a surface that the
+    /// occluder touches, both rays start in front of it, so that it is S. It is not D as well: a path counts once.
+    Vec3 lifted(double offset) const { return y.y - n_b * (side * offset) - w * (kTowardsCamera * offset); }
   };
 
   /// A way from D to the camera.
@@ -132,15 +134,16 @@ class SecondaryBoundary {
     const double wedge = 1 / (4 * g.y.edge->wedge());
     double aimed = 0;
     if (scene_.emits(g.light.triangle) && dot(g.light.n, g.w) < 0)
-      aimed = scene_.emitter_pdf(g.light.triangle) / solid_angle_to_area(g.y.y, g.light);
+      aimed = scene_.emitter_pdf(g.light.triangle) * g.r_s * g.r_s / -dot(g.light.n, g.w);
     return (1 - kAimedShare) * wedge + kAimedShare * aimed;
   }
 
   bool find_light_end(Segment& g) {
     ++worker_.rays;
-    const int t = scene_.caster.first_triangle(g.lifted(scene_.caster.offset()), g.w);
+    const Vec3 start = g.lifted(scene_.caster.offset());
+    const int t = scene_.caster.first_triangle(start, g.w);
     if (t < 0 || !faces(t, -g.w)) return false;
-    g.light = scene_.point_on_triangle(t, g.y.y, g.w);
+    g.light = scene_.point_on_triangle(t, start, g.w);  // beside the occluder even where it touches the surface
     g.r_s = length(g.light.p - g.y.y);
     return true;
   }
