@@ -10,6 +10,7 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "optim/files.h"
+#include "optim/heavy_tail.h"
 
 namespace isochron {
 namespace {
@@ -81,6 +82,9 @@ int check(const CheckCommand& command) {
     fmt::print(
         "Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
   write_file_atomically(folder + "/check.csv", check_csv(table));
+  HeavyTails tails;
+  for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.kurtosis);
+  if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {}/check.csv", folder);
   return wrong == 0 ? 0 : 1;
 }

@@ -9,6 +9,7 @@
 #include "core/image/image.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
+#include "optim/heavy_tail.h"
 
 namespace isochron {
 namespace {
@@ -37,7 +38,8 @@ int derive(const DeriveCommand& command) {
   const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
   const double images_per_unknown = 6;  // total, three terms, a batch and its sum
   const int group = std::max(1, static_cast<int>(std::min(kMostBytes / (bytes * images_per_unknown), 1e6)));
-  std::string table = "parameter,gate,component,mean,standard_error\n";
+  std::string table = "parameter,gate,component,mean,standard_error,kurtosis\n";
+  HeavyTails tails;
   for (int first = block.begin; first < block.begin + block.count; first += group) {
     const int count = std::min(group, block.begin + block.count - first);
     const auto components = estimate_derivatives(problem, theta, first, count, poll_interrupt);
@@ -51,12 +53,16 @@ int derive(const DeriveCommand& command) {
       }
       write_exr_components(folder + "/" + name + ".exr", names, images);
       for (int g = 0; g < problem.gates().size(); ++g)
-        for (const DerivativeEstimate& component : components)
-          table += fmt::format("{},{},{},{},{}\n", name, g, component.component, component.gates[i].mean[g],
-                               component.gates[i].standard_error[g]);
+        for (const DerivativeEstimate& component : components) {
+          const Statistics& s = component.gates[i];
+          table += fmt::format("{},{},{},{},{},{}\n", name, g, component.component, s.mean[g], s.standard_error[g],
+                               s.kurtosis[g]);
+          tails.add(name, g, s.kurtosis[g]);
+        }
     }
   }
   write_file_atomically(folder + "/derive.csv", table);
+  if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote derivative images and {}/derive.csv", folder);
   return command.common.no_plots || draw_plots(folder) ? 0 : 1;
 }

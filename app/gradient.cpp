@@ -7,6 +7,7 @@
 #include "app/interrupt.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
+#include "optim/heavy_tail.h"
 
 namespace isochron {
 namespace {
@@ -26,14 +27,19 @@ int gradient(const CommonOptions& options) {
   const GradientEstimate estimate = estimate_gradient(problem, theta, target, poll_interrupt);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
-  std::string table = "parameter,value,gradient,standard_error\n";
-  for (int i = 0; i < parameters.size(); ++i)
-    table += fmt::format("{},{},{},{}\n", parameters.component_names()[i], theta[i],
-                         estimate.gradient.mean[i], estimate.gradient.standard_error[i]);
+  std::string table = "parameter,value,gradient,standard_error,kurtosis\n";
+  HeavyTails tails;
+  for (int i = 0; i < parameters.size(); ++i) {
+    const std::string& name = parameters.component_names()[i];
+    table += fmt::format("{},{},{},{},{}\n", name, theta[i], estimate.gradient.mean[i],
+                         estimate.gradient.standard_error[i], estimate.gradient.kurtosis[i]);
+    tails.add(name, -1, estimate.gradient.kurtosis[i]);
+  }
   write_file_atomically(folder + "/gradient.csv", table);
   write_file_atomically(folder + "/gradient.yaml",
                         fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds, thread_count(options),
                                     estimate.repeats));
+  if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {}/gradient.csv", folder);
   return 0;
 }

@@ -224,6 +224,7 @@ std::vector<Comparison> check_derivative(const Problem& problem, const std::vect
     row.finite_difference = difference.gates.mean[g];
     row.finite_difference_error = std::hypot(difference.gates.standard_error[g], difference.rounding[g]);
     row.z = z_score(row.total, row.standard_error, row.finite_difference, row.finite_difference_error);
+    row.kurtosis = std::max(analytic.front().gates[0].kurtosis[g], difference.gates.kurtosis[g]);
     rows.push_back(row);
   }
   return rows;
@@ -232,11 +233,11 @@ std::vector<Comparison> check_derivative(const Problem& problem, const std::vect
 std::string check_csv(const std::vector<Comparison>& table) {
   std::string text =
       "parameter,gate,interior,visibility,path_length,total,standard_error,finite_difference,"
-      "finite_difference_error,z\n";
+      "finite_difference_error,z,kurtosis\n";
   for (const Comparison& row : table)
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{}\n", row.parameter, row.gate, row.terms[0],
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", row.parameter, row.gate, row.terms[0],
                         row.terms[1], row.terms[2], row.total, row.standard_error, row.finite_difference,
-                        row.finite_difference_error, row.z);
+                        row.finite_difference_error, row.z, row.kurtosis);
   return text;
 }
 

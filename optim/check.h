@@ -15,7 +15,8 @@ struct Comparison {
   std::array<double, 3> terms{};  ///< in the order of kTerms; 0 where a term vanishes
   double total = 0, standard_error = 0;
   double finite_difference = 0, finite_difference_error = 0;
-  double z = 0;  ///< see z_score
+  double z = 0;         ///< see z_score
+  double kurtosis = 0;  ///< of the batches of either side, the larger (see Statistics)
 };
 
 /// (a - b) / hypot(error_a, error_b); 0 where both are equal, infinite where they differ without error.
@@ -52,7 +53,7 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
 std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta,
                                          int component, const Poll& poll);
 
-/// `parameter,gate,interior,visibility,path_length,total,standard_error,finite_difference,...`
+/// `parameter,gate,interior,visibility,path_length,total,standard_error,finite_difference,finite_difference_error,z,kurtosis`
 std::string check_csv(const std::vector<Comparison>& table);
 
 }  // namespace isochron

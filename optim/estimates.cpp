@@ -57,9 +57,19 @@ DerivativeEstimate sum_of(const std::vector<DerivativeEstimate>& terms) {
       for (std::size_t k = 0; k < image.data.size(); ++k) total.images[i].data[k] += image.data[k];
       for (std::size_t g = 0; g < total.gates[i].mean.size(); ++g) {
         total.gates[i].mean[g] += terms[t].gates[i].mean[g];
-        double& error = total.gates[i].standard_error[g];
-        error = std::hypot(error, terms[t].gates[i].standard_error[g]);
       }
+    }
+    for (std::size_t g = 0; g < total.gates[i].mean.size(); ++g) {
+      double error = 0, fourth = 0;
+      for (const DerivativeEstimate& term : terms) error = std::hypot(error, term.gates[i].standard_error[g]);
+      total.gates[i].standard_error[g] = error;
+      if (!(error > 0)) continue;
+      // So do fourth cumulants, (kurtosis - 3) variance^2.
+      for (const DerivativeEstimate& term : terms) {
+        const double share = term.gates[i].standard_error[g] / error;
+        fourth += (term.gates[i].kurtosis[g] - 3) * std::pow(share, 4);
+      }
+      total.gates[i].kurtosis[g] = 3 + fourth;
     }
   }
   return total;
@@ -76,15 +86,20 @@ Statistics BatchStatistics::result() const {
   const std::size_t count = batches_.size(), size = batches_.front().size();
   double samples = 0;
   for (double n : samples_) samples += n;
-  Statistics result{std::vector<double>(size, 0.0), std::vector<double>(size, 0.0)};
+  const auto n = static_cast<double>(count);
+  const std::vector<double> zeros(size, 0.0);
+  Statistics result{zeros, zeros, zeros};
   for (std::size_t i = 0; i < size; ++i) {
     for (std::size_t b = 0; b < count; ++b) result.mean[i] += samples_[b] / samples * batches_[b][i];
+    const auto deviation = [&](std::size_t b) { return samples_[b] / samples * (batches_[b][i] - result.mean[i]); };
     double sum = 0;
+    for (std::size_t b = 0; b < count; ++b) sum += deviation(b) * deviation(b);
+    result.standard_error[i] = std::sqrt(sum * n / (n - 1));
+    if (!(sum > 0)) continue;
     for (std::size_t b = 0; b < count; ++b) {
-      const double deviation = samples_[b] / samples * (batches_[b][i] - result.mean[i]);
-      sum += deviation * deviation;
+      const double share = deviation(b) * deviation(b) / sum;
+      result.kurtosis[i] += n * share * share;
     }
-    result.standard_error[i] = std::sqrt(sum * static_cast<double>(count) / static_cast<double>(count - 1));
   }
   return result;
 }

@@ -14,6 +14,10 @@ inline constexpr int kMostBatches = 32;
 /// Mean and standard error of the mean of some quantities.
 struct Statistics {
   std::vector<double> mean, standard_error;
+  /// Fourth central moment of the batches over the square of the second: about 3 where they are normal and the
+  /// standard error means what it says, up to their number where a single one stands out (see heavy_tail.h); 0 where
+  /// all are equal.
+  std::vector<double> kurtosis;
 };
 
 /// Collects independent batches, weighted by their samples.

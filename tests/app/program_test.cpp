@@ -150,13 +150,13 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   EXPECT_TRUE(folder_.has("out/height.exr"));
   EXPECT_FALSE(folder_.has("out/power.exr"));
   const std::string derive = folder_.read("out/derive.csv");
-  EXPECT_EQ(derive.rfind("parameter,gate,component,mean,standard_error\nheight,0,total,", 0), 0u);
+  EXPECT_EQ(derive.rfind("parameter,gate,component,mean,standard_error,kurtosis\nheight,0,total,", 0), 0u);
   for (const char* row : {"height,1,total,", "height,1,interior,", "height,1,visibility,"})
     EXPECT_NE(derive.find(row), std::string::npos);
 
   ASSERT_EQ(run({"gradient", file, "-o", out, "--at", "target"}).status, 0);
   const std::string gradient = folder_.read("out/gradient.csv");
-  EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error\nheight,0,", 0), 0u);
+  EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error,kurtosis\nheight,0,", 0), 0u);
   EXPECT_NE(gradient.find("\npower,10,"), std::string::npos);
   const std::string cost = folder_.read("out/gradient.yaml");
   for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"})
@@ -170,11 +170,11 @@ TEST_F(Program, CheckAgreesWithFiniteDifferences) {
   EXPECT_EQ(result.status, 0) << result.errors << folder_.read("stdout");
   const std::string table = folder_.read("out/check.csv");
   EXPECT_EQ(table.rfind("parameter,gate,interior,visibility,path_length,total,standard_error,"
-                        "finite_difference,finite_difference_error,z\nheight,0,",
+                        "finite_difference,finite_difference_error,z,kurtosis\nheight,0,",
                         0),
             0u);
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 5);
-  EXPECT_EQ(std::count(table.begin(), table.end(), ','), 5 * 9);
+  EXPECT_EQ(std::count(table.begin(), table.end(), ','), 5 * 10);
   EXPECT_NE(folder_.read("stdout").find("0 of 4 differ"), std::string::npos);
   ASSERT_EQ(run({"check", file, "-o", out, "--samples", "256", "--parameter", "power"}).status, 0);
   EXPECT_EQ(folder_.read("out/check.csv").find("height"), std::string::npos);
