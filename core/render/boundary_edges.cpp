@@ -18,7 +18,7 @@ Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const
 
 }  // namespace
 
-BoundaryEdges::BoundaryEdges(const PreparedScene& scene) {
+BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
   std::vector<double> primary_weight, secondary_weight;
   std::vector<char> secondary_moves;
   double moving_sum = 0, static_sum = 0;
@@ -43,7 +43,8 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene) {
       primary_.push_back(b);
       primary_weight.push_back(b.length / squared);
     }
-    const double weight = b.length * b.wedge();
+    b.azimuths = wedge ? b.wedge() : kPi;
+    const double weight = b.length * b.azimuths;
     (moves ? moving_sum : static_sum) += weight;
     secondary_.push_back(b);
     secondary_weight.push_back(weight);

@@ -17,11 +17,13 @@ struct BoundaryEdge {
   Vec3 point(double s) const { return origin + (end - origin) * s; }
   /// Angle of the wedge of grazing directions on either side: pi less the opening.
   double wedge() const { return kPi - opening; }
+  double azimuths = 0;  ///< angle that directions are drawn from, on either side: the wedge or, without it, pi
 };
 
 class BoundaryEdges {
  public:
-  explicit BoundaryEdges(const PreparedScene& scene);
+  /// `wedge`: pick edges and azimuths by the wedge of grazing directions (see BoundaryTechniques).
+  explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true);
 
   struct Sample {
     const BoundaryEdge* edge = nullptr;

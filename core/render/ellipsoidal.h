@@ -6,6 +6,8 @@
 // Every crossing arc is sampled once; only which of them gets its visibility tested is a random pick, so the density
 // of a technique is one over the arc's span.
 #pragma once
+#include <span>
+
 #include "core/geometry/ellipsoid.h"
 #include "core/render/worker.h"
 
@@ -20,11 +22,15 @@ struct GatePass {
   bool coupled = true;
 };
 
-template <class Sink>
+/// Complete paths go to the worker's sink.
+struct ToSink {};
+
+/// `Receiver`: ToSink, or what takes the light that `gather` finds.
+template <class Sink, class Receiver = ToSink>
 class EllipsoidalConnections {
  public:
-  EllipsoidalConnections(Worker<Sink>& worker, const GatePass& pass)
-      : worker_(worker), scene_(worker.scene), pass_(pass) {}
+  EllipsoidalConnections(Worker<Sink>& worker, const GatePass& pass, Receiver receiver = {})
+      : worker_(worker), scene_(worker.scene), pass_(pass), receiver_(receiver) {}
 
   /// One camera path through `pixel` with connections at every vertex. Contributions to the pixel itself are scaled by
   /// `scale`; those of the camera's own connections, which land on any pixel, by `scale` / number of pixels.
@@ -39,6 +45,30 @@ class EllipsoidalConnections {
       if (max_bounces >= 1) connect_surface(target, pixel, Rgb(splat_scale), rng);
     }
     if (max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
+    connect_along(pixel, scale, max_bounces, rng);
+  }
+
+  /// Walks on from vertex 1 of the worker's path, which vertex 0 looks at, by up to `max_bounces` scattering vertices.
+  /// Hands complete paths of the given lengths to receiver.take(i, bounces, value): i counts the lengths, value is
+  /// contribution over density from vertex 1 on, per unit of length and without the gate. Leaves the path grown.
+  void gather(std::span<const double> lengths, int max_bounces, Rng& rng) {
+    targets_.clear();
+    for (std::size_t i = 0; i < lengths.size(); ++i) {
+      if (!(lengths[i] > 0)) continue;
+      Target t;
+      t.tau[0] = lengths[i];
+      t.present[0] = true;
+      t.index = static_cast<int>(i);
+      targets_.push_back(t);
+    }
+    connect_along(-1, 1, max_bounces, rng);
+  }
+
+ private:
+  static constexpr bool kGathers = !std::is_same_v<Receiver, ToSink>;
+
+  /// Connections at the path's last vertex and at those of a walk from there.
+  void connect_along(int pixel, double scale, int max_bounces, Rng& rng) {
     Path& path = worker_.path;
     Rgb throughput(1.0);
     for (int bounce = 1; bounce <= max_bounces; ++bounce) {
@@ -55,13 +85,13 @@ class EllipsoidalConnections {
     }
   }
 
- private:
   /// One length drawn from W, or the two sides of a pair drawn from dW (first plus, then minus).
   struct Target {
     double tau[2] = {0, 0};
     bool present[2] = {false, false};
     bool pair = false;
-    int gate = 0;  ///< of a pair
+    int gate = 0;   ///< of a pair
+    int index = 0;  ///< among the lengths gathered for
     double scale = 0;
     double longest() const { return std::max(present[0] ? tau[0] : 0, present[1] ? tau[1] : 0); }
     double shortest() const { return present[0] && present[1] ? std::min(tau[0], tau[1]) : longest(); }
@@ -119,7 +149,7 @@ class EllipsoidalConnections {
 
   /// Whether connecting to emitter point y can only matter through the connecting vertex itself.
   bool ends_are_static(int emitter_triangle) const {
-    if constexpr (!Sink::kDifferential) return false;
+    if constexpr (!Sink::kDifferential || kGathers) return false;
     return !can_move(scene_, worker_.path, worker_.path.size() - 1, emitter_triangle);
   }
 
@@ -200,7 +230,7 @@ class EllipsoidalConnections {
       if (y.value.is_black()) continue;
       if (!(path.size() == 1 ? worker_.visible_from_camera(y.point) : worker_.visible(x, y.point))) continue;
       double weight = 1;
-      if (path.size() > 1) {
+      if (path.size() > (kGathers ? 2 : 1)) {
         const SurfacePoint& previous = path.vertex[path.size() - 2];
         const double by_emitter = vertex_pdf() / (y.span * y.area_rate);
         const double by_surface = scene_.emitter_pdf(y.point.triangle) * surface_arc_pdf(previous, x, y.point);
@@ -335,11 +365,11 @@ class EllipsoidalConnections {
 
   /// The worker's path is complete and as long as side i of the target says.
   void deliver(const Target& target, int i, int pixel, const Rgb& value) {
-    if (!target.pair) {
+    if constexpr (kGathers) {
+      receiver_.take(target.index, worker_.path.size() - 2, value);
+    } else if (!target.pair) {
       if (worker_.matters(worker_.path)) worker_.emit(worker_.path, pixel, value * target.scale, target.tau[0], pass_.use);
-      return;
-    }
-    if constexpr (Sink::kDifferential) {
+    } else if constexpr (Sink::kDifferential) {
       differentiate_path(scene_, worker_.path.vertex.data(), worker_.path.size(), true, worker_.differential);
       if (worker_.differential.empty()) return;
       worker_.sink.bind(worker_.differential);
@@ -350,6 +380,7 @@ class EllipsoidalConnections {
   Worker<Sink>& worker_;
   const PreparedScene& scene_;
   const GatePass pass_;
+  [[no_unique_address]] Receiver receiver_;
   std::vector<Target> targets_;
 };
 

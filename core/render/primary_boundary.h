@@ -1,7 +1,7 @@
 // Primary visibility boundary: a camera ray grazes a moving edge (theory section 5, "Primary").
 #pragma once
 #include "core/render/boundary_edges.h"
-#include "core/render/standard_walk.h"
+#include "core/render/light_side.h"
 
 namespace isochron {
 
@@ -31,56 +31,65 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
   return scene.point_on_triangle(t, scene.camera.position, beside);
 }
 
-/// One edge point; contributions are scaled by `scale` (one over the number of edge points).
 template <class Sink>
-void sample_primary_boundary(Worker<Sink>& worker, const BoundaryEdges& edges, double scale, Rng& rng) {
-  const PreparedScene& scene = worker.scene;
-  const auto [edge, s, y, pdf] = edges.sample_primary(rng.uniform());
-  const int pixel = scene.camera.project(y);
-  if (pixel < 0) return;
-  const Vec3 to_y = y - scene.camera.position;
-  const double r = length(to_y);
-  const Vec3 d = to_y / r;
-  const Vec3 normal = cross(edge->tangent, d);
-  const double sine = length(normal);
-  if (!(sine > 0)) return;
-  const Vec3 n_b = normal / sine;
+class PrimaryBoundary {
+ public:
+  /// `narrow_gates`: use the techniques that draw lengths from the gates.
+  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, bool narrow_gates)
+      : worker_(worker),
+        scene_(worker.scene),
+        edges_(edges),
+        light_side_(worker, narrow_gates && worker.options.boundary.light_arcs) {}
 
-  // Off the faces, to the camera's side of each, so that the edge does not hide itself.
-  Vec3 off = -d;
-  for (int i = 0; i < edge->faces(); ++i)
-    off += scene.normal[edge->face[i]] * std::copysign(1.0, -dot(scene.normal[edge->face[i]], d));
-  ++worker.rays;
-  if (scene.caster.occluded(scene.camera.position, y + off * scene.caster.offset())) return;
+  /// One edge point; contributions are scaled by `scale` (one over the number of edge points).
+  void sample(double scale, Rng& rng) {
+    if (!edges_.has_primary()) return;
+    const auto [edge, s, y, pdf] = edges_.sample_primary(rng.uniform());
+    const int pixel = scene_.camera.project(y);
+    if (pixel < 0) return;
+    const Vec3 to_y = y - scene_.camera.position;
+    const double r = length(to_y);
+    const Vec3 d = to_y / r;
+    const Vec3 normal = cross(edge->tangent, d);
+    const double sine = length(normal);
+    if (!(sine > 0)) return;
+    const Vec3 n_b = normal / sine;
 
-  LocalDifferential& differential = worker.differential;
-  differential.clear();
-  const double share[2] = {1 - s, s};
-  for (int i = 0; i < 2; ++i)
-    if (scene.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
-  worker.sink.bind(differential);
+    // Off the faces, to the camera's side of each, so that the edge does not hide itself.
+    Vec3 off = -d;
+    for (int i = 0; i < edge->faces(); ++i)
+      off += scene_.normal[edge->face[i]] * std::copysign(1.0, -dot(scene_.normal[edge->face[i]], d));
+    ++worker_.rays;
+    if (scene_.caster.occluded(scene_.camera.position, y + off * scene_.caster.offset())) return;
 
-  struct Visitor {
-    Worker<Sink>& worker;
-    int pixel;
-    double scale;
-    bool wants() const { return true; }
-    void take(const Rgb& value) {
-      worker.sink.add(pixel, value * scale, worker.path.length.back(), GateUse::value);
+    LocalDifferential& differential = worker_.differential;
+    differential.clear();
+    const double share[2] = {1 - s, s};
+    for (int i = 0; i < 2; ++i)
+      if (scene_.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
+    worker_.sink.bind(differential);
+
+    const double factor = scale * sine * scene_.camera.image_area_per_solid_angle(d) / (r * r * pdf);
+    SurfacePoint eye;
+    eye.p = scene_.camera.position;
+    // The two sides share their random numbers: what they have in common cancels.
+    const Rng shared = rng;
+    for (const double sign : {-1.0, 1.0}) {
+      const auto x1 = seen_beside(worker_, *edge, y, d, n_b * sign);
+      if (!x1) continue;
+      const double before = length(x1->p - eye.p);
+      Rng walk_rng = shared;
+      for (const GatheredLight& light :
+           light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng))
+        worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, GateUse::value);
     }
-  };
-  const double factor = scale * sine * scene.camera.image_area_per_solid_angle(d) / (r * r * pdf);
-  // The two sides share their random numbers: what they have in common cancels.
-  const Rng shared = rng;
-  for (const double sign : {-1.0, 1.0}) {
-    const auto x1 = seen_beside(worker, *edge, y, d, n_b * sign);
-    if (!x1) continue;
-    worker.start_path_at_camera();
-    worker.path.push(scene, *x1);
-    Rng walk_rng = shared;
-    walk_standard(worker, worker.path, worker.options.max_bounces, {worker.gates.lower(), worker.gates.upper()},
-                  walk_rng, Visitor{worker, pixel, -sign * factor});
   }
-}
+
+ private:
+  Worker<Sink>& worker_;
+  const PreparedScene& scene_;
+  const BoundaryEdges& edges_;
+  LightSide<Sink> light_side_;
+};
 
 }  // namespace isochron

@@ -75,7 +75,7 @@ struct Renderer::Impl {
   mutable std::atomic<long long> rays{0};
 
   Impl(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent)
-      : gates(gate_set), options(estimator), basis(tangent), scene(source, tangent), edges(scene) {
+      : gates(gate_set), options(estimator), basis(tangent), scene(source, tangent), edges(scene, estimator.boundary.wedge) {
     ellipsoidal = options.sampling == Sampling::ellipsoidal;
     if (options.sampling == Sampling::automatic) {
       // Narrow gates: below this share of the path length, standard sampling throws too many paths away.
@@ -137,9 +137,10 @@ struct Renderer::Impl {
       for_each_sample(strand, strands, stream, range,
                       [&](int pixel, Rng& rng) { sample_standard(worker, pixel, scale, rng); });
     } else if (term == Term::visibility) {
+      PrimaryBoundary primary(worker, edges, ellipsoidal);
       SecondaryBoundary secondary(worker, edges, ellipsoidal);
       for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
-        if (edges.has_primary()) sample_primary_boundary(worker, edges, splat_scale, rng);
+        primary.sample(splat_scale, rng);
         secondary.sample_from_edge(splat_scale, rng);
         secondary.sample_from_camera(pixel, scale, rng);
       });

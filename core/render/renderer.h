@@ -12,10 +12,20 @@ namespace isochron {
 
 enum class Sampling { automatic, standard, ellipsoidal };
 
+/// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
+struct BoundaryTechniques {
+  bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
+  bool aimed = true;        ///< directions from the edge towards emitters
+  bool from_camera = true;  ///< edge points seen from vertices of camera paths
+  bool at_length = true;    ///< the same at lengths drawn from the gates, where they are narrow
+  bool light_arcs = true;   ///< ellipsoidal connections beyond the segment, where gates are narrow
+};
+
 struct EstimatorOptions {
   int max_bounces = 8;                       ///< scattering vertices on a path, >= 0
   Sampling sampling = Sampling::automatic;   ///< automatic: by gate width
   bool antithetic = true;                    ///< coupled pairs for the gate's derivative under ellipsoidal sampling
+  BoundaryTechniques boundary{};
 };
 
 /// The terms of the derivative (paper Eq. 13).

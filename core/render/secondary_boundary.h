@@ -9,20 +9,22 @@
 // From the edge, the D side walks on and connects to the camera at every vertex.
 #pragma once
 #include "core/render/boundary_edges.h"
-#include "core/render/standard_walk.h"
+#include "core/render/light_side.h"
 
 namespace isochron {
 
 template <class Sink>
 class SecondaryBoundary {
  public:
-  /// `narrow_gates`: use the technique that draws lengths from the gates.
+  /// `narrow_gates`: use the techniques that draw lengths from the gates.
   SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, bool narrow_gates)
       : worker_(worker),
         scene_(worker.scene),
         edges_(edges),
-        narrow_gates_(narrow_gates),
-        light_path_(worker.options.max_bounces) {}
+        techniques_(worker.options.boundary),
+        at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
+        aimed_share_(techniques_.aimed ? 0.5 : 0),
+        light_side_(worker, narrow_gates && techniques_.light_arcs) {}
 
   /// One segment from an edge; contributions are scaled by `scale` (one over the number of such segments).
   void sample_from_edge(double scale, Rng& rng) {
@@ -31,7 +33,7 @@ class SecondaryBoundary {
     g.y = edges_.sample_secondary(rng.uniform());
     const double pick = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
     int aimed_at = -1;
-    if (pick < kAimedShare) {
+    if (pick < aimed_share_) {
       double pdf;
       const SurfacePoint target = scene_.sample_emitter(u0, u1, u2, pdf);
       g.w = normalize(target.p - g.y.y);
@@ -55,25 +57,24 @@ class SecondaryBoundary {
 
   /// One camera path through `pixel`, with a random edge point at each of its vertices.
   void sample_from_camera(int pixel, double scale, Rng& rng) {
-    if (!edges_.has_secondary() || !worker_.start_camera_path(pixel, rng)) return;
+    if (!techniques_.from_camera || !edges_.has_secondary() || !worker_.start_camera_path(pixel, rng)) return;
     Path& path = worker_.path;
     Rgb throughput(1.0);
     double tau = 0;
-    if (narrow_gates_) {
+    if (at_length_) {
       const double pick = rng.uniform(), u = rng.uniform();
       tau = worker_.gates.sample_mixture(pick, u);
     }
     for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
       if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
       connect_edge(pixel, throughput * scale, rng);
-      if (narrow_gates_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
+      if (at_length_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
       if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
       if (!extend(worker_, path, throughput, rng)) return;
     }
   }
 
  private:
-  static constexpr double kAimedShare = 0.5;
   static constexpr double kTowardsCamera = 32;  ///< rays within 1 / 32 of a touched surface miss it
 
   /// The boundary segment: from D (camera side) through the edge point along the unit direction w to S (light side).
@@ -107,35 +108,29 @@ class SecondaryBoundary {
     double camera_over_edge;  ///< density of finding the segment from the camera over that from the edge
   };
   enum class Found { from_edge, from_camera };
-  /// Light that leaves S towards D.
-  struct Emission {
-    Rgb value;
-    double length;  ///< D to emitter
-    int bounces;    ///< scattering vertices on the light side
-  };
 
   bool faces(int triangle, const Vec3& w) const {
     return dot(scene_.normal[triangle], w) > 0 || scene_.material_of(triangle).two_sided;
   }
 
-  /// Uniform in azimuth over the grazing wedge and in the cosine to the edge.
+  /// Uniform in azimuth over the grazing wedge (see BoundaryEdge::azimuths) and in the cosine to the edge.
   static Vec3 direction_in_wedge(const BoundaryEdge& edge, double u0, double u1) {
     const Vec3& f0 = edge.inward[0];
     Vec3 across = cross(edge.tangent, f0);
     if (edge.faces() == 2 && dot(across, edge.inward[1]) < 0) across = -across;
     const double half = u0 < 0.5 ? 0 : 1;
-    const double beta = edge.opening + (2 * u0 - half) * edge.wedge() + half * kPi;
+    const double beta = edge.opening + (2 * u0 - half) * edge.azimuths + half * kPi;
     const double cosine = 2 * u1 - 1, sine = std::sqrt(1 - cosine * cosine);
     return edge.tangent * cosine + (f0 * std::cos(beta) + across * std::sin(beta)) * sine;
   }
 
   /// Density per solid angle of w from the edge: wedge and aimed together. `g.light` is known.
   double direction_pdf(const Segment& g) const {
-    const double wedge = 1 / (4 * g.y.edge->wedge());
+    const double wedge = 1 / (4 * g.y.edge->azimuths);
     double aimed = 0;
     if (scene_.emits(g.light.triangle) && dot(g.light.n, g.w) < 0)
       aimed = scene_.emitter_pdf(g.light.triangle) * g.r_s * g.r_s / -dot(g.light.n, g.w);
-    return (1 - kAimedShare) * wedge + kAimedShare * aimed;
+    return (1 - aimed_share_) * wedge + aimed_share_ * aimed;
   }
 
   bool find_light_end(Segment& g) {
@@ -167,6 +162,7 @@ class SecondaryBoundary {
 
   /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
   double camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k) const {
+    if (!techniques_.from_camera) return 0;
     double ratio = scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
                    solid_angle_to_area(x[0].p, x[1]) / scene_.camera.pixels();
     for (int j = 1; j < k; ++j)
@@ -283,7 +279,7 @@ class SecondaryBoundary {
   /// Density of the edge point when the length is drawn from the gates, over that of a uniform one; S is on an emitter
   /// and `before` is the length from the camera to D.
   double length_over_uniform(const Segment& g, double before) const {
-    if (!narrow_gates_ || !scene_.emits(g.light.triangle)) return 0;
+    if (!at_length_ || !scene_.emits(g.light.triangle)) return 0;
     const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
     const int t = g.light.triangle;
     return scene_.emitter_pdf(t) * scene_.area[t] * worker_.gates.mixture_pdf(before + g.r_d + g.r_s) *
@@ -314,37 +310,26 @@ class SecondaryBoundary {
   /// Gathers the light that S sends towards D and joins it with every connection.
   void finish(const Segment& g, Found found, Rng& rng) {
     if (connections_.empty()) return;
-    double shortest = connections_[0].length, longest = shortest;
     int fewest = connections_[0].bounces;
+    before_.clear();
     for (const Connection& c : connections_) {
-      shortest = std::min(shortest, c.length);
-      longest = std::max(longest, c.length);
       fewest = std::min(fewest, c.bounces);
+      before_.push_back(c.length + g.r_d + g.r_s);
     }
-    struct Visitor {
-      std::vector<Emission>& emissions;
-      const Path& path;
-      bool wants() const { return true; }
-      void take(const Rgb& value) { emissions.push_back({value, path.length.back(), path.size() - 2}); }
-    };
-    emissions_.clear();
-    light_path_.start(g.camera_end, 0);
-    light_path_.push(scene_, g.light);
-    walk_standard(worker_, light_path_, worker_.options.max_bounces - fewest,
-                  {worker_.gates.lower() - longest, worker_.gates.upper() - shortest}, rng,
-                  Visitor{emissions_, light_path_});
-    if (emissions_.empty()) return;
+    const auto& lights = light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng);
     const LocalDifferential* bound = nullptr;
-    for (const Connection& c : connections_) {
+    for (std::size_t i = 0; i < connections_.size(); ++i) {
+      const Connection& c = connections_[i];
       const LocalDifferential* differential = c.bounces == 1 ? &pixel_flow_ : &material_flow_;
       if (differential->empty()) continue;
       if (differential != bound) worker_.sink.bind(*(bound = differential));
       const double ratio = c.camera_over_edge;
-      for (const Emission& e : emissions_) {
+      for (const GatheredLight& e : lights) {
         if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
+        if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
         const double rate = e.bounces == 0 ? length_over_uniform(g, c.length) : 0;
         const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
-        worker_.sink.add(c.pixel, c.value * e.value * weight, c.length + e.length, GateUse::value);
+        worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i] + e.length, GateUse::value);
       }
     }
   }
@@ -352,12 +337,14 @@ class SecondaryBoundary {
   Worker<Sink>& worker_;
   const PreparedScene& scene_;
   const BoundaryEdges& edges_;
-  const bool narrow_gates_;
-  Path light_path_;
+  const BoundaryTechniques techniques_;
+  const bool at_length_;
+  const double aimed_share_;  ///< of the directions from an edge
+  LightSide<Sink> light_side_;
   LocalDifferential pixel_flow_, material_flow_;
   std::vector<SurfacePoint> walk_, camera_side_;
   std::vector<Connection> connections_;
-  std::vector<Emission> emissions_;
+  std::vector<double> before_;  ///< lengths from the camera to S, one per connection
 };
 
 }  // namespace isochron
