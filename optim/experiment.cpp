@@ -164,8 +164,8 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
   if (std::find(std::begin(kReserved), std::end(kReserved), spec.name) != std::end(kReserved))
     spec.fail("name", fmt::format("'{}' is the name of another output", spec.name));
   spec.type = static_cast<ParameterType>(
-      require("type").choice({"translation", "rotation", "vertices", "albedo", "roughness", "emission"}));
-  const bool of_material = spec.type == ParameterType::albedo || spec.type == ParameterType::roughness;
+      require("type").choice({"translation", "rotation", "vertices", "albedo", "roughness", "ior", "emission"}));
+  const bool of_material = is_of_material(spec.type);
   (of_material ? spec.material : spec.shape) = require(of_material ? "material" : "shape").text();
   if (!of_material && spec.type != ParameterType::emission)
     if (const auto selection = find("selection")) spec.selection = read_selection(*selection);

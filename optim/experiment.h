@@ -39,9 +39,13 @@ struct GateSpec {
 /// zeros).
 GateSet make_gates(const GateSpec& spec);
 
-enum class ParameterType { translation, rotation, vertices, albedo, roughness, emission };
+enum class ParameterType { translation, rotation, vertices, albedo, roughness, ior, emission };
 enum class VertexDirection { fixed, normal, free };
 const char* name(ParameterType type);
+/// Whether it is a material's, else a shape's.
+inline bool is_of_material(ParameterType type) {
+  return type == ParameterType::albedo || type == ParameterType::roughness || type == ParameterType::ior;
+}
 
 /// Which vertices of a shape a parameter moves: all, a list of indices, or those inside a box.
 struct Selection {
@@ -51,12 +55,12 @@ struct Selection {
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
-/// file; those of albedo, roughness and emission replace what the scene file says.
+/// file; those of albedo, roughness, ior and emission replace what the scene file says.
 struct ParameterSpec {
   std::string name;
   ParameterType type = ParameterType::translation;
   std::string shape;     ///< translation, rotation, vertices, emission
-  std::string material;  ///< albedo, roughness
+  std::string material;  ///< albedo, roughness, ior
   Selection selection;
   VertexDirection direction_kind = VertexDirection::fixed;
   Vec3

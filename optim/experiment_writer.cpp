@@ -78,7 +78,8 @@ const char* program_version() {
 }
 
 const char* name(ParameterType type) {
-  constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo", "roughness", "emission"};
+  constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo",
+                                    "roughness",   "ior",      "emission"};
   return kNames[static_cast<int>(type)];
 }
 

@@ -14,7 +14,7 @@ namespace isochron {
 namespace {
 
 constexpr double kDegree = kPi / 180;
-constexpr double kLeastAlbedo = 1e-4, kLeastRoughness = 1e-3, kLeastRelativeEmission = 1e-6;
+constexpr double kLeastAlbedo = 1e-4, kLeastRoughness = 1e-3, kLeastContrast = 1e-3, kLeastRelativeEmission = 1e-6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -69,6 +69,16 @@ int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, st
   return count;
 }
 
+void check_material(const ParameterSpec& spec, MaterialType type) {
+  const auto reject = [&](const char* is, const char* has) {
+    spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material, is, has));
+  };
+  if (spec.type == ParameterType::roughness && type == MaterialType::diffuse) reject("diffuse", "roughness");
+  if (spec.type == ParameterType::ior && type != MaterialType::rough_dielectric) reject("no dielectric", "ior");
+  if (spec.type == ParameterType::albedo && type == MaterialType::rough_dielectric)
+    reject("a dielectric", "albedo");
+}
+
 }  // namespace
 
 Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs)
@@ -76,13 +86,12 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
   for (const ParameterSpec& spec : specs) {
     int count = 1;
     int shape = -1, material = -1;
-    if (spec.type == ParameterType::albedo || spec.type == ParameterType::roughness) {
+    if (is_of_material(spec.type)) {
       material = scene.find_material(spec.material);
       if (material < 0)
         spec.fail("material", fmt::format("there is no material '{}' in the scene", spec.material),
                   "allowed: " + names_of(scene.materials));
-      if (spec.type == ParameterType::roughness && scene.materials[material].type == MaterialType::diffuse)
-        spec.fail("material", fmt::format("material '{}' is diffuse and has no roughness", spec.material));
+      check_material(spec, scene.materials[material].type);
     } else {
       shape = scene.find_shape(spec.shape);
       if (shape < 0)
@@ -97,7 +106,7 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
       bind_motion(spec, motion, shape, count);
       motions_[shape].push_back(std::move(motion));
     } else {
-      if (spec.type != ParameterType::roughness && !scene.grey) count = 3;
+      if ((spec.type == ParameterType::albedo || spec.type == ParameterType::emission) && !scene.grey) count = 3;
       const int index = spec.type == ParameterType::emission ? shape : material;
       for (const MaterialValue& other : material_values_)
         if (other.type == spec.type && other.index == index)
@@ -145,6 +154,12 @@ void Parameters::bind_values(const ParameterSpec& spec, int count) {
   double lowest = -kInfinity, highest = kInfinity;
   if (spec.type == ParameterType::albedo) lowest = kLeastAlbedo, highest = 1;
   if (spec.type == ParameterType::roughness) lowest = kLeastRoughness, highest = 1;
+  if (spec.type == ParameterType::ior) {
+    if (std::any_of(spec.initial.begin(), spec.initial.end(), [](double value) { return value > 1; }))
+      lowest = 1 + kLeastContrast;
+    else
+      lowest = kLeastContrast, highest = 1 - kLeastContrast;
+  }
   if (spec.type == ParameterType::emission) {
     const double largest = *std::max_element(spec.initial.begin(), spec.initial.end());
     if (!(largest > 0)) spec.fail("initial", "is no emission", "a number above 0");
@@ -222,6 +237,7 @@ Scene Parameters::apply(const std::vector<double>& theta) const {
     const Rgb colour = value.count == 1 ? Rgb(t[0]) : Rgb(t[0], t[1], t[2]);
     if (value.type == ParameterType::albedo) scene.materials[value.index].albedo = colour;
     if (value.type == ParameterType::roughness) scene.materials[value.index].roughness = t[0];
+    if (value.type == ParameterType::ior) scene.materials[value.index].ior = t[0];
     if (value.type == ParameterType::emission) scene.shapes[value.index].emission = colour;
   }
   return scene;
@@ -259,6 +275,7 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
       if (value.type == ParameterType::emission) set(layout.emission(value.index, channel), column);
     }
     if (value.type == ParameterType::roughness) set(layout.roughness(value.index), value.first_component);
+    if (value.type == ParameterType::ior) set(layout.ior(value.index), value.first_component);
   }
   for (std::size_t i = 0; i < column_of.size(); ++i) {
     if (column_of[i] >= 0) basis.entries.push_back({column_of[i], 1.0});

@@ -4,7 +4,8 @@
 // tangents of earlier parameters are carried through it. Directions (also `normal`: the area-weighted vertex
 // normals of the loaded mesh) and pivots are fixed in the world.
 //
-// Physical bounds, always applied besides the user's: albedo in [1e-4, 1], roughness in [1e-3, 1], emission
+// Physical bounds, always applied besides the user's: albedo in [1e-4, 1], roughness in [1e-3, 1], ior at
+// least 1e-3 from 1 on the side of its initial value, emission
 // at least 1e-6 of its largest initial component (so that an emitter stays one).
 #pragma once
 #include <string>

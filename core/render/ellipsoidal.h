@@ -3,6 +3,8 @@
 //   surface arcs   q is put between a camera-side vertex x_k (the camera included) and a point y on an emitter, on an
 //                  ellipse of total length tau;
 //   emitter arcs   the emitter's point itself is put on a circle at the distance that is left.
+// Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
+// that ends outside is found by emitter arcs, whatever it went through before.
 // Every crossing arc is sampled once; only which of them gets its visibility tested is a random pick, so the density
 // of a technique is one over the arc's span.
 #pragma once
@@ -233,7 +235,9 @@ class EllipsoidalConnections {
       if (path.size() > (kGathers ? 2 : 1)) {
         const SurfacePoint& previous = path.vertex[path.size() - 2];
         const double by_emitter = vertex_pdf() / (y.span * y.area_rate);
-        const double by_surface = scene_.emitter_pdf(y.point.triangle) * surface_arc_pdf(previous, x, y.point);
+        const double by_surface =
+            scene_.outside(previous, x) ? scene_.emitter_pdf(y.point.triangle) * surface_arc_pdf(previous, x, y.point)
+                                        : 0;
         weight = by_emitter / (by_emitter + by_surface);
       }
       worker_.path.push(scene_, y.point);
@@ -266,6 +270,7 @@ class EllipsoidalConnections {
     const SurfacePoint q = scene_.point_in_plane(t, arcs.point(phi));
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
+    if (!scene_.outside(x, q)) return;
     const Scattering s(x.p, q, y.p);
     const double cos_y = -dot(y.n, s.w_i);
     if (!(cos_y > 0)) return;
@@ -298,6 +303,7 @@ class EllipsoidalConnections {
     const SurfacePoint y = scene_.point_in_plane(t, arcs.point(arcs.angle(along)));
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
+    if (!scene_.outside(x, y)) return;
     const double distance = 0.5 * sphere.tau;
     const Vec3 w = (y.p - x.p) / distance;
     const double cos_y = -dot(y.n, w);

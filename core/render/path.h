@@ -33,7 +33,7 @@ class FixedStack {
 /// boundary segment, the point that the walk looks from); its triangle is -1 for the camera.
 struct Path {
   FixedStack<SurfacePoint> vertex;
-  FixedStack<double> length;  ///< length[k]: from vertex 0 to vertex k, plus what length[0] starts with
+  FixedStack<double> length;  ///< length[k]: optical, from vertex 0 to vertex k, plus what length[0] starts with
   FixedStack<char> moves;     ///< moves[k]: some vertex up to k can have a derivative
 
   explicit Path(int max_bounces) : vertex(max_bounces + 3), length(max_bounces + 3), moves(max_bounces + 3) {}
@@ -45,9 +45,9 @@ struct Path {
   void push(const PreparedScene& scene, const SurfacePoint& x) {
     push(scene, x, isochron::length(x.p - vertex.back().p));
   }
-  /// `distance`: of x from the last vertex.
+  /// `distance`: of x from the last vertex, geometric.
   void push(const PreparedScene& scene, const SurfacePoint& x, double distance) {
-    length.push_back(length.back() + distance);
+    length.push_back(length.back() + distance * scene.index_between(back(), x));
     moves.push_back(moves.back() || scene.moves(x.triangle));
     vertex.push_back(x);
   }

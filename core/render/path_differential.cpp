@@ -9,17 +9,15 @@ namespace {
 struct Accumulated {
   Vec3 position;  ///< d ln F / d x_k, normals held
   Vec3 normal;    ///< d ln F / d n_k, as if n_k were free
-  Vec3 length;    ///< d l / d x_k
+  Vec3 length;    ///< d l / d x_k, l optical
 };
 
 /// d (unit direction of d) contracted with g: (g - (g.w) w) / |d|.
 Vec3 through_normalize(const Vec3& g, const Vec3& w, double distance) { return (g - w * dot(g, w)) / distance; }
 
-/// Adds the scattering lobe's part at vertex x between its neighbours.
-void add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s, Accumulated& before,
-              Accumulated& here, Accumulated& after, double& d_roughness) {
-  d_roughness = 0;
-  if (material.type == MaterialType::diffuse) return;
+/// Adds the scattering lobe's part at vertex x between its neighbours; returns the lobe's derivative.
+LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s, Accumulated& before,
+                        Accumulated& here, Accumulated& after) {
   const LobeDerivative lobe = lobe_derivative(material, s.cos_i, s.cos_o, s.cos_io);
   const Vec3 to_after = through_normalize(x.n * lobe.d_cos_i + s.w_o * lobe.d_cos_io, s.w_i, s.distance_i);
   const Vec3 to_before = through_normalize(x.n * lobe.d_cos_o + s.w_i * lobe.d_cos_io, s.w_o, s.distance_o);
@@ -27,7 +25,7 @@ void add_lobe(const Material& material, const SurfacePoint& x, const Scattering&
   before.position += to_before;
   here.position -= to_after + to_before;
   here.normal += s.w_i * lobe.d_cos_i + s.w_o * lobe.d_cos_o;
-  d_roughness = lobe.d_roughness;
+  return lobe;
 }
 
 /// Carries position and normal gradients of vertex k to its triangle's vertices.
@@ -70,8 +68,14 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     const double squared = length_squared(d);
     const double inverse = 1 / std::sqrt(squared);
     const Vec3 w = d * inverse;
-    g[k].length -= w;
-    g[k + 1].length += w;
+    const Material* medium = scene.medium_between(x[k], x[k + 1]);
+    const Vec3 g_length = medium ? w * medium->ior : w;
+    g[k].length -= g_length;
+    g[k + 1].length += g_length;
+    if (medium) {
+      const int m = static_cast<int>(medium - scene.scene.materials.data());
+      if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, 0, squared * inverse});
+    }
     if (length_only || k == 0) continue;
     const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
     const Vec3 g_d = x[k].n / cos_near + x[k + 1].n / cos_far - d * (4 / squared);
@@ -84,11 +88,11 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     for (int k = 1; k + 1 < count; ++k) {
       const int m = scene.shape_of(x[k].triangle).material;
       const Material& material = scene.scene.materials[m];
-      double d_roughness;
       if (material.type != MaterialType::diffuse) {
         const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
-        add_lobe(material, x[k], s, g[k - 1], g[k], g[k + 1], d_roughness);
-        if (scene.moving.roughness[m]) out.scalars.push_back({scene.layout.roughness(m), -1, d_roughness});
+        const LobeDerivative lobe = add_lobe(material, x[k], s, g[k - 1], g[k], g[k + 1]);
+        if (scene.moving.roughness[m]) out.scalars.push_back({scene.layout.roughness(m), -1, lobe.d_roughness});
+        if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, lobe.d_ior});
       }
       if (scene.moving.albedo[m])
         for (int c = 0; c < 3; ++c)

@@ -11,17 +11,18 @@ namespace isochron {
 struct VertexGradient {
   int vertex;
   Vec3 log_f;   ///< of ln F
-  Vec3 length;  ///< of the path length
+  Vec3 length;  ///< of the (optical) path length
 };
 
-/// Gradient of ln F with respect to a scalar degree of freedom; `channel` -1: of every channel.
+/// Gradients with respect to a scalar degree of freedom; `channel` -1: of every channel.
 struct ScalarGradient {
   int dof;
   int channel;
-  double log_f;
+  double log_f;       ///< of ln F
+  double length = 0;  ///< of the path length
 };
 
-/// Sparse gradient of one path (or boundary segment). A vertex may appear more than once; entries add up.
+/// Sparse gradient of one path (or boundary segment). What appears more than once adds up.
 struct LocalDifferential {
   std::vector<VertexGradient> vertices;
   std::vector<ScalarGradient> scalars;

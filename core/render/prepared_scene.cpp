@@ -26,6 +26,7 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
       triangle(scene.triangles.size(), 0),
       albedo(scene.materials.size(), 0),
       roughness(scene.materials.size(), 0),
+      ior(scene.materials.size(), 0),
       emission(scene.shapes.size(), 0),
       scatters(scene.triangles.size(), 0) {
   if (!basis || basis->columns == 0) return;
@@ -35,15 +36,18 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
   for (int m = 0; m < layout.materials; ++m) {
     for (int c = 0; c < 3; ++c) albedo[m] |= basis->moves(layout.albedo(m, c));
     roughness[m] = basis->moves(layout.roughness(m));
+    ior[m] = basis->moves(layout.ior(m)) && scene.materials[m].type == MaterialType::rough_dielectric;
+    lengths |= ior[m] != 0;
   }
   for (int s = 0; s < layout.shapes; ++s)
     for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
   for (std::size_t t = 0; t < triangle.size(); ++t) {
     for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
     const int m = scene.shapes[scene.triangles[t].shape].material;
-    scatters[t] = albedo[m] || roughness[m];
+    scatters[t] = albedo[m] || roughness[m] || ior[m];
     geometry |= triangle[t] != 0;
   }
+  lengths |= geometry;
   any = !basis->entries.empty();
 }
 
@@ -66,6 +70,10 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis)
     record.origin = corner(t, 0);
     record.shape = scene.triangles[t].shape;
     record.material = &scene.materials[scene.shapes[record.shape].material];
+    if (is_dielectric(t)) {
+      has_dielectric_ = true;
+      least_index_ = std::min(least_index_, record.material->ior);
+    }
     record.moves = moving.triangle[t] || moving.scatters[t];
     // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
     if (doubled > 0) {
@@ -127,7 +135,7 @@ double PreparedScene::distance_to_emitters(const Vec3& p) const {
     }
     nearest = std::min(nearest, squared);
   }
-  return std::sqrt(nearest);
+  return std::sqrt(nearest) * least_index_;
 }
 
 }  // namespace isochron

@@ -49,10 +49,11 @@ class DiscreteDistribution {
 /// Which degrees of freedom move. Everything else is skipped by the derivative passes.
 struct MovingParts {
   std::vector<std::uint8_t> vertex, triangle;
-  std::vector<std::uint8_t> albedo, roughness;  ///< per material
-  std::vector<std::uint8_t> emission;           ///< per shape
-  std::vector<std::uint8_t> scatters;           ///< per triangle: its material's albedo or roughness moves
+  std::vector<std::uint8_t> albedo, roughness, ior;  ///< per material
+  std::vector<std::uint8_t> emission;                ///< per shape
+  std::vector<std::uint8_t> scatters;                ///< per triangle: its material's albedo, roughness or ior moves
   bool any = false, geometry = false;
+  bool lengths = false;  ///< paths can change their length
   MovingParts(const Scene& scene, const TangentBasis* basis);
 };
 
@@ -78,6 +79,27 @@ class PreparedScene {
   Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
     return dot(x.n, w) > 0 ? shape_of(x.triangle).emission : Rgb();
   }
+
+  /// The dielectric that the segment between x and y, which see each other, runs inside of: one with an end on the
+  /// back of its face. Null outside. Opaque surfaces and the camera (triangle -1) know no medium: a segment between
+  /// two of them counts as outside.
+  const Material* medium_between(const SurfacePoint& x, const SurfacePoint& y) const {
+    if (!has_dielectric_) return nullptr;
+    const Vec3 d = y.p - x.p;
+    if (is_behind(x, d)) return &material_of(x.triangle);
+    if (is_behind(y, -d)) return &material_of(y.triangle);
+    return nullptr;
+  }
+  /// Optical length of the segment over its geometric length.
+  double index_between(const SurfacePoint& x, const SurfacePoint& y) const {
+    const Material* medium = medium_between(x, y);
+    return medium ? medium->ior : 1;
+  }
+  bool outside(const SurfacePoint& x, const SurfacePoint& y) const { return !medium_between(x, y); }
+  bool is_dielectric(int triangle) const { return material_of(triangle).type == MaterialType::rough_dielectric; }
+  /// Lower bound of the optical length of any path over the distance between its ends.
+  double least_index() const { return least_index_; }
+
   bool emits(int triangle) const { return records_[triangle].emits; }
   /// Whether a path through the triangle can have a derivative because of it.
   bool moves(int triangle) const { return records_[triangle].moves; }
@@ -126,13 +148,17 @@ class PreparedScene {
     return x.p + x.n * std::copysign(caster.offset(), dot(x.n, w));
   }
 
-  /// Lower bound of the distance from p to any emitter.
+  /// Lower bound of the optical length of any path from p to an emitter.
   double distance_to_emitters(const Vec3& p) const;
 
  private:
   struct Box {
     Vec3 low, high;
   };
+  /// Whether x is on a dielectric's face whose back the direction d leaves from.
+  bool is_behind(const SurfacePoint& x, const Vec3& d) const {
+    return x.triangle >= 0 && is_dielectric(x.triangle) && dot(x.n, d) < 0;
+  }
   /// First point on the ray that starts at `lifted`; it is put on the line through `origin`.
   std::optional<SurfacePoint> first_point(const Vec3& lifted, const Vec3& origin, const Vec3& w) const {
     const int t = caster.first_triangle(lifted, w);
@@ -144,6 +170,8 @@ class PreparedScene {
   std::vector<double> emitter_pdf_;
   std::vector<Box> emitter_boxes_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;
+  bool has_dielectric_ = false;
+  double least_index_ = 1;
 };
 
 }  // namespace isochron

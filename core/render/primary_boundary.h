@@ -77,7 +77,7 @@ class PrimaryBoundary {
     for (const double sign : {-1.0, 1.0}) {
       const auto x1 = seen_beside(worker_, *edge, y, d, n_b * sign);
       if (!x1) continue;
-      const double before = length(x1->p - eye.p);
+      const double before = length(x1->p - eye.p) * scene_.index_between(eye, *x1);
       Rng walk_rng = shared;
       for (const GatheredLight& light :
            light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng))

@@ -125,7 +125,7 @@ struct Renderer::Impl {
     if (!scene.moving.any || scene.emitters.empty()) return false;
     if (term == Term::interior) return true;
     if (term == Term::visibility) return scene.moving.geometry;
-    return scene.moving.geometry && gates.shape().pair_mass(jump_part()) > 0;
+    return scene.moving.lengths && gates.shape().pair_mass(jump_part()) > 0;
   }
   PairPart jump_part() const { return ellipsoidal ? PairPart::jumps : PairPart::atoms; }
 
@@ -150,7 +150,7 @@ struct Renderer::Impl {
       if (term == Term::interior) {
         pass.value = true;
         pass.use = options.antithetic ? GateUse::value : GateUse::value_and_slope;
-        pass.pairs = options.antithetic && scene.moving.geometry;
+        pass.pairs = options.antithetic && scene.moving.lengths;
         pass.part = PairPart::smooth;
       } else {
         pass.pairs = true;

@@ -110,7 +110,8 @@ class SecondaryBoundary {
   enum class Found { from_edge, from_camera };
 
   bool faces(int triangle, const Vec3& w) const {
-    return dot(scene_.normal[triangle], w) > 0 || scene_.material_of(triangle).two_sided;
+    return dot(scene_.normal[triangle], w) > 0 || scene_.material_of(triangle).two_sided ||
+           scene_.is_dielectric(triangle);
   }
 
   /// Uniform in azimuth over the grazing wedge (see BoundaryEdge::azimuths) and in the cosine to the edge.
@@ -199,15 +200,16 @@ class SecondaryBoundary {
           camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
           const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
           connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
-                                  walked + distance, camera_over_edge(g, camera_side_, bounce)});
+                                  walked + distance * scene_.index_between(x, eye), camera_over_edge(g, camera_side_, bounce)});
         }
       }
       if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
-      const auto next = step(worker_, x, from, throughput, rng);
+      const auto next = step(worker_, x, from, throughput, rng, Walk::towards_camera);
       if (!next) return;
       from = -next->direction;
-      walked += length(next->point.p - x.p);
-      if (walked + g.r_d + g.r_s + length(next->point.p - camera.position) > worker_.gates.upper()) return;
+      walked += length(next->point.p - x.p) * scene_.index_between(x, next->point);
+      const double others = g.r_d + g.r_s + length(next->point.p - camera.position);
+      if (walked + others * scene_.least_index() > worker_.gates.upper()) return;
       walk_.push_back(next->point);
     }
   }
@@ -277,9 +279,9 @@ class SecondaryBoundary {
   };
 
   /// Density of the edge point when the length is drawn from the gates, over that of a uniform one; S is on an emitter
-  /// and `before` is the length from the camera to D.
+  /// and `before` is the length from the camera to D. Lengths are drawn for segments outside of dielectrics alone.
   double length_over_uniform(const Segment& g, double before) const {
-    if (!at_length_ || !scene_.emits(g.light.triangle)) return 0;
+    if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
     const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
     const int t = g.light.triangle;
     return scene_.emitter_pdf(t) * scene_.area[t] * worker_.gates.mixture_pdf(before + g.r_d + g.r_s) *
@@ -312,9 +314,10 @@ class SecondaryBoundary {
     if (connections_.empty()) return;
     int fewest = connections_[0].bounces;
     before_.clear();
+    const double length = (g.r_d + g.r_s) * scene_.index_between(g.camera_end, g.light);
     for (const Connection& c : connections_) {
       fewest = std::min(fewest, c.bounces);
-      before_.push_back(c.length + g.r_d + g.r_s);
+      before_.push_back(c.length + length);
     }
     const auto& lights = light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng);
     const LocalDifferential* bound = nullptr;

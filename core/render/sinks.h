@@ -58,6 +58,7 @@ class TangentSink {
       for_each_column(s.dof, [&](Rates& rates, double velocity) {
         for (int c = 0; c < 3; ++c)
           if (s.channel < 0 || s.channel == c) rates.log_f[c] += s.log_f * velocity;
+        rates.length += s.length * velocity;
       });
   }
 
@@ -151,7 +152,8 @@ class AdjointSink {
         if (const int i = active_[layout_.vertex(v.vertex, axis)]; i >= 0)
           gradient_[i] += sum * v.log_f[axis] + slope_weight * v.length[axis];
     for (const ScalarGradient& s : differential_->scalars)
-      if (const int i = active_[s.dof]; i >= 0) gradient_[i] += (s.channel < 0 ? sum : weight[s.channel]) * s.log_f;
+      if (const int i = active_[s.dof]; i >= 0)
+        gradient_[i] += (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length;
   }
 
   const GateSet& gates_;

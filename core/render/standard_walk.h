@@ -45,7 +45,7 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
     const Scattering s(x, w_o, distance_o, y.p);
     const double scattered = s.lobe(material) * std::abs(s.cos_i);
     const double cos_y = -dot(y.n, s.w_i);
-    if (scattered > 0 && cos_y > 0 && reach.holds(path.length.back() + s.distance_i)) {
+    if (scattered > 0 && cos_y > 0 && reach.holds(path.length.back() + s.distance_i * scene.index_between(x, y))) {
       const double to_area = cos_y / (s.distance_i * s.distance_i);
       const double pdf_bsdf = s.pdf_towards_light(material) * to_area;
       path.push(scene, y, s.distance_i);

@@ -77,12 +77,14 @@ struct Step {
   double pdf;      ///< per solid angle
 };
 
-/// Goes on from x, which looks back along the unit vector w_o, by BSDF sampling. Empty when the walk ends.
+/// Goes on from x, which looks back along the unit vector w_back, by BSDF sampling. Empty when the walk ends.
 template <class W>
-std::optional<Step> step(W& worker, const SurfacePoint& x, const Vec3& w_o, Rgb& throughput, Rng& rng) {
+std::optional<Step> step(W& worker, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput, Rng& rng,
+                         Walk walk = Walk::towards_light) {
   const Material& material = worker.scene.material_of(x.triangle);
   const double u0 = rng.uniform(), u1 = rng.uniform();
-  const auto next = sample_direction(material, x.n, w_o, u0, u1);
+  const double u2 = material.type == MaterialType::rough_dielectric ? rng.uniform() : 0;
+  const auto next = sample_direction(material, x.n, w_back, u0, u1, u2, walk);
   if (!next) return std::nullopt;
   throughput *= material.albedo * next->weight;
   if (throughput.is_black()) return std::nullopt;

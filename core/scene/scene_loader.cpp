@@ -53,17 +53,20 @@ Material read_material(const std::string& name, const YamlValue& value, bool& gr
   Material material;
   material.name = name;
   const YamlValue type = map.require("type");
-  if (type.is_scalar() && type.text() == "rough_dielectric")
-    type.fail("rough_dielectric is not available yet", "allowed: diffuse, rough_conductor");
-  if (type.choice({"diffuse", "rough_conductor"}) == 0) {
-    material.type = MaterialType::diffuse;
-    material.albedo = map.require("albedo").color(unit, grey);
-  } else {
-    material.type = MaterialType::rough_conductor;
+  material.type = static_cast<MaterialType>(type.choice({"diffuse", "rough_conductor", "rough_dielectric"}));
+  if (material.type == MaterialType::diffuse) material.albedo = map.require("albedo").color(unit, grey);
+  if (material.type == MaterialType::rough_conductor)
     material.albedo = map.require("reflectance").color(unit, grey);
+  if (material.type != MaterialType::diffuse)
     material.roughness = map.require("roughness").number({.low = 0, .high = 1, .low_open = true});
+  if (material.type == MaterialType::rough_dielectric) {
+    material.albedo = Rgb(1);
+    const YamlValue ior = map.require("ior");
+    material.ior = ior.number(NumberRange::positive());
+    if (material.ior == 1) ior.fail("1 is no boundary", "a number above 0 other than 1");
+  } else if (const auto two_sided = map.find("two_sided")) {
+    material.two_sided = two_sided->boolean();
   }
-  if (const auto two_sided = map.find("two_sided")) material.two_sided = two_sided->boolean();
   map.reject_unknown();
   return material;
 }
@@ -110,14 +113,36 @@ void check_areas(const YamlValue& cause, const Mesh& mesh) {
   }
 }
 
+/// Throws InputError unless the mesh bounds a solid: every edge has two faces, which run along it in opposite directions.
+void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
+  const auto runs_along = [&](int face, const Edge& edge) {
+    const auto& f = mesh.faces[face];
+    for (int i = 0; i < 3; ++i)
+      if (f[i] == edge.vertex[0]) return f[(i + 1) % 3] == edge.vertex[1];
+    return false;
+  };
+  for (const Edge& edge : edges) {
+    const auto complain = [&](const char* what) {
+      const Vec3 &a = mesh.positions[edge.vertex[0]], &b = mesh.positions[edge.vertex[1]];
+      throw InputError(fmt::format("a rough_dielectric needs a closed surface; {} ({:.6g}, {:.6g}, {:.6g}) to "
+                                   "({:.6g}, {:.6g}, {:.6g})",
+                                   what, a.x, a.y, a.z, b.x, b.y, b.z));
+    };
+    if (edge.face[1] < 0) complain("this one ends at the edge from");
+    if (runs_along(edge.face[0], edge) == runs_along(edge.face[1], edge))
+      complain("the faces of this one disagree about its outside at the edge from");
+  }
+}
+
 Mesh read_shape_mesh(const YamlValue& file, const std::string& path,
-                     const std::optional<YamlValue>& transform, std::vector<Edge>& edges) {
+                     const std::optional<YamlValue>& transform, bool solid, std::vector<Edge>& edges) {
   Mesh mesh;
   try {
     const Mesh raw = read_mesh(path);
     try {
       mesh = clean_mesh(raw);
       edges = build_edges(mesh);
+      if (solid) check_solid(mesh, edges);
     } catch (const InputError& error) {
       throw InputError(path + ": " + error.what());
     }
@@ -147,11 +172,14 @@ void read_shape(const YamlValue& value, Scene& scene) {
 
   if (const auto emission = map.find("emission"))
     shape.emission = emission->color(NumberRange::non_negative(), scene.grey);
+  const bool dielectric = scene.materials[shape.material].type == MaterialType::rough_dielectric;
+  if (dielectric && !shape.emission.is_black())
+    map.find("emission")->fail("a shape of rough_dielectric emits nothing", "leave it out");
   const std::optional<YamlValue> transform = map.find("transform");
   map.reject_unknown();
 
   std::vector<Edge> edges;
-  const Mesh mesh = read_shape_mesh(file, shape.file, transform, edges);
+  const Mesh mesh = read_shape_mesh(file, shape.file, transform, dielectric, edges);
   constexpr std::size_t kMost =
       std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
   if (scene.positions.size() + mesh.positions.size() > kMost ||

@@ -207,6 +207,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
         "  - {name: pull, type: vertices, shape: block, direction: [1, 1, 0], selection: [2, 0], initial: "
         "0, target: [0.1, -0.1]}\n"
         "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
+        "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
         "  - {name: power");
     const Experiment original = load_experiment(folder.write("tiny.yaml", text));
     const std::string out = folder.file("runs/deep");
@@ -225,7 +226,9 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.estimator.sampling, Sampling::ellipsoidal);
     EXPECT_FALSE(back.estimator.antithetic);
     EXPECT_EQ(back.gradient.step, 0.003);
-    ASSERT_EQ(back.parameters.size(), 6u);
+    ASSERT_EQ(back.parameters.size(), 7u);
+    EXPECT_EQ(back.parameters[5].type, ParameterType::ior);
+    EXPECT_EQ(back.parameters[5].material, "glass");
     EXPECT_EQ(back.parameters[1].initial, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
     EXPECT_EQ(back.parameters[1].upper, (std::vector<double>{1, 2, 3, 4}));
     EXPECT_EQ(back.parameters[1].direction_kind, VertexDirection::normal);

@@ -11,11 +11,12 @@
 namespace isochron {
 namespace {
 
-/// Two shapes: a tetrahedron of four vertices and a quad of four, one diffuse and one rough material.
+/// Two shapes: a tetrahedron of four vertices and a quad of four, a diffuse, a rough and a glass material.
 Scene two_shapes(bool grey) {
   Scene scene;
   scene.grey = grey;
-  scene.materials = {{.name = "white"}, {.name = "metal", .type = MaterialType::rough_conductor}};
+  scene.materials = {{.name = "white"}, {.name = "metal", .type = MaterialType::rough_conductor},
+                     {.name = "glass", .type = MaterialType::rough_dielectric}};
   scene.positions = {{0, 0, 0},   {1, 0, 0},  {0, 2, 0}, {0, 0, 3},
                      {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
   scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0},
@@ -43,7 +44,7 @@ ParameterSpec spec(const std::string& name, ParameterType type, const std::strin
   ParameterSpec s;
   s.name = name;
   s.type = type;
-  (type == ParameterType::albedo || type == ParameterType::roughness ? s.material : s.shape) = of;
+  (is_of_material(type) ? s.material : s.shape) = of;
   s.initial = {initial};
   s.target = {initial};
   return s;
@@ -68,6 +69,7 @@ std::vector<ParameterSpec> every_kind() {
   specs.back().direction = {0, 2, 0};
   specs.push_back(spec("colour", ParameterType::albedo, "white", 0.4));
   specs.push_back(spec("rough", ParameterType::roughness, "metal", 0.25));
+  specs.push_back(spec("bend", ParameterType::ior, "glass", 1.5));
   specs.push_back(spec("power", ParameterType::emission, "quad", 3));
   return specs;
 }
@@ -94,7 +96,7 @@ TEST(Parameters, TangentIsTheDerivativeOfApply) {
   for (bool grey : {true, false}) {
     const Scene scene = two_shapes(grey);
     const Parameters parameters(scene, every_kind());
-    ASSERT_EQ(parameters.size(), 1 + 2 + 1 + 6 + 1 + 4 + (grey ? 1 : 3) + 1 + (grey ? 1 : 3));
+    ASSERT_EQ(parameters.size(), 1 + 2 + 1 + 6 + 1 + 4 + (grey ? 1 : 3) + 1 + 1 + (grey ? 1 : 3));
     const std::vector<double> theta = point_near_initial(parameters, 5);
     const TangentBasis basis = parameters.tangent(theta);
     ASSERT_EQ(basis.columns, parameters.size());
@@ -213,7 +215,7 @@ TEST(Parameters, RejectWhatDoesNotFitTheScene) {
   EXPECT_EQ(message(s), "parameter p: material: material 'white' is diffuse and has no roughness");
   s = spec("p", ParameterType::albedo, "gold", 0.2);
   EXPECT_EQ(message(s),
-            "parameter p: material: there is no material 'gold' in the scene (allowed: white, metal)");
+            "parameter p: material: there is no material 'gold' in the scene (allowed: white, metal, glass)");
   s = spec("p", ParameterType::translation, "tetra", 0);
   s.selection = {Selection::Kind::box, {}, {5, 5, 5}, {6, 6, 6}};
   EXPECT_EQ(message(s), "parameter p: selection: selects no vertex of shape 'tetra'");
@@ -221,6 +223,17 @@ TEST(Parameters, RejectWhatDoesNotFitTheScene) {
   EXPECT_EQ(message(s), "parameter p: selection: there is no vertex 4 in shape 'tetra' (0 to 3)");
   s.selection = {Selection::Kind::list, {2, 2}, {}, {}};
   EXPECT_EQ(message(s), "parameter p: selection: vertex 2 is listed twice");
+  s = spec("p", ParameterType::ior, "metal", 1.5);
+  EXPECT_EQ(message(s), "parameter p: material: material 'metal' is no dielectric and has no ior");
+  s = spec("p", ParameterType::albedo, "glass", 0.5);
+  EXPECT_EQ(message(s), "parameter p: material: material 'glass' is a dielectric and has no albedo");
+  // An index keeps to its side of one.
+  s = spec("p", ParameterType::ior, "glass", 1.5);
+  s.target = {0.9};
+  EXPECT_EQ(message(s), "parameter p: target: 0.9 is out of bounds (1.001 to inf)");
+  s = spec("p", ParameterType::ior, "glass", 0.7);
+  s.target = {1};
+  EXPECT_EQ(message(s), "parameter p: target: 1 is out of bounds (0.001 to 0.999)");
   s = spec("p", ParameterType::albedo, "white", 1.2);
   EXPECT_EQ(message(s), "parameter p: initial: 1.2 is out of bounds (0.0001 to 1)");
   s = spec("p", ParameterType::albedo, "white", 0.5);

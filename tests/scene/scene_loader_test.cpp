@@ -213,12 +213,9 @@ TEST_F(SceneLoader, MaterialErrors) {
   EXPECT_EQ(error(", reflectance: 0.9", ""), "scene.yaml:9:10: materials.metal.reflectance: is missing");
   EXPECT_EQ(error("two_sided: true", "two_sided: 1"),
             "scene.yaml:9:79: materials.metal.two_sided: '1' is neither (true or false)");
-  EXPECT_EQ(error("type: diffuse", "type: rough_dielectric"),
-            "scene.yaml:8:17: materials.white.type: rough_dielectric is not available yet "
-            "(allowed: diffuse, rough_conductor)");
   EXPECT_EQ(error("type: diffuse", "type: difuse"),
             "scene.yaml:8:17: materials.white.type: 'difuse' is not known, did you mean 'diffuse'? "
-            "(allowed: diffuse, rough_conductor)");
+            "(allowed: diffuse, rough_conductor, rough_dielectric)");
   EXPECT_EQ(
       error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
       "scene.yaml:8:39: materials.white.roughness: is not a known key (allowed: type, albedo, two_sided)");
