@@ -200,7 +200,8 @@ class SecondaryBoundary {
           camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
           const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
           connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
-                                  walked + distance * scene_.index_between(x, eye), camera_over_edge(g, camera_side_, bounce)});
+                                  walked + distance * scene_.index_between(x, eye),
+                                  camera_over_edge(g, camera_side_, bounce)});
         }
       }
       if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;

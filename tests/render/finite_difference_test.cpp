@@ -1,9 +1,9 @@
-// Total derivative = finite differences, for everything that can move, in a diffuse and a glossy scene, under every
-// kind of gate and both samplings. The finite differences render the moved scenes with common random numbers.
+// Total derivative = finite differences, for everything that can move, in a diffuse and a glossy scene and one with
+// glass, under every kind of gate and both samplings. The finite differences render the moved scenes with common random numbers.
 //
-// Statistics: 2 gates x 7 or 8 parameters per case, each a z-test at 4 standard errors of the difference (false
-// alarms: 16 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below 5 % of the
-// derivative's scale (15 % in the glossy scene): the terms' root mean square over gates and over all motions, which have
+// Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at 4 standard errors of the difference (false
+// alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below 5 % of the
+// derivative's scale (15 % in the others): the terms' root mean square over gates and over all motions, which have
 // comparable speeds; over gates for a material's parameter. The steps are small enough that their bias, of second order, stays below that.
 // ISOCHRON_TEST_SAMPLES=16 in the environment takes 16 times the samples, for errors four times smaller.
 #include <gtest/gtest.h>
@@ -15,9 +15,11 @@
 namespace isochron::testing {
 namespace {
 
+enum class Look { diffuse, glossy, glass };
+
 struct Case {
   const char* name;
-  bool glossy;
+  Look look;
   GateShape shape;
   Sampling sampling;
   int samples, reference_samples;  ///< per batch
@@ -29,7 +31,14 @@ class FiniteDifference : public ::testing::TestWithParam<Case> {};
 TEST_P(FiniteDifference, TotalDerivative) {
   const Case& c = GetParam();
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
-  if (c.glossy)
+  if (c.look == Look::glass) {
+    Material& m = scene.materials[scene.find_material("block")];
+    m.type = MaterialType::rough_dielectric;
+    m.albedo = Rgb(1);
+    m.roughness = 0.3;
+    m.ior = 1.5;
+  }
+  if (c.look == Look::glossy)
     for (const char* name : {"block", "panel"}) {
       Material& m = scene.materials[scene.find_material(name)];
       m.type = MaterialType::rough_conductor;
@@ -52,8 +61,9 @@ TEST_P(FiniteDifference, TotalDerivative) {
       {"rotation", rotate_y(scene, "block", {-0.9, -0.4, -0.6}), 0.02},
       {"vertex of a silhouette", translate(scene, "block", {-0.3, 1, 0.5}, at(corner)), 0.02},
       {"vertex within a surface", translate(scene, "panel", {-1, 0, 0.3}, at(middle)), 0.01},
-      {"albedo", change_albedo(scene, "block"), 0.01, false}};
-  if (c.glossy) parameters.push_back({"roughness", change_roughness(scene, "block"), 0.01, false});
+      {"albedo", change_albedo(scene, c.look == Look::glass ? "grey" : "block"), 0.01, false}};
+  if (c.look == Look::glass) parameters.push_back({"ior", change_ior(scene, "block"), 0.01, false});
+  if (c.look != Look::diffuse) parameters.push_back({"roughness", change_roughness(scene, "block"), 0.01, false});
   std::vector<Motion> motions;
   for (const Parameter& p : parameters) motions.push_back(p.motion);
   const TangentBasis basis = make_basis(scene, motions);
@@ -97,7 +107,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
       EXPECT_LT(std::abs(z_score(total, difference[g])), 4)
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
-      EXPECT_LT(error, (c.glossy ? 0.15 : 0.05) / std::sqrt(factor) * scale)
+      EXPECT_LT(error, (c.look == Look::diffuse ? 0.05 : 0.15) / std::sqrt(factor) * scale)
           << parameters[p].name << ", gate " << g << ": ours " << total.standard_error << ", finite difference "
           << difference[g].standard_error;
     }
@@ -107,13 +117,15 @@ TEST_P(FiniteDifference, TotalDerivative) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, FiniteDifference,
     ::testing::Values(
-        Case{"diffuse_gaussian_standard", false, GateShape::gaussian(0.3), Sampling::standard, 120, 250},
-        Case{"diffuse_boxcar_standard", false, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
-        Case{"diffuse_truncated_ellipsoidal", false, GateShape::truncated_gaussian(0.3, 0.3), Sampling::ellipsoidal, 40,
+        Case{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120, 250},
+        Case{"diffuse_boxcar_standard", Look::diffuse, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
+        Case{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3), Sampling::ellipsoidal, 40,
              400},
-        Case{"glossy_gaussian_ellipsoidal", true, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 250},
-        Case{"glossy_boxcar_ellipsoidal", true, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 400},
-        Case{"glossy_truncated_standard", true, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60, 400}),
+        Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 250},
+        Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 400},
+        Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60, 400},
+        Case{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 250},
+        Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60, 250}),
     [](const auto& test) { return test.param.name; });
 
 }  // namespace

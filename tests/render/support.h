@@ -70,6 +70,14 @@ inline Motion change_roughness(const Scene& scene, const std::string& material) 
           }};
 }
 
+inline Motion change_ior(const Scene& scene, const std::string& material) {
+  const int m = scene.find_material(material);
+  return {[=](Scene& target, double t) { target.materials[m].ior += t; },
+          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
+            out.emplace_back(DofLayout(source).ior(m), 1.0);
+          }};
+}
+
 inline Motion change_emission(const Scene& scene, const std::string& shape) {
   const int s = scene.find_shape(shape);
   return {[=](Scene& target, double t) {

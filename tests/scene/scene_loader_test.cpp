@@ -115,6 +115,50 @@ TEST_F(SceneLoader, LoadsEverything) {
   EXPECT_EQ(inner, 1);
 }
 
+TEST_F(SceneLoader, Glass) {
+  const std::string white = "white: {type: diffuse, albedo: 0.6}";
+  const auto glass = [&](const std::string& keys) {
+    return white + "\n  glass: {type: rough_dielectric, " + keys + "}";
+  };
+  const Material m = load_scene(with(white, glass("roughness: 0.1, ior: 1.4"))).materials[1];
+  EXPECT_EQ(m.type, MaterialType::rough_dielectric);
+  EXPECT_EQ(m.roughness, 0.1);
+  EXPECT_EQ(m.ior, 1.4);
+  EXPECT_EQ(m.albedo, Rgb(1));
+  EXPECT_EQ(error(white, glass("roughness: 0.1")), "scene.yaml:9:10: materials.glass.ior: is missing");
+  EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1")),
+            "scene.yaml:9:53: materials.glass.ior: 1 is no boundary (a number above 0 other than 1)");
+  EXPECT_EQ(error(white, glass("roughness: 0.1, ior: -1.5")),
+            "scene.yaml:9:53: materials.glass.ior: -1.5 is out of range (a number above 0)");
+  EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
+            "scene.yaml:9:58: materials.glass.two_sided: is not a known key (allowed: type, roughness, ior)");
+}
+
+TEST_F(SceneLoader, GlassIsSolid) {
+  const std::string white = "white: {type: diffuse, albedo: 0.6}";
+  const std::string shape = "shapes:\n  - {name: gem, file: gem.off, material: white";
+  const auto message = [&](const std::string& faces, const std::string& more = "") {
+    folder.write("gem.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + faces);
+    std::string text = kScene;
+    text.replace(text.find(white), white.size(), "white: {type: rough_dielectric, roughness: 0.1, ior: 1.4}");
+    text.replace(text.find("material: white, emission"), 15, "material: metal");
+    text.replace(text.find("shapes:"), 7, shape + more + "}");
+    folder.write("scene.yaml", text);
+    std::string found = error_of([&] { load_scene(folder.path("scene.yaml")); });
+    for (std::size_t at; (at = found.find(folder.path(""))) != std::string::npos;) found.erase(at, folder.path("").size());
+    return found;
+  };
+  EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"), "no error");
+  EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n"),
+            "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; this one ends at the "
+            "edge from (1, 0, 0) to (0, 1, 0)");
+  EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 3 2\n"),
+            "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; the faces of this one "
+            "disagree about its outside at the edge from (1, 0, 0) to (0, 1, 0)");
+  EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n", ", emission: 1"),
+            "scene.yaml:11:60: shapes[0].emission: a shape of rough_dielectric emits nothing (leave it out)");
+}
+
 TEST_F(SceneLoader, EdgesOfLaterShapesCountOn) {
   const Scene scene = load_scene(with("meshes/triangle.off", "meshes/quad.obj"));
   ASSERT_EQ(scene.edges.size(), 10u);
