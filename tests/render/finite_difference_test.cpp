@@ -5,6 +5,8 @@
 // alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below 5 % of the
 // derivative's scale (15 % in the others): the terms' root mean square over gates and over all motions, which have
 // comparable speeds; over gates for a material's parameter. The steps are small enough that their bias, of second order, stays below that.
+// Motions of the glass itself have no such limit: next to an edge of the block light goes from face to face over a distance
+// that vanishes, where the derivative's samples grow like one over it. Their tails are heavy, and their z-tests weak.
 // ISOCHRON_TEST_SAMPLES=16 in the environment takes 16 times the samples, for errors four times smaller.
 #include <gtest/gtest.h>
 
@@ -53,16 +55,18 @@ TEST_P(FiniteDifference, TotalDerivative) {
     Motion motion;
     double step;
     bool geometry = true;
+    bool heavy = false;  ///< samples without a finite variance
   };
+  const bool glass = c.look == Look::glass;
   std::vector<Parameter> parameters = {
-      {"moving object", translate(scene, "block", {0.3, 1, 0.2}), 0.01},
+      {"moving object", translate(scene, "block", {0.3, 1, 0.2}), 0.01, true, glass},
       {"moving light", translate(scene, "light", {0.4, 0, 0.3}), 0.01},
       {"moving receiver", translate(scene, "panel", {-1, 0.2, 0.1}), 0.01},
-      {"rotation", rotate_y(scene, "block", {-0.9, -0.4, -0.6}), 0.02},
-      {"vertex of a silhouette", translate(scene, "block", {-0.3, 1, 0.5}, at(corner)), 0.02},
+      {"rotation", rotate_y(scene, "block", {-0.9, -0.4, -0.6}), 0.02, true, glass},
+      {"vertex of a silhouette", translate(scene, "block", {-0.3, 1, 0.5}, at(corner)), 0.02, true, glass},
       {"vertex within a surface", translate(scene, "panel", {-1, 0, 0.3}, at(middle)), 0.01},
-      {"albedo", change_albedo(scene, c.look == Look::glass ? "grey" : "block"), 0.01, false}};
-  if (c.look == Look::glass) parameters.push_back({"ior", change_ior(scene, "block"), 0.01, false});
+      {"albedo", change_albedo(scene, glass ? "grey" : "block"), 0.01, false}};
+  if (glass) parameters.push_back({"ior", change_ior(scene, "block"), 0.01, false});
   if (c.look != Look::diffuse) parameters.push_back({"roughness", change_roughness(scene, "block"), 0.01, false});
   std::vector<Motion> motions;
   for (const Parameter& p : parameters) motions.push_back(p.motion);
@@ -88,7 +92,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
   double motion_scale = 0;
   int motion_count = 0;
   for (std::size_t p = 0; p < parameters.size(); ++p)
-    if (parameters[p].geometry) motion_scale = std::hypot(motion_scale, size_of(p)), ++motion_count;
+    if (parameters[p].geometry && !parameters[p].heavy) motion_scale = std::hypot(motion_scale, size_of(p)), ++motion_count;
   motion_scale /= std::sqrt(motion_count);
 
   EstimatorOptions reference_options = options;
@@ -107,6 +111,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
       EXPECT_LT(std::abs(z_score(total, difference[g])), 4)
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
+      if (parameters[p].heavy) continue;
       EXPECT_LT(error, (c.look == Look::diffuse ? 0.05 : 0.15) / std::sqrt(factor) * scale)
           << parameters[p].name << ", gate " << g << ": ours " << total.standard_error << ", finite difference "
           << difference[g].standard_error;

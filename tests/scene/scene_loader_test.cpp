@@ -127,18 +127,18 @@ TEST_F(SceneLoader, Glass) {
   EXPECT_EQ(m.albedo, Rgb(1));
   EXPECT_EQ(error(white, glass("roughness: 0.1")), "scene.yaml:9:10: materials.glass.ior: is missing");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1")),
-            "scene.yaml:9:53: materials.glass.ior: 1 is no boundary (a number above 0 other than 1)");
+            "scene.yaml:9:56: materials.glass.ior: 1 is no boundary (a number above 0 other than 1)");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: -1.5")),
-            "scene.yaml:9:53: materials.glass.ior: -1.5 is out of range (a number above 0)");
+            "scene.yaml:9:56: materials.glass.ior: -1.5 is out of range (a number above 0)");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
-            "scene.yaml:9:58: materials.glass.two_sided: is not a known key (allowed: type, roughness, ior)");
+            "scene.yaml:9:61: materials.glass.two_sided: is not a known key (allowed: type, roughness, ior)");
 }
 
 TEST_F(SceneLoader, GlassIsSolid) {
   const std::string white = "white: {type: diffuse, albedo: 0.6}";
   const std::string shape = "shapes:\n  - {name: gem, file: gem.off, material: white";
   const auto message = [&](const std::string& faces, const std::string& more = "") {
-    folder.write("gem.off", "OFF\n4 4 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + faces);
+    folder.write("gem.off", "OFF\n4 " + std::to_string(faces.size() / 8) + " 0\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + faces);
     std::string text = kScene;
     text.replace(text.find(white), white.size(), "white: {type: rough_dielectric, roughness: 0.1, ior: 1.4}");
     text.replace(text.find("material: white, emission"), 15, "material: metal");
@@ -156,7 +156,7 @@ TEST_F(SceneLoader, GlassIsSolid) {
             "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; the faces of this one "
             "disagree about its outside at the edge from (1, 0, 0) to (0, 1, 0)");
   EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n", ", emission: 1"),
-            "scene.yaml:11:60: shapes[0].emission: a shape of rough_dielectric emits nothing (leave it out)");
+            "scene.yaml:11:59: shapes[0].emission: a shape of rough_dielectric emits nothing (leave it out)");
 }
 
 TEST_F(SceneLoader, EdgesOfLaterShapesCountOn) {
