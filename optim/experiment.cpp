@@ -231,6 +231,7 @@ void read_settings(YamlMap& map, Experiment& experiment) {
           static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
     if (const auto antithetic = estimator.find("antithetic"))
       experiment.estimator.antithetic = antithetic->boolean();
+    if (const auto guiding = estimator.find("guiding")) experiment.guiding = guiding->boolean();
     estimator.reject_unknown();
   }
   if (const auto value = map.find("gradient")) {

@@ -4,7 +4,7 @@
 //   max_bounces 8                      parameters: none
 //   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0]
 //   samples: 64 for each of primal, interior, visibility, path_length
-//   estimator: sampling auto, antithetic true
+//   estimator: sampling auto, antithetic true, guiding true
 //   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter)
 //   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0
 //   target: samples 4096, seed 7       seed 1
@@ -113,6 +113,7 @@ struct Experiment {
   std::string scene;  ///< absolute path
   GateSpec gates;
   EstimatorOptions estimator;
+  bool guiding = true;  ///< of the visibility term; see Problem::estimator
   std::vector<ParameterSpec> parameters;
   TargetSpec target;
   SampleSpec samples;

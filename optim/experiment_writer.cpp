@@ -101,8 +101,9 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
     fmt::format_to(out, "target:\n  images: {}\n", relative(e.target.images));
   fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
                  e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
-  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n",
-                 kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic);
+  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  guiding: {}\n",
+                 kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic,
+                 e.guiding);
   const bool analytic = e.gradient.method == GradientMethod::analytic;
   fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
   // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.

@@ -80,12 +80,19 @@ GatedImage Problem::make_target(const Poll& poll) const {
   return mean.mean();
 }
 
+EstimatorOptions Problem::estimator(int visibility_samples) const {
+  constexpr double kLearningShare = 0.06;
+  EstimatorOptions options = experiment_.estimator;
+  if (experiment_.guiding) options.guiding_samples = kLearningShare * visibility_samples;
+  return options;
+}
+
 Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target,
                              std::uint32_t iteration, const Poll& poll, Share share) const {
   const SampleSpec& samples = experiment_.samples;
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);
-  const Renderer renderer(scene, gates_, experiment_.estimator, &basis);
+  const Renderer renderer(scene, gates_, estimator(share.of(samples.visibility).count()), &basis);
   Evaluation result;
   result.image = renderer.render(stream(Pass::primal, iteration), share.of(samples.primal));
   result.loss = mean_squared_error(result.image, target);

@@ -70,6 +70,10 @@ class Problem {
   /// Reads a target image and checks its shape against this experiment's.
   GatedImage read_target(const std::string& file) const;
 
+  /// The experiment's options for a renderer that will take so many visibility samples per pixel: guiding learns from
+  /// a small share of their number.
+  EstimatorOptions estimator(int visibility_samples) const;
+
   /// Image, loss and gradient at theta from the random numbers of one iteration. Unbiased for image and
   /// gradient (the loss has the variance of the image added to it).
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,

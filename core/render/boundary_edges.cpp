@@ -64,7 +64,9 @@ BoundaryEdges::Sample BoundaryEdges::sample(const std::vector<BoundaryEdge>& edg
   result.edge = &edges[i];
   result.s = u;
   result.y = result.edge->point(u);
-  result.pdf = distribution.probability(i) / result.edge->length;
+  result.begin = distribution.below(i);
+  result.share = distribution.probability(i);
+  result.pdf = result.share / result.edge->length;
   return result;
 }
 

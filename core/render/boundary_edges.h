@@ -30,6 +30,9 @@ class BoundaryEdges {
     double s = 0;    ///< fraction along the edge
     Vec3 y;
     double pdf = 0;  ///< per length
+    double begin = 0, share = 0;  ///< the edge takes the numbers from `begin` to `begin` + `share`
+    /// The number that gives this point.
+    double x() const { return begin + s * share; }
   };
   /// Edges that the camera may see moving, by length over squared distance. `u` in (0, 1).
   bool has_primary() const { return !primary_distribution_.empty(); }

@@ -171,6 +171,7 @@ class EllipsoidalConnections {
     const EllipsoidBvh& bvh = ends_are_static(y.triangle) ? scene_.moving_triangles : scene_.all_triangles;
     worker_.candidates.clear();
     bvh.query_surfaces(x.p, y.p, low, high, worker_.candidates);
+    worker_.arcs += static_cast<long long>(worker_.candidates.size());
 
     const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
     ArcPair chosen;

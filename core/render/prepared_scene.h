@@ -38,6 +38,8 @@ class DiscreteDistribution {
   explicit DiscreteDistribution(const std::vector<double>& weights);
   bool empty() const { return total() <= 0; }
   double total() const { return cumulative_.empty() ? 0 : cumulative_.back(); }
+  /// Probability of all indices before i.
+  double below(int i) const { return (i ? cumulative_[i - 1] : 0) / total(); }
   double probability(int i) const { return (cumulative_[i] - (i ? cumulative_[i - 1] : 0)) / total(); }
   /// Index drawn in proportion to its weight; `u` in (0, 1) is replaced by a fresh uniform number.
   int sample(double& u) const;

@@ -1,6 +1,7 @@
 // Primary visibility boundary: a camera ray grazes a moving edge (theory section 5, "Primary").
 #pragma once
 #include "core/render/boundary_edges.h"
+#include "core/render/boundary_guide.h"
 #include "core/render/light_side.h"
 
 namespace isochron {
@@ -35,16 +36,22 @@ template <class Sink>
 class PrimaryBoundary {
  public:
   /// `narrow_gates`: use the techniques that draw lengths from the gates.
-  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, bool narrow_gates)
+  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates)
       : worker_(worker),
         scene_(worker.scene),
         edges_(edges),
+        guide_(guide),
         light_side_(worker, narrow_gates && worker.options.boundary.light_arcs) {}
 
   /// One edge point; contributions are scaled by `scale` (one over the number of edge points).
   void sample(double scale, Rng& rng) {
     if (!edges_.has_primary()) return;
-    const auto [edge, s, y, pdf] = edges_.sample_primary(rng.uniform());
+    const int table = BoundaryGuide::table(BoundaryGuide::primary);
+    const Warp& warp = guide_.warp(table);
+    const double x = warp.sample(rng.uniform());
+    const BoundaryEdges::Sample point = edges_.sample_primary(x);
+    const BoundaryEdge* edge = point.edge;
+    const Vec3 y = point.y;
     const int pixel = scene_.camera.project(y);
     if (pixel < 0) return;
     const Vec3 to_y = y - scene_.camera.position;
@@ -64,12 +71,12 @@ class PrimaryBoundary {
 
     LocalDifferential& differential = worker_.differential;
     differential.clear();
-    const double share[2] = {1 - s, s};
+    const double share[2] = {1 - point.s, point.s};
     for (int i = 0; i < 2; ++i)
       if (scene_.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
     worker_.sink.bind(differential);
 
-    const double factor = scale * sine * scene_.camera.image_area_per_solid_angle(d) / (r * r * pdf);
+    const double factor = scale * sine * scene_.camera.image_area_per_solid_angle(d) / (r * r * point.pdf * warp.density(x));
     SurfacePoint eye;
     eye.p = scene_.camera.position;
     // The two sides share their random numbers: what they have in common cancels.
@@ -83,12 +90,14 @@ class PrimaryBoundary {
            light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng))
         worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, GateUse::value);
     }
+    note_guide(worker_.sink, table, x);
   }
 
  private:
   Worker<Sink>& worker_;
   const PreparedScene& scene_;
   const BoundaryEdges& edges_;
+  const BoundaryGuide& guide_;
   LightSide<Sink> light_side_;
 };
 

@@ -5,6 +5,7 @@
 #include <tbb/task_arena.h>
 
 #include <atomic>
+#include <mutex>
 #include <stdexcept>
 
 #include "core/render/ellipsoidal.h"
@@ -22,6 +23,16 @@ constexpr int kMostStrands = 32, kFewestStrands = 8;
 constexpr int kSharedStrands = 256;  // where strands need no accumulators of their own
 constexpr std::size_t kStrandBudget = std::size_t{512} << 20;  // bytes, all strands together
 constexpr int kPixelsPerBlock = 8;
+
+/// The pass that guiding learns from: its own random numbers; with fewer samples it would teach noise.
+constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
+constexpr long long kFewestLearningSamples = 64;
+
+/// Work done so far, in rays: on small and large scenes an arc takes about half as long.
+template <class Sink>
+double work(const Worker<Sink>& worker) {
+  return static_cast<double>(worker.rays) + 0.5 * static_cast<double>(worker.arcs);
+}
 
 int strand_count(std::size_t accumulator_doubles) {
   const std::size_t fitting = kStrandBudget / (sizeof(double) * std::max<std::size_t>(accumulator_doubles, 1));
@@ -73,6 +84,8 @@ struct Renderer::Impl {
   BoundaryEdges edges;
   bool ellipsoidal = false;
   mutable std::atomic<long long> rays{0};
+  mutable std::once_flag learned;
+  mutable BoundaryGuide guide;
 
   Impl(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent)
       : gates(gate_set), options(estimator), basis(tangent), scene(source, tangent), edges(scene, estimator.boundary.wedge) {
@@ -129,6 +142,46 @@ struct Renderer::Impl {
   }
   PairPart jump_part() const { return ellipsoidal ? PairPart::jumps : PairPart::atoms; }
 
+  /// Before the visibility term is run. What is learned depends on scene, gates, basis and options alone.
+  void learn() const {
+    std::call_once(learned, [this] {
+      const long long samples = std::llround(options.guiding_samples * scene.camera.pixels());
+      if (samples < kFewestLearningSamples) return;
+      std::vector<std::vector<GuideRecord>> records(kMostStrands);
+      std::vector<std::array<double, BoundaryGuide::kTechniques>> costs(kMostStrands);
+      parallel(kMostStrands, [&](int strand) {
+        Worker worker(scene, gates, options, GuideSink(gates, scene.layout, *basis));
+        auto& cost = costs[strand];
+        cost.fill(0);
+        const auto run = [&](BoundaryGuide::Technique technique, auto&& sample) {
+          const double before = work(worker);
+          sample();
+          cost[technique] += work(worker) - before;
+        };
+        const BoundaryGuide unguided;
+        PrimaryBoundary primary(worker, edges, unguided, ellipsoidal);
+        SecondaryBoundary secondary(worker, edges, unguided, ellipsoidal);
+        const double splat_scale = 1.0 / scene.camera.pixels();
+        for (long long i = strand; i < samples; i += kMostStrands) {
+          const int pixel = static_cast<int>(i * scene.camera.pixels() / samples) % scene.camera.pixels();
+          Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
+          run(BoundaryGuide::primary, [&] { primary.sample(splat_scale, rng); });
+          run(BoundaryGuide::from_edge, [&] { secondary.sample_from_edge(splat_scale, rng); });
+          run(BoundaryGuide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
+        }
+        records[strand] = std::move(worker.sink.records);
+        rays += worker.rays;
+      });
+      std::vector<GuideRecord> all;
+      std::array<double, BoundaryGuide::kTechniques> cost{};
+      for (int strand = 0; strand < kMostStrands; ++strand) {
+        all.insert(all.end(), records[strand].begin(), records[strand].end());
+        for (int t = 0; t < BoundaryGuide::kTechniques; ++t) cost[t] += costs[strand][t];
+      }
+      guide = BoundaryGuide(all, cost);
+    });
+  }
+
   template <class Sink>
   void run_term(Term term, Worker<Sink>& worker, int strand, int strands, const Stream& stream,
                 SampleRange range) const {
@@ -137,12 +190,17 @@ struct Renderer::Impl {
       for_each_sample(strand, strands, stream, range,
                       [&](int pixel, Rng& rng) { sample_standard(worker, pixel, scale, rng); });
     } else if (term == Term::visibility) {
-      PrimaryBoundary primary(worker, edges, ellipsoidal);
-      SecondaryBoundary secondary(worker, edges, ellipsoidal);
+      PrimaryBoundary primary(worker, edges, guide, ellipsoidal);
+      SecondaryBoundary secondary(worker, edges, guide, ellipsoidal);
+      const auto run = [&](BoundaryGuide::Technique technique, Rng& rng, auto&& sample) {
+        const double rate = guide.rate(technique);
+        for (int i = static_cast<int>(rate + rng.uniform()); i > 0; --i) sample(1 / rate);
+      };
       for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
-        primary.sample(splat_scale, rng);
-        secondary.sample_from_edge(splat_scale, rng);
-        secondary.sample_from_camera(pixel, scale, rng);
+        run(BoundaryGuide::primary, rng, [&](double share) { primary.sample(share * splat_scale, rng); });
+        run(BoundaryGuide::from_edge, rng, [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
+        run(BoundaryGuide::from_camera, rng,
+            [&](double share) { secondary.sample_from_camera(pixel, share * scale, rng); });
       });
     } else {
       GatePass pass;
@@ -195,6 +253,7 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
   const int columns = impl_->basis->columns;
   std::vector<GatedImage> images(columns, impl_->blank());
   if (!impl_->has(term) || columns == 0) return images;
+  if (term == Term::visibility) impl_->learn();
   const int strands = strand_count(images[0].data.size() * columns);
   std::vector<std::vector<std::vector<double>>> films(columns, std::vector<std::vector<double>>(strands));
   parallel(strands, [&](int strand) {
@@ -212,6 +271,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
                             std::vector<double>& dof_gradient) const {
   if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
   if (!impl_->has(term)) return;
+  if (term == Term::visibility) impl_->learn();
   std::vector<int> active(impl_->scene.layout.size(), -1);
   std::vector<int> dofs;
   for (int dof = 0; dof < impl_->scene.layout.size(); ++dof)

@@ -26,6 +26,8 @@ struct EstimatorOptions {
   Sampling sampling = Sampling::automatic;   ///< automatic: by gate width
   bool antithetic = true;                    ///< coupled pairs for the gate's derivative under ellipsoidal sampling
   BoundaryTechniques boundary{};
+  /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.
+  double guiding_samples = 0;
 };
 
 /// The terms of the derivative (paper Eq. 13).

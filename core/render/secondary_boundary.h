@@ -9,6 +9,7 @@
 // From the edge, the D side walks on and connects to the camera at every vertex.
 #pragma once
 #include "core/render/boundary_edges.h"
+#include "core/render/boundary_guide.h"
 #include "core/render/light_side.h"
 
 namespace isochron {
@@ -17,12 +18,16 @@ template <class Sink>
 class SecondaryBoundary {
  public:
   /// `narrow_gates`: use the techniques that draw lengths from the gates.
-  SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, bool narrow_gates)
+  SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates)
       : worker_(worker),
         scene_(worker.scene),
         edges_(edges),
+        guide_(guide),
         techniques_(worker.options.boundary),
         at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
+        camera_over_edge_rate_(techniques_.from_camera
+                                   ? guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)
+                                   : 0),
         aimed_share_(techniques_.aimed ? 0.5 : 0),
         light_side_(worker, narrow_gates && techniques_.light_arcs) {}
 
@@ -30,7 +35,8 @@ class SecondaryBoundary {
   void sample_from_edge(double scale, Rng& rng) {
     if (!edges_.has_secondary()) return;
     Segment g;
-    g.y = edges_.sample_secondary(rng.uniform());
+    const double x = edge_warp().sample(rng.uniform());
+    g.y = edges_.sample_secondary(x);
     const double pick = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
     int aimed_at = -1;
     if (pick < aimed_share_) {
@@ -51,8 +57,9 @@ class SecondaryBoundary {
     if (!differentiate(g)) return;
 
     connections_.clear();
-    walk_to_camera(g, scale * g.sine / (g.y.pdf * direction_pdf(g)), rng);
+    walk_to_camera(g, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
     finish(g, Found::from_edge, rng);
+    note_guide(worker_.sink, BoundaryGuide::table(BoundaryGuide::from_edge), x);
   }
 
   /// One camera path through `pixel`, with a random edge point at each of its vertices.
@@ -109,6 +116,13 @@ class SecondaryBoundary {
   };
   enum class Found { from_edge, from_camera };
 
+  const Warp& edge_warp() const { return guide_.warp(BoundaryGuide::table(BoundaryGuide::from_edge)); }
+  /// Of D at vertex `bounces` of a path through the pixel.
+  const Warp& camera_warp(int pixel, int bounces) const { return guide_.warp(camera_table(pixel, bounces)); }
+  int camera_table(int pixel, int bounces) const {
+    return BoundaryGuide::table_from_camera(scene_.camera, pixel, bounces);
+  }
+
   bool faces(int triangle, const Vec3& w) const {
     return dot(scene_.normal[triangle], w) > 0 || scene_.material_of(triangle).two_sided ||
            scene_.is_dielectric(triangle);
@@ -162,9 +176,10 @@ class SecondaryBoundary {
   }
 
   /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
-  double camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k) const {
+  double camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k, int pixel) const {
     if (!techniques_.from_camera) return 0;
-    double ratio = scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
+    double ratio = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) / edge_warp().density(g.y.x());
+    ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
                    solid_angle_to_area(x[0].p, x[1]) / scene_.camera.pixels();
     for (int j = 1; j < k; ++j)
       ratio *= Scattering(x[j - 1].p, x[j], x[j + 1].p).pdf_towards_light(scene_.material_of(x[j].triangle)) *
@@ -201,7 +216,7 @@ class SecondaryBoundary {
           const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
           connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
                                   walked + distance * scene_.index_between(x, eye),
-                                  camera_over_edge(g, camera_side_, bounce)});
+                                  camera_over_edge(g, camera_side_, bounce, pixel)});
         }
       }
       if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
@@ -218,8 +233,11 @@ class SecondaryBoundary {
   /// D is the last vertex of the worker's path: tries a random edge point.
   void connect_edge(int pixel, const Rgb& throughput, Rng& rng) {
     Segment g;
-    g.y = edges_.sample_secondary(rng.uniform());
+    const int table = camera_table(pixel, worker_.path.size() - 1);
+    const double x = guide_.warp(table).sample(rng.uniform());
+    g.y = edges_.sample_secondary(x);
     if (join_camera_path(g, pixel, throughput)) finish(g, Found::from_camera, rng);
+    note_guide(worker_.sink, table, x);
   }
 
   /// As `connect_edge`, for light straight from an emitter on paths of length tau.
@@ -228,7 +246,8 @@ class SecondaryBoundary {
     double pdf_area;
     const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
     Segment g;
-    g.y = edges_.sample_secondary(u_edge);
+    const int table = camera_table(pixel, worker_.path.size() - 1);
+    g.y = edges_.sample_secondary(guide_.warp(table).sample(u_edge));
     const double left = tau - worker_.path.length.back();
     const ShadowLine line(scene_, worker_.path.back().p, *g.y.edge, emitter);
     if (!(left > 0) || !(line.height > 0)) return;
@@ -246,7 +265,7 @@ class SecondaryBoundary {
       g.y.y = g.y.edge->point(s);
       if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) continue;
       const Connection& c = connections_[0];
-      const double rate = length_over_uniform(g, c.length);
+      const double rate = length_over_random(g, c);
       const Rgb radiance = scene_.emitted(g.light, -g.w);
       if (!(rate > 0) || radiance.is_black()) continue;
       const LocalDifferential& differential = c.bounces == 1 ? pixel_flow_ : material_flow_;
@@ -254,6 +273,7 @@ class SecondaryBoundary {
       worker_.sink.bind(differential);
       // The balance heuristic cancels this technique's own rate.
       worker_.sink.add(pixel, c.value * radiance * (1 / (1 / c.camera_over_edge + 1 + rate)), tau, GateUse::value);
+      note_guide(worker_.sink, table, g.y.x());
     }
   }
 
@@ -279,14 +299,16 @@ class SecondaryBoundary {
     }
   };
 
-  /// Density of the edge point when the length is drawn from the gates, over that of a uniform one; S is on an emitter
-  /// and `before` is the length from the camera to D. Lengths are drawn for segments outside of dielectrics alone.
-  double length_over_uniform(const Segment& g, double before) const {
+  /// Density of the edge point when the length is drawn from the gates, over that of a random one from the camera; S is
+  /// on an emitter. Lengths are drawn for segments outside of dielectrics alone.
+  double length_over_random(const Segment& g, const Connection& c) const {
     if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
     const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
     const int t = g.light.triangle;
-    return scene_.emitter_pdf(t) * scene_.area[t] * worker_.gates.mixture_pdf(before + g.r_d + g.r_s) *
-           line.distance_rate(g.y.s);
+    const Warp& warp = camera_warp(c.pixel, c.bounces);
+    const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
+    return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area[t] *
+           worker_.gates.mixture_pdf(c.length + g.r_d + g.r_s) * line.distance_rate(g.y.s);
   }
 
   /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.
@@ -304,9 +326,9 @@ class SecondaryBoundary {
     if (!(scattered > 0) || !g.orient() || !find_light_end(g) || !differentiate(g)) return false;
     ++worker_.rays;
     if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return false;
-    const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf) * scattered;
+    const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x())) * scattered;
     connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back(),
-                            camera_over_edge(g, path.vertex, k)});
+                            camera_over_edge(g, path.vertex, k, pixel)});
     return true;
   }
 
@@ -331,7 +353,7 @@ class SecondaryBoundary {
       for (const GatheredLight& e : lights) {
         if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
         if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
-        const double rate = e.bounces == 0 ? length_over_uniform(g, c.length) : 0;
+        const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
         const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
         worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i] + e.length, GateUse::value);
       }
@@ -341,8 +363,10 @@ class SecondaryBoundary {
   Worker<Sink>& worker_;
   const PreparedScene& scene_;
   const BoundaryEdges& edges_;
+  const BoundaryGuide& guide_;
   const BoundaryTechniques techniques_;
   const bool at_length_;
+  const double camera_over_edge_rate_;  ///< how often segments are looked for from the camera, over that from an edge
   const double aimed_share_;  ///< of the directions from an edge
   LightSide<Sink> light_side_;
   LocalDifferential pixel_flow_, material_flow_;

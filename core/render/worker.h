@@ -15,7 +15,7 @@ struct Worker {
   Path path;
   LocalDifferential differential;
   std::vector<int> candidates;
-  long long rays = 0;
+  long long rays = 0, arcs = 0;
 
   Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator, Sink target)
       : scene(prepared), gates(gate_set), options(estimator), sink(std::move(target)), path(estimator.max_bounces) {}

@@ -19,19 +19,25 @@ class Determinism : public ::testing::TestWithParam<Sampling> {
       : scene_(load_scene(TEST_DATA "/validation/scene.yaml")),
         gates_(GateShape::truncated_gaussian(0.2, 0.3), {4.9, 5.3, 5.8}),
         basis_(make_basis(scene_, {translate(scene_, "block", {0.5, 0, 1}), change_albedo(scene_, "grey")})),
-        renderer_(scene_, gates_, {.max_bounces = 3, .sampling = GetParam()}, &basis_) {}
+        renderer_(make_renderer()) {}
   ~Determinism() override { set_thread_count(0); }
 
-  Results run(const Stream& stream, SampleRange range) const {
+  /// Guided, so that what each renderer learns is tested, too.
+  Renderer make_renderer() const {
+    return {scene_, gates_, {.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 0.3}, &basis_};
+  }
+
+  Results run(const Stream& stream, SampleRange range) const { return run(renderer_, stream, range); }
+  Results run(const Renderer& renderer, const Stream& stream, SampleRange range) const {
     Results r;
-    r.image = renderer_.render(stream, range);
+    r.image = renderer.render(stream, range);
     GatedImage adjoint = r.image;
     for (std::size_t i = 0; i < adjoint.data.size(); ++i)
       adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
     for (const Term term : kTerms) {
-      r.derivatives.push_back(renderer_.derive(term, stream, range));
+      r.derivatives.push_back(renderer.derive(term, stream, range));
       r.gradients.emplace_back(DofLayout(scene_).size(), 0.0);
-      renderer_.add_gradient(term, adjoint, stream, range, r.gradients.back());
+      renderer.add_gradient(term, adjoint, stream, range, r.gradients.back());
     }
     return r;
   }
@@ -55,7 +61,7 @@ TEST_P(Determinism, SameBitsForAnyNumberOfThreads) {
   std::vector<std::vector<double>> results;
   for (const int threads : {1, 2, 1}) {
     set_thread_count(threads);
-    results.push_back(flat(run({3, 1, 4}, {0, 8})));
+    results.push_back(flat(run(make_renderer(), {3, 1, 4}, {0, 8})));
   }
   for (double x : results[0]) ASSERT_TRUE(std::isfinite(x));
   for (std::size_t i = 1; i < results.size(); ++i) EXPECT_EQ(results[i], results[0]);

@@ -75,6 +75,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
   EstimatorOptions options;
   options.max_bounces = 3;
   options.sampling = c.sampling;
+  options.guiding_samples = 8;
   const Renderer renderer(scene, gates, options, &basis);
 
   constexpr int kBatches = 32;

@@ -103,6 +103,7 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
   EstimatorOptions options;
   options.max_bounces = 1;
   options.sampling = sampling;
+  options.guiding_samples = 100;
   const Renderer renderer(scene, gates, options, &basis);
 
   // Standard sampling hits such a gate with few paths, and W' with fewer.

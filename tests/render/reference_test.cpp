@@ -65,6 +65,7 @@ TEST_P(Reference, EveryTerm) {
   options.max_bounces = 3;
   options.sampling = c.sampling;
   options.antithetic = c.antithetic;
+  options.guiding_samples = 8;
   const Renderer renderer(scene, gates, options, &basis);
 
   constexpr int kBatches = 32;

@@ -39,12 +39,16 @@ struct Variant {
 };
 constexpr Variant kVariants[] = {
     {"all", [](EstimatorOptions&) {}},
+    {"without guiding", [](EstimatorOptions& o) { o.guiding_samples = 0; }},
     {"without wedge", [](EstimatorOptions& o) { o.boundary.wedge = false; }},
     {"without aimed", [](EstimatorOptions& o) { o.boundary.aimed = false; }},
     {"without from camera", [](EstimatorOptions& o) { o.boundary.from_camera = false; }},
     {"without at length", [](EstimatorOptions& o) { o.boundary.at_length = false; }},
     {"without light arcs", [](EstimatorOptions& o) { o.boundary.light_arcs = false; }},
 };
+
+/// Of the samples, spent on learning.
+constexpr double kLearningShare = 0.06;
 
 struct Result {
   double mean = 0, of_mean = 0, of_pixels = 0;  ///< variances for one second
@@ -76,6 +80,7 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
     EstimatorOptions options;
     options.max_bounces = setting.max_bounces;
     options.sampling = setting.sampling;
+    options.guiding_samples = kLearningShare * setting.samples * batches;
     variant.change(options);
     const Result r = measure(setting, options, batches);
     if (&variant == kVariants) all = r;

@@ -1,0 +1,130 @@
+// Guiding of the visibility term: where the edge points of each technique are drawn from, as histograms over primary
+// sample space, and how often each technique is used. Learned once in a short pass of its own and then frozen, so
+// estimates stay unbiased.
+#pragma once
+#include <array>
+#include <vector>
+
+#include "core/gates/gate.h"
+#include "core/render/camera_model.h"
+#include "core/render/path_differential.h"
+
+namespace isochron {
+
+/// Piecewise constant density on (0, 1).
+class Warp {
+ public:
+  /// Uniform.
+  Warp() : below_{0, 1} {}
+  /// Equal bins by their probabilities, which sum to one and are positive.
+  explicit Warp(const std::vector<double>& probability);
+  /// Maps a uniform u in (0, 1) to a number of this density.
+  double sample(double u) const;
+  double density(double x) const {
+    const int i = bin(x);
+    return (below_[i + 1] - below_[i]) * bins();
+  }
+  /// Probability of (0, x).
+  double below(double x) const {
+    const int i = bin(x);
+    return below_[i] + (below_[i + 1] - below_[i]) * (x * bins() - i);
+  }
+
+ private:
+  int bins() const { return static_cast<int>(below_.size()) - 1; }
+  int bin(double x) const { return std::min(static_cast<int>(x * bins()), bins() - 1); }
+  std::vector<double> below_;
+};
+
+/// What the learning pass notes about a technique: where contributions came from, and their squares.
+struct GuideRecord {
+  int table;
+  double x;       ///< in (0, 1): the edge point's place in the unguided distribution
+  double square;  ///< summed over pixels, gates and columns
+};
+
+class BoundaryGuide {
+ public:
+  enum Technique { primary, from_edge, from_camera };
+  static constexpr int kTechniques = 3;
+
+  /// Unguided: every technique once per sample.
+  BoundaryGuide() : warps_(kTables) {}
+  /// From the records of unguided samples and the cost of each technique over all of them, in any unit.
+  BoundaryGuide(const std::vector<GuideRecord>& records, const std::array<double, kTechniques>& cost);
+
+  /// How often a technique is used per sample, on average.
+  double rate(Technique t) const { return rate_[t]; }
+  /// The histogram of a technique; `from_camera` has one per tile of the image for D next to the camera, and one for
+  /// all others.
+  const Warp& warp(int table) const { return warps_[table]; }
+  static int table(Technique t) { return t; }
+  static int table_from_camera(const CameraModel& camera, int pixel, int bounces) {
+    if (bounces > 1) return from_camera;
+    const int x = pixel % camera.width * kTiles / camera.width, y = pixel / camera.width * kTiles / camera.height;
+    return kTechniques + y * kTiles + x;
+  }
+
+ private:
+  static constexpr int kTiles = 4;  ///< across the image, either way
+  static constexpr int kTables = kTechniques + kTiles * kTiles;
+  std::vector<Warp> warps_;
+  double rate_[kTechniques] = {1, 1, 1};
+};
+
+/// Sink of the learning pass.
+class GuideSink {
+ public:
+  static constexpr bool kDifferential = true;
+  GuideSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis)
+      : gates_(gates), layout_(layout), basis_(basis) {}
+
+  void bind(const LocalDifferential& differential) {
+    rates_.clear();
+    for (const VertexGradient& v : differential.vertices)
+      for (int axis = 0; axis < 3; ++axis) {
+        const int dof = layout_.vertex(v.vertex, axis);
+        for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
+          add_rate(basis_.entries[i].column, v.log_f[axis] * basis_.entries[i].coefficient);
+      }
+    rate_squared_ = 0;
+    for (const auto& [column, rate] : rates_) rate_squared_ += rate * rate;
+  }
+  template <class Use>
+  void add(int /*pixel*/, const Rgb& value, double length, Use) {
+    double squared = 0;
+    gates_.for_each_value(length, [&](int, double w) { squared += w * w; });
+    square_ += squared * rate_squared_ * value.max() * value.max();
+  }
+  /// What was added since the last call came from place x of a table.
+  void note(int table, double x) {
+    if (square_ > 0) records.push_back({table, x, square_});
+    square_ = 0;
+  }
+
+  std::vector<GuideRecord> records;
+
+ private:
+  void add_rate(int column, double rate) {
+    for (auto& known : rates_)
+      if (known.first == column) {
+        known.second += rate;
+        return;
+      }
+    rates_.emplace_back(column, rate);
+  }
+
+  const GateSet& gates_;
+  const DofLayout layout_;
+  const TangentBasis& basis_;
+  std::vector<std::pair<int, double>> rates_;
+  double rate_squared_ = 0, square_ = 0;
+};
+
+/// Tells a learning sink where contributions came from; others do not ask.
+template <class Sink>
+void note_guide(Sink& sink, int table, double x) {
+  if constexpr (requires { sink.note(table, x); }) sink.note(table, x);
+}
+
+}  // namespace isochron
