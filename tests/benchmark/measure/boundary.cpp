@@ -1,6 +1,6 @@
 // What each technique of the visibility term brings: isochron_boundary CSV [BATCHES]. Variance times CPU seconds of the
-// term, with all techniques and with one left out at a
-// time (guiding learns from 6 % of the samples, in the time measured), on
+// term, with all techniques and with one left out at a time (guiding learns from 6 % of the samples,
+// in the time measured), on
 //   cube     experiments/cube.yaml's scene and a narrow gate: direct light past a glossy cube
 //   box      the reference box (diffuse, three bounces), under a wide and a narrow gate
 //   sensor   a field of view of 0.004 degrees that looks at one point of a floor past an occluder
