@@ -25,15 +25,16 @@ std::string file_name(const YamlValue& value) {
   const bool valid = name[0] != '-' && std::all_of(name.begin(), name.end(), [](unsigned char c) {
                        return (c < 0x80 && std::isalnum(c)) || c == '_' || c == '-';
                      });
-  if (!valid) value.fail(fmt::format("'{}' is not a usable name", name), "letters, digits, _ and -");
+  if (!valid) value.fail(quote(name) + " is not a usable name", "letters, digits, _ and -");
   return name;
 }
 
 std::string existing_file(const YamlValue& value, const std::filesystem::path& folder) {
   const std::string text = value.text();
-  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text);
-  if (!std::filesystem::is_regular_file(path))
-    value.fail(fmt::format("there is no file '{}'", text), "a path relative to the experiment file");
+  std::error_code none;  // such as of names that are too long
+  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text, none);
+  if (none || !std::filesystem::is_regular_file(path, none))
+    value.fail("there is no file " + quote(text), "a path relative to the experiment file");
   return path.string();
 }
 
@@ -172,6 +173,8 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
   if (spec.type == ParameterType::translation) spec.direction = require("direction").direction();
   if (spec.type == ParameterType::rotation) {
     spec.axis = require("axis").direction();
+    if (!std::isnormal(length_squared(spec.axis)))
+      spec.fail("axis", "is too long or too short", "a length whose square a double can hold");
     if (const auto pivot = find("pivot")) spec.pivot = pivot->vec3();
   }
   if (spec.type == ParameterType::vertices) {

@@ -26,7 +26,7 @@ std::vector<std::vector<double>> read_number_file(const std::string& file, int c
       double value = 0;
       const auto parsed = std::from_chars(word.data(), word.data() + word.size(), value);
       if (parsed.ec != std::errc() || parsed.ptr != word.data() + word.size() || !std::isfinite(value))
-        throw InputError(fmt::format("{}:{}:{}: '{}' is not a finite number", file, number, at + 1, word));
+        throw InputError(fmt::format("{}:{}:{}: {} is not a finite number", file, number, at + 1, quote(word)));
       row.push_back(value);
       at = text.find_first_not_of(kSeparators, end);
     }

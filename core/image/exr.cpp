@@ -7,17 +7,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <fstream>
-#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 
+#include "core/image/exr_check.h"
 #include "core/image/file.h"
 #include "core/image/image.h"
 #include "core/math/error.h"
@@ -88,15 +85,15 @@ void check_channels(const std::string& file, const Imf::ChannelList& list, Gated
   for (auto channel = list.begin(); channel != list.end(); ++channel) {
     const std::optional<ChannelName> name = parse_channel(channel.name());
     if (!name)
-      fail(file, fmt::format("channel '{}' is not one of a gated image (gateNNN.Y, or gateNNN.R, .G, .B)",
-                             channel.name()));
+      fail(file, fmt::format("channel {} is not one of a gated image (gateNNN.Y, or gateNNN.R, .G, .B)",
+                             quote(channel.name())));
     const int channels = name->letter == 'Y' ? 1 : 3;
     if (image.channels != 0 && image.channels != channels)
-      fail(file, fmt::format("channel '{}' mixes grey and colour", channel.name()));
+      fail(file, fmt::format("channel {} mixes grey and colour", quote(channel.name())));
     if (channel.channel().type == Imf::UINT)
-      fail(file, fmt::format("channel '{}' holds integers (half or float)", channel.name()));
+      fail(file, fmt::format("channel {} holds integers (half or float)", quote(channel.name())));
     if (channel.channel().xSampling != 1 || channel.channel().ySampling != 1)
-      fail(file, fmt::format("channel '{}' is subsampled", channel.name()));
+      fail(file, fmt::format("channel {} is subsampled", quote(channel.name())));
     image.channels = channels;
     image.gates = std::max(image.gates, name->gate + 1);
   }
@@ -110,16 +107,18 @@ void check_channels(const std::string& file, const Imf::ChannelList& list, Gated
 }
 
 GatedImage read_planes(const std::string& file) {
-  Imf::InputFile input(file.c_str());
+  constexpr int kLargestSize = 32768;  // as of a camera
+  Imf::Header::setMaxImageSize(kLargestSize, kLargestSize);
+  Imf::StdISStream stream;
+  stream.str(read_checked_exr(file));
+  Imf::InputFile input(stream);
   const auto& window = input.header().dataWindow();
   if (window != input.header().displayWindow())
     fail(file, "is cropped (data window and display window differ)");
   GatedImage image;
   check_channels(file, input.header().channels(), image);
-  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
-  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
-  if (width * height > std::numeric_limits<int>::max()) fail(file, "has too many pixels");
-  image = GatedImage(static_cast<int>(width), static_cast<int>(height), image.gates, image.channels);
+  image.width = window.max.x - window.min.x + 1;
+  image.height = window.max.y - window.min.y + 1;
 
   const std::size_t planes = static_cast<std::size_t>(image.gates) * image.channels;
   std::vector<float> row(planes * image.width);
@@ -140,7 +139,8 @@ GatedImage read_planes(const std::string& file) {
         fail(file, fmt::format("{} in row {}, column {}, gate {}", row[i], y, i / planes,
                                static_cast<int>(i % planes) / image.channels));
     }
-    std::copy(row.begin(), row.end(), image.data.begin() + static_cast<std::ptrdiff_t>(row.size() * y));
+    // Grows with what was found, not to what a damaged header declares.
+    image.data.insert(image.data.end(), row.begin(), row.end());
   }
   return image;
 }
@@ -186,14 +186,14 @@ void write_exr_components(const std::string& file, const std::vector<std::string
 }
 
 GatedImage read_exr(const std::string& file) {
-  if (!std::ifstream(file)) fail(file, std::string("cannot be opened: ") + std::strerror(errno));
   try {
     return read_planes(file);
   } catch (const InputError&) {
     throw;
   } catch (const std::exception& error) {
     std::string what = error.what();
-    std::replace(what.begin(), what.end(), '\n', ' ');
+    std::replace_if(
+        what.begin(), what.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
     fail(file, "cannot be read as OpenEXR: " + what);
   }
 }

@@ -33,12 +33,10 @@ class Importer final : public OpenMesh::IO::ImporterT<HalfEdgeMesh> {
     corners_.clear();
     for (const OpenMesh::VertexHandle v : corners) corners_.push_back(v.idx());
     add_fan(corners_, triangles);
-    ++polygons;
     return OpenMesh::FaceHandle();  // none to attach colors and the like to
   }
 
   std::vector<std::array<int, 3>> triangles;
-  std::size_t polygons = 0;
 
  private:
   std::vector<int> corners_;
@@ -75,10 +73,10 @@ Mesh read_mesh(const std::string& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension != ".obj" && extension != ".off" && extension != ".ply" && extension != ".stl")
-    throw InputError(
-        fmt::format("{}: '{}' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file, extension));
+    throw InputError(fmt::format("{}: {} is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file,
+                                 quote(extension)));
   CheckedMeshFile checked = check_mesh_file(file, extension, read_file(file));
-  if (checked.triangles == 0u || checked.polygons == 0u) throw InputError(file + ": has no faces");
+  if (checked.triangles == 0) throw InputError(file + ": has no faces");
 
   HalfEdgeMesh vertices;
   Importer importer(vertices);
@@ -90,13 +88,13 @@ Mesh read_mesh(const std::string& file) {
     if (checked.binary) options += OpenMesh::IO::Options::Binary;
     read = OpenMesh::IO::IOManager().read(stream, extension, importer, options);
   }
-  const std::size_t triangles = importer.triangles.size(), polygons = importer.polygons;
   if (!read || checked.vertices.value_or(vertices.n_vertices()) != vertices.n_vertices() ||
-      checked.triangles.value_or(triangles) != triangles || checked.polygons.value_or(polygons) != polygons) {
+      checked.triangles != importer.triangles.size()) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-    throw InputError(fmt::format("{}: cannot be read as {}: OpenMesh finds {} vertices and {} faces there",
-                                 file, extension.substr(1), vertices.n_vertices(), polygons));
+    throw InputError(
+        fmt::format("{}: cannot be read as {}: OpenMesh finds {} vertices and {} triangles there", file,
+                    extension.substr(1), vertices.n_vertices(), importer.triangles.size()));
   }
 
   Mesh mesh;

@@ -11,16 +11,15 @@ namespace isochron {
 
 /// What OpenMesh has to find in a file.
 struct CheckedMeshFile {
-  std::string contents;                  ///< of text only what OpenMesh has to see
-  bool binary = false;                   ///< of PLY or STL
-  std::optional<std::size_t> vertices;   ///< not known of STL: OpenMesh joins equal ones
-  std::optional<std::size_t> triangles;  ///< as of `add_fan`; not known of binary PLY
-  std::optional<std::size_t> polygons;   ///< known of binary PLY
+  std::string contents;                 ///< of text and PLY only what OpenMesh has to see
+  bool binary = false;                  ///< of PLY or STL
+  std::optional<std::size_t> vertices;  ///< not known of STL: OpenMesh joins equal ones
+  std::size_t triangles = 0;            ///< as of `add_fan`
 };
 
-/// Checks that every coordinate of a text file or of binary STL is a finite float, and every index of a text
-/// file that of a vertex; of binary PLY only the header. `extension` is ".obj", ".off", ".ply" or ".stl".
-/// Throws InputError `FILE[:LINE]: what is wrong`, with lines counted from one.
+/// Checks that the file holds as much as it declares, that every coordinate is a finite float, and every
+/// index that of a vertex. `extension` is ".obj", ".off", ".ply" or ".stl". Throws InputError `FILE[:LINE]:
+/// what is wrong`, with lines counted from one.
 CheckedMeshFile check_mesh_file(const std::string& file, const std::string& extension, std::string contents);
 
 /// Appends the fan of triangles around a polygon's first corner, but for those that have a corner twice.

@@ -29,7 +29,7 @@ Camera read_camera(const YamlValue& value) {
   const YamlValue look_at = map.require("look_at");
   camera.look_at = look_at.vec3();
   const std::optional<YamlValue> up = map.find("up");
-  if (up) camera.up = up->direction();
+  if (up) camera.up = unit(up->direction());
   camera.fov = map.require("fov").number({.low = 0, .high = 180, .low_open = true, .high_open = true});
   const YamlValue resolution = map.require("resolution");
   const std::vector<YamlValue> sizes = resolution.list();
@@ -39,6 +39,9 @@ Camera read_camera(const YamlValue& value) {
   map.reject_unknown();
 
   if (camera.look_at == camera.position) look_at.fail("is the camera's position", "a point away from it");
+  if (!std::isnormal(length_squared(camera.look_at - camera.position)))
+    look_at.fail("lies too near the camera's position or too far away",
+                 "a distance whose square a double can hold");
   // What is left of the cross product of two parallel vectors is round-off of this relative size.
   constexpr double kParallel = 16 * std::numeric_limits<double>::epsilon();
   const Vec3 forward = unit(camera.look_at - camera.position);

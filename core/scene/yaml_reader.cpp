@@ -1,6 +1,7 @@
 #include "core/scene/yaml_reader.h"
 
 #include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -36,15 +37,6 @@ struct YamlValue::Document {
 
 namespace {
 
-/// User text fit for a one-line message.
-std::string quoted(const std::string& text) {
-  constexpr std::size_t kLongest = 40;
-  std::string shown = text.substr(0, kLongest);
-  std::replace_if(
-      shown.begin(), shown.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
-  return "'" + shown + (text.size() > kLongest ? "...'" : "'");
-}
-
 std::string join(const std::vector<std::string>& words) {
   return std::accumulate(
       words.begin(), words.end(), std::string(),
@@ -58,7 +50,7 @@ std::string describe(const YAML::Node& node) {
     case YAML::NodeType::Sequence:
       return fmt::format("a list of {}", node.size());
     case YAML::NodeType::Scalar:
-      return quoted(node.Scalar());
+      return quote(node.Scalar());
     default:
       return "nothing";
   }
@@ -89,7 +81,7 @@ std::string child(const std::string& parent, const std::string& name) {
 
 std::string one_line(std::string text) {
   std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return c < 0x20; }, ' ');
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   return text;
 }
 
@@ -97,15 +89,34 @@ std::string place(const std::string& source, const YAML::Mark& mark) {
   return fmt::format("{}:{}:{}", source, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1);
 }
 
-/// The only document in `text`.
+/// Follows a document for the place where it begins.
+struct DocumentStart final : YAML::EventHandler {
+  YAML::Mark mark;
+  void OnDocumentStart(const YAML::Mark& at) override { mark = at; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+                       YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
+  }
+  void OnMapEnd() override {}
+};
+
+/// The only document in `text`. Not by YAML::LoadAll, which finds empty documents without end before some
+/// characters.
 YAML::Node parse_document(const std::string& source, const std::string& text) {
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.empty()) throw InputError(source + ":1:1: syntax: is empty");
-    if (documents.size() > 1)
-      throw InputError(place(source, documents[1].Mark()) +
-                       ": syntax: a second document (one per file is allowed)");
-    return documents[0];
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    DocumentStart document;
+    if (!parser.HandleNextDocument(document)) throw InputError(source + ":1:1: syntax: is empty");
+    if (parser.HandleNextDocument(document))
+      throw InputError(place(source, document.mark) +
+                       ": syntax: a second document begins (one per file is allowed)");
+    return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw InputError(place(source, error.mark) + ": syntax: " + one_line(error.msg));
   }

@@ -4,6 +4,8 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+#include <ImfStringVectorAttribute.h>
 #include <gtest/gtest.h>
 #include <half.h>
 
@@ -13,6 +15,7 @@
 #include <limits>
 #include <map>
 #include <random>
+#include <string_view>
 
 #include "core/image/image.h"
 #include "tests/scene/temporary_folder.h"
@@ -241,6 +244,47 @@ TEST_F(Exr, ReadErrorsNameTheFirstThingAmiss) {
   const std::string whole = folder.read("f.exr");
   folder.write("f.exr", whole.substr(0, whole.size() * 2 / 3));
   EXPECT_TRUE(read_error().starts_with(": cannot be read as OpenEXR: ")) << read_error();
+}
+
+TEST_F(Exr, HeadersAreNotBelieved) {
+  // OpenEXR alone allocates two gigabytes for the first two.
+  write_exr(path(), any_floats(2, 2, 1, 1));
+  const std::string whole = folder.read("f.exr");
+  const auto error_with = [&](std::string_view from, const std::string& to) {
+    std::string contents = whole;
+    folder.write("f.exr", contents.replace(contents.find(from), from.size(), to));
+    return read_error();
+  };
+  using namespace std::literals;
+  const std::string_view order = "lineOrder\0lineOrder\0\1\0\0\0"sv;
+  const std::string cannot = ": cannot be read as OpenEXR: ";
+  EXPECT_EQ(error_with(order, "other\0unknown\0\0\0\0\x70"s), cannot + "the header ends too early");
+  EXPECT_EQ(error_with(order, "lineOrder\0lineOrder\0\xff\xff\xff\xff"s),
+            cannot + "the header ends too early");
+  // A list of channels without its end, which OpenEXR would look for in the attributes behind.
+  EXPECT_EQ(error_with("\1\0\0\0\0compression\0"sv, "\1\0\0\0x"s + "compression\0"s),
+            cannot + "the header ends too early");
+  EXPECT_EQ(error_with("pixelAspectRatio\0float\0\4"sv, "pixelAspectRatio\0int\0\4"s),
+            cannot + "its attribute pixelAspectRatio is damaged");
+  EXPECT_TRUE(error_with("dataWindow\0box2i\0\x10\0\0\0\0\0\0\0\0\0\0\0\1\0\0\0"sv,
+                         "dataWindow\0box2i\0\x10\0\0\0\0\0\0\0\0\0\0\0\1\0\0\x70"s)
+                  .starts_with(cannot));
+}
+
+TEST_F(Exr, OtherAttributesAreSkipped) {
+  Imf::Header header(1, 1);
+  header.channels().insert("gate000.Y", Imf::Channel(Imf::FLOAT));
+  header.insert("comments", Imf::StringAttribute("measured"));
+  header.insert("names", Imf::StringVectorAttribute({"a", "b"}));
+  const float value = 3;
+  Imf::FrameBuffer buffer;
+  buffer.insert("gate000.Y", Imf::Slice::Make(Imf::FLOAT, &value, header.dataWindow()));
+  {
+    Imf::OutputFile output(path().c_str(), header);
+    output.setFrameBuffer(buffer);
+    output.writePixels(1);
+  }
+  EXPECT_EQ(read_exr(path()).data, std::vector<double>{3});
 }
 
 TEST_F(Exr, CroppedImagesAreRejected) {

@@ -236,6 +236,12 @@ TEST_F(SceneLoader, CameraErrors) {
   EXPECT_EQ(error("[64, 48]", "[64]"), "scene.yaml:6:15: camera.resolution: a list of 1 ([width, height])");
   EXPECT_EQ(error("look_at: [0, 0, 0]", "look_at: [0, 0, 5]"),
             "scene.yaml:3:12: camera.look_at: is the camera's position (a point away from it)");
+  for (const std::string far : {"1e200", "1e-200", "1e308"})
+    EXPECT_EQ(
+        error("position: [0, 0, 5]\n  look_at: [0, 0, 0]",
+              "position: [0, 0, 0]\n  look_at: [0, 0, " + far + "]"),
+        "scene.yaml:3:12: camera.look_at: lies too near the camera's position or too far away (a distance "
+        "whose square a double can hold)");
   EXPECT_EQ(error("up: [0, 1, 0]", "up: [0, 0, -3]"),
             "scene.yaml:4:7: camera.up: up is parallel to the line of sight (any other direction)");
   EXPECT_EQ(error("up: [0, 1, 0]", "up: [0, 0, 0]"),

@@ -1,0 +1,92 @@
+#include "core/image/exr_check.h"
+
+#include <algorithm>
+#include <bit>
+#include <cerrno>
+#include <cstdint>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+#include <string_view>
+
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "EXR files are little-endian");
+
+/// The attributes of every EXR file. A size of zero: a list of channels.
+struct Required {
+  std::string_view name, type;
+  std::size_t size;
+};
+constexpr Required kRequired[] = {
+    {"channels", "chlist", 0},        {"compression", "compression", 1}, {"dataWindow", "box2i", 16},
+    {"displayWindow", "box2i", 16},   {"lineOrder", "lineOrder", 1},     {"pixelAspectRatio", "float", 4},
+    {"screenWindowCenter", "v2f", 8}, {"screenWindowWidth", "float", 4},
+};
+
+class Bytes {
+ public:
+  explicit Bytes(std::string_view rest) : rest_(rest) {}
+  bool empty() const { return rest_.empty(); }
+  std::string_view take(std::size_t size) {
+    if (size > rest_.size()) throw std::runtime_error("the header ends too early");
+    const std::string_view taken = rest_.substr(0, size);
+    rest_.remove_prefix(size);
+    return taken;
+  }
+  std::int32_t integer() {
+    std::int32_t value = 0;
+    std::memcpy(&value, take(sizeof value).data(), sizeof value);
+    return value;
+  }
+  std::string_view text() {  ///< up to a zero
+    const std::string_view word = take(std::min(rest_.find('\0'), rest_.size()));
+    take(1);
+    return word;
+  }
+
+ private:
+  std::string_view rest_;
+};
+
+bool is_list_of_channels(std::string_view value) {
+  constexpr std::size_t kChannel = 16;
+  Bytes bytes(value);
+  while (!bytes.text().empty()) bytes.take(kChannel);
+  return bytes.empty();
+}
+
+}  // namespace
+
+std::string read_checked_exr(const std::string& file) {
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(file + ": cannot be opened: " + std::strerror(errno));
+  std::string contents = (std::ostringstream() << stream.rdbuf()).str();
+
+  constexpr std::int32_t kMagic = 20000630, kTiled = 0x200, kDeep = 0x800, kParts = 0x1000;
+  Bytes bytes(contents);
+  if (bytes.integer() != kMagic) throw std::runtime_error("it does not begin like one");
+  if ((bytes.integer() & (kTiled | kDeep | kParts)) != 0)
+    throw std::runtime_error("it is tiled, deep or of several parts (allowed: scanlines of one image)");
+  for (std::string_view name; !(name = bytes.text()).empty();) {
+    const std::string_view type = bytes.text();
+    const std::int32_t size = bytes.integer();
+    const std::string_view value = bytes.take(static_cast<std::uint32_t>(size));
+    const Required* known = nullptr;
+    for (const Required& required : kRequired)
+      if (required.name == name) known = &required;
+    if (known == nullptr) {
+      if (!type.empty()) contents[static_cast<std::size_t>(type.data() - contents.data())] = '\1';
+    } else if (known->type != type ||
+               (known->size != 0 ? value.size() != known->size : !is_list_of_channels(value))) {
+      throw std::runtime_error("its attribute " + std::string(name) + " is damaged");
+    }
+  }
+  return contents;
+}
+
+}  // namespace isochron
