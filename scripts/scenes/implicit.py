@@ -5,11 +5,11 @@ surface towards the mean of their neighbours, which makes triangles nearly regul
 
 import numpy as np
 
-LEVEL = 0.6**3  # a blob alone has its surface where 1 - (d / support)^2 = 0.6
+ROOT = 0.72  # a blob alone has its surface where 1 - (d / support)^2 = ROOT; nearer to 1, blobs melt together more
 
 
 class Blobs:
-    """Sum of kernels (1 - d^2)^3 minus LEVEL, positive inside; d in units of each blob's support."""
+    """Sum of kernels (1 - d^2)^3 minus ROOT^3, positive inside; d in units of each blob's support."""
 
     def __init__(self):
         self._blobs = []
@@ -17,11 +17,11 @@ class Blobs:
     def add(self, centre, radii, tilt=0.0):
         """radii: semi-axes of the surface of this blob alone; tilt: degrees, turns its x axis towards y."""
         c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
-        axes = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) / np.reshape(radii, (3, 1)) * np.sqrt(1 - 0.6)
+        axes = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) / np.reshape(radii, (3, 1)) * np.sqrt(1 - ROOT)
         self._blobs.append((np.asarray(centre, dtype=float), axes))
 
     def value_and_gradient(self, points):
-        value, gradient = np.full(len(points), -LEVEL), np.zeros((len(points), 3))
+        value, gradient = np.full(len(points), -(ROOT**3)), np.zeros((len(points), 3))
         for centre, axes in self._blobs:
             local = (points - centre) @ axes.T
             inside = np.maximum(1 - (local * local).sum(1), 0)

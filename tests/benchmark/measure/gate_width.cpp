@@ -3,23 +3,16 @@
 // from 10 % to 0.1 % of the path: variance of the mean image or of its derivative by a vertical motion, times the CPU
 // seconds spent. Lower is better; standard against ellipsoidal sampling,
 // coupled and uncoupled.
-#include <time.h>
-
 #include <cstdio>
 #include <cstdlib>
 
+#include "tests/benchmark/measure/cpu_time.h"
 #include "tests/render/support.h"
 
 namespace isochron::benchmarks {
 namespace {
 
 using testing::Estimate;
-
-double cpu_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 struct Setting {
   const char* name;

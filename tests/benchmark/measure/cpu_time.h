@@ -1,0 +1,13 @@
+// CPU seconds of all threads of this process.
+#pragma once
+#include <time.h>
+
+namespace isochron::benchmarks {
+
+inline double cpu_seconds() {
+  timespec t;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+}  // namespace isochron::benchmarks
