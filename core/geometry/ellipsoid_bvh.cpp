@@ -115,7 +115,7 @@ struct EllipsoidBvh::Impl {
 
   // With `kSurfaces` what lies strictly between the two ellipsoids is left out.
   template <bool kSurfaces>
-  void visit(const Shell& shell, std::vector<int>& ids) const;
+  int visit(const Shell& shell, std::vector<int>& ids) const;
   template <bool kSurfaces>
   void test_block(const Block& block, const Shell& shell, std::vector<int>& ids) const;
   template <bool kSurfaces>
@@ -353,35 +353,38 @@ bool EllipsoidBvh::empty() const {
 }
 
 template <bool kSurfaces>
-void EllipsoidBvh::Impl::visit(const Shell& shell, std::vector<int>& ids) const {
+int EllipsoidBvh::Impl::visit(const Shell& shell, std::vector<int>& ids) const {
   if (nodes.empty()) {
     for (const Block& block : blocks) test_block<kSurfaces>(block, shell, ids);
-    return;
+    return static_cast<int>(blocks.size());
   }
   int stack[kStack];  // a visit replaces one entry by up to eight
   int size = 0;
   stack[size++] = 0;
-  while (size > 0) {
+  int visited = 0;
+  for (; size > 0; ++visited) {
     const int entry = stack[--size];
     if (entry < 0)
       test_block<kSurfaces>(blocks[static_cast<std::size_t>(~entry)], shell, ids);
     else
       size += test_node<kSurfaces>(nodes[static_cast<std::size_t>(entry)], shell, stack + size);
   }
+  return visited;
 }
 
-void EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
-                         std::vector<int>& ids) const {
-  if (const auto shell = make_shell(a, b, tau_low, tau_high)) impl_->visit<false>(*shell, ids);
+int EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
+                        std::vector<int>& ids) const {
+  const auto shell = make_shell(a, b, tau_low, tau_high);
+  return shell ? impl_->visit<false>(*shell, ids) : 0;
 }
 
-void EllipsoidBvh::query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
+int EllipsoidBvh::query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
                                   std::vector<int>& ids) const {
   const auto shell = make_shell(a, b, tau_low, tau_high);
-  if (!shell) return;
+  if (!shell) return 0;
   // Nothing is between equal lengths, and of a coarse mesh's triangles few are: the simpler tests do.
   const bool fine = impl_->blocks.size() > kWidth;
-  tau_low < tau_high && fine ? impl_->visit<true>(*shell, ids) : impl_->visit<false>(*shell, ids);
+  return tau_low < tau_high && fine ? impl_->visit<true>(*shell, ids) : impl_->visit<false>(*shell, ids);
 }
 
 std::optional<EllipsoidBvh::Shell> EllipsoidBvh::make_shell(const Vec3& a, const Vec3& b, double tau_low,

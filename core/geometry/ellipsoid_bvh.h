@@ -27,11 +27,11 @@ class EllipsoidBvh {
   /// [tau_low, tau_high]: all that do, and few that do not. tau_low below |a-b| means "down to nothing",
   /// tau_high at or below |a-b| finds nothing, an infinite one sets no limit. Triangles with coordinates that
   /// are not finite are never reported, those without area may be. The order depends on the hierarchy only.
-  /// Safe to call from several threads.
-  void query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
+  /// Safe to call from several threads. Returns the nodes and leaves visited: the work done.
+  int query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
   /// The same for the two ellipsoids of total lengths tau_low and tau_high alone: leaves out nearly all triangles
   /// strictly between them, of which a fine mesh has many. The others come in the order of `query`.
-  void query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
+  int query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
 
  private:
   struct Shell;

@@ -51,9 +51,9 @@ Triangles grid(int rows, int columns, Vec3 (*point)(double, double)) {
   return triangles;
 }
 
-/// A rippled torus of 70 000 triangles.
-Triangles mesh() {
-  return grid(250, 140, [](double u, double v) {
+/// A rippled torus of 2 * rows * columns triangles, 70 000 by default.
+Triangles mesh(int rows = 250, int columns = 140) {
+  return grid(rows, columns, [](double u, double v) {
     const double p = kTwoPi * u, t = kTwoPi * v;
     const double r = 0.4 * (1 + 0.1 * std::sin(11 * p) * std::cos(5 * t));
     return Vec3{(1 + r * std::cos(t)) * std::cos(p), (1 + r * std::cos(t)) * std::sin(p), r * std::sin(t)};
@@ -136,6 +136,29 @@ void BM_QueryMesh(benchmark::State& state) {
   query_all(state, mesh(), 2);
 }
 BENCHMARK(BM_QueryMesh)->ArgName("permille")->Arg(0)->Arg(10);
+
+/// Argument: number of triangles, about. One length, so that the counters tell what a query does.
+void BM_QueryByTriangles(benchmark::State& state) {
+  const int columns = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(state.range(0)) / 4)));
+  const int rows = static_cast<int>(state.range(0)) / (2 * columns);
+  const Triangles triangles = mesh(rows, columns);
+  const EllipsoidBvh bvh(triangles);
+  const std::vector<Query> queries = random_queries(triangles, 2);
+  std::vector<int> ids;
+  std::size_t i = 0, found = 0, visited = 0;
+  for (auto _ : state) {
+    const Query& q = queries[i];
+    ids.clear();
+    visited += static_cast<std::size_t>(bvh.query(q.a, q.b, q.tau, q.tau, ids));
+    found += ids.size();
+    i = (i + 1) % queries.size();
+  }
+  const auto iterations = static_cast<double>(state.iterations());
+  state.counters["triangles"] = static_cast<double>(triangles.size());
+  state.counters["crossing"] = static_cast<double>(found) / iterations;
+  state.counters["visited"] = static_cast<double>(visited) / iterations;
+}
+BENCHMARK(BM_QueryByTriangles)->ArgName("triangles")->RangeMultiplier(10)->Range(10, 1000000);
 
 void BM_BuildMesh(benchmark::State& state) {
   const Triangles triangles = mesh();

@@ -8,68 +8,10 @@
 
 #include "core/math/constants.h"
 #include "tests/geometry/random_cases.h"
+#include "tests/geometry/reference_ellipse.h"
 
 namespace isochron {
 namespace {
-
-using Vec3L = Vec3T<long double>;
-
-Vec3L extended(const Vec3& v) {
-  return {v.x, v.y, v.z};
-}
-
-/// Total span in long double by another route: in-plane axes from a Gram-Schmidt under the quadratic form,
-/// all roots of the three edge functions sorted, and the midpoint of every piece tested. `margin` is the
-/// least relative distance from a change of topology.
-long double reference_span(const Ellipsoid& e, const Triangle& t, long double& margin) {
-  margin = 1;
-  const Vec3L a = extended(e.a), b = extended(e.b), c = (a + b) / 2.0L, f = (b - a) / 2.0L;
-  const long double tau = e.tau;
-  const long double minor2 = (tau * tau - 4 * length_squared(f)) / 4, major2 = tau * tau / 4;
-  const Vec3L v[3] = {extended(t.v0), extended(t.v1), extended(t.v2)};
-  const Vec3L n = cross(v[1] - v[0], v[2] - v[0]);
-  // Inverse of the shape matrix minor2 I + f f^T (Sherman-Morrison); the ellipsoid is x.Kx = 1.
-  const auto K = [&](const Vec3L& x) { return (x - f * (dot(f, x) / major2)) / minor2; };
-  const Vec3L sn = n * minor2 + f * dot(f, n);
-  const long double h2 = dot(n, sn), d = dot(n, v[0] - c);
-  const long double r2 = 1 - d * d / h2;
-  margin = std::min(margin, std::abs(r2));
-  if (r2 <= 0) return 0;
-  const Vec3L centre = c + sn * (d / h2);
-  Vec3L e1 = v[2] - v[0];
-  e1 *= std::sqrt(r2 / dot(e1, K(e1)));
-  Vec3L e2 = v[1] - v[0];
-  e2 -= e1 * (dot(e1, K(e2)) / r2);
-  e2 *= std::sqrt(r2 / dot(e2, K(e2)));
-  std::vector<long double> roots;
-  long double C[3], X[3], Y[3];
-  for (int i = 0; i < 3; ++i) {
-    const Vec3L inward = cross(n, v[(i + 1) % 3] - v[i]);
-    C[i] = dot(inward, centre - v[i]), X[i] = dot(inward, e1), Y[i] = dot(inward, e2);
-    const long double R = std::hypot(X[i], Y[i]), phase = std::atan2(Y[i], X[i]);
-    margin = std::min(margin, std::abs(std::abs(C[i]) / R - 1));
-    if (std::abs(C[i]) >= R) continue;
-    const long double w = std::acos(-C[i] / R);
-    roots.push_back(phase - w), roots.push_back(phase + w);
-  }
-  const auto inside = [&](long double phi) {
-    for (int i = 0; i < 3; ++i)
-      if (C[i] + X[i] * std::cos(phi) + Y[i] * std::sin(phi) < 0) return false;
-    return true;
-  };
-  const long double two_pi = 2 * std::acos(-1.0L);
-  if (roots.empty()) return inside(0) ? two_pi : 0;
-  for (long double& r : roots) r -= two_pi * std::floor(r / two_pi);
-  std::sort(roots.begin(), roots.end());
-  roots.push_back(roots[0] + two_pi);
-  long double sum = 0;
-  for (std::size_t i = 0; i + 1 < roots.size(); ++i) {
-    const long double piece = roots[i + 1] - roots[i];
-    if (i + 2 < roots.size()) margin = std::min(margin, piece);
-    if (inside((roots[i] + roots[i + 1]) / 2)) sum += piece;
-  }
-  return sum;
-}
 
 double sum_of_distances(const Ellipsoid& e, const Vec3& q) {
   return length(q - e.a) + length(q - e.b);
@@ -94,8 +36,8 @@ TEST(ClipEllipse, AgreesWithLongDoubleReference) {
   for (int k = 0; k < 100000; ++k) {
     const Triangle t = random.triangle();
     const Ellipsoid e = random.ellipsoid(t);
-    long double margin;
-    const long double expected = reference_span(e, t, margin);
+    const ReferenceEllipse reference(e, t);
+    const long double expected = reference.span, margin = reference.margin;
     EllipseArcs arcs;
     const bool hit = clip_ellipse(e, t.v0, t.v1, t.v2, arcs);
     EXPECT_EQ(hit, arcs.count > 0);

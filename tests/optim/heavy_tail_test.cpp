@@ -30,7 +30,7 @@ TEST(HeavyTail, KurtosisOfKnownBatches) {
 }
 
 TEST(HeavyTail, NormalBatchesHardlyEverExceedTheLimit) {
-  // The limit promises less than 1e-5; 200 000 draws see up to 6 of those with probability 0.995, seed fixed.
+  // The limit promises 4e-6: 200 000 draws see more than 4 of those with probability 1e-3, seed fixed.
   std::mt19937_64 rng(5);
   std::normal_distribution<double> normal;
   std::vector<double> batches(kMostBatches);
@@ -42,7 +42,7 @@ TEST(HeavyTail, NormalBatchesHardlyEverExceedTheLimit) {
     alarms += value > kHeavyTailKurtosis;
     mean += value / 200000;
   }
-  EXPECT_LE(alarms, 6);
+  EXPECT_LE(alarms, 4);
   EXPECT_NEAR(mean, 3.0 * 31 / 33, 0.01);  // its expectation for normal batches, 3 (n - 1) / (n + 1)
 }
 
@@ -55,7 +55,7 @@ TEST(HeavyTail, WarningNamesParametersAndGates) {
   EXPECT_NE(tails.warning().find("height (gates 0-2, 7), width (gate 3): "), std::string::npos) << tails.warning();
   EXPECT_NE(tails.warning().find("25.2"), std::string::npos);
   HeavyTails many;
-  for (int i = 0; i < 9; ++i) many.add(std::string(1, static_cast<char>(97 + i)), -1, 12);
+  for (int i = 0; i < 9; ++i) many.add(std::string(1, static_cast<char>(97 + i)), -1, 13);
   EXPECT_NE(many.warning().find("a, b, c, d and 5 more: "), std::string::npos) << many.warning();
   EXPECT_EQ(many.warning().find('\n'), std::string::npos);
 }
