@@ -41,8 +41,10 @@ std::string HeavyTails::warning() const {
   }
   if (entries_.size() > kMostNamed) names += fmt::format(" and {} more", entries_.size() - kMostNamed);
   return fmt::format(
-      "heavy tail in {}: a few rare samples make most of the variance (kurtosis of the batches up to {:.1f}, 3 is "
-      "normal), so do not trust the standard error, nor a small one elsewhere; take many more samples or wider gates",
+      "heavy tail in {}: a few rare samples make most of the variance (kurtosis of the batches up to {:.1f}, "
+      "3 is "
+      "normal), so do not trust the standard error, nor a small one elsewhere; take many more samples or "
+      "wider gates",
       names, largest_);
 }
 

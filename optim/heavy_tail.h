@@ -5,10 +5,10 @@
 
 namespace isochron {
 
-/// A standard error is not to be trusted where the kurtosis of its batches (Statistics::kurtosis) exceeds this: of 32
-/// batches one then carries more than three eighths of all squared deviations. 32 normal batches exceed it with a
-/// probability of 4e-6, fewer batches less often (by simulation). Fewer than 14 batches never do, so with that few
-/// samples there is no warning.
+/// A standard error is not to be trusted where the kurtosis of its batches (Statistics::kurtosis) exceeds
+/// this: of 32 batches one then carries more than three eighths of all squared deviations. 32 normal batches
+/// exceed it with a probability of 4e-6, fewer batches less often (by simulation). Fewer than 14 batches
+/// never do, so with that few samples there is no warning.
 inline constexpr double kHeavyTailKurtosis = 12;
 
 /// Collects what is heavy-tailed among many estimates, for one line of warning.

@@ -1,13 +1,14 @@
-// Ellipses of extreme shape against a reference in long double: lengths down to |a-b| (1 + 1e-12) and to the specular
-// length, slivers, sizes from 1e-4 to 1e4 times the foci's distance, scales from 1e-6 to 1e6, coinciding foci, foci in
-// the triangle's plane, lengths that pass through a vertex.
+// Ellipses of extreme shape against a reference in long double: lengths down to |a-b| (1 + 1e-12) and to the
+// specular length, slivers, sizes from 1e-4 to 1e4 times the foci's distance, scales from 1e-6 to 1e6,
+// coinciding foci, foci in the triangle's plane, lengths that pass through a vertex.
 //
-// Many of these are ill-conditioned: rounding the input alone changes the result by more than any fixed tolerance. So
-// the input is rounded anew, six times, by up to 8 units in the last place of its largest coordinate, and the result
-// has to be as near to the reference as those results are to each other, times 4. Six draws do not always show how far
-// rounding can go: one case in 10 000 may be further off (3e-5 are). Where the length exceeds |a-b| by less than
-// the coordinates' rounding, whether there is an ellipsoid at all is undecided: only that its points lie on it is asked.
-// 100 000 cases; ISOCHRON_TEST_SAMPLES=10 in the environment makes it a million.
+// Many of these are ill-conditioned: rounding the input alone changes the result by more than any fixed
+// tolerance. So the input is rounded anew, six times, by up to 8 units in the last place of its largest
+// coordinate, and the result has to be as near to the reference as those results are to each other, times 4.
+// Six draws do not always show how far rounding can go: one case in 10 000 may be further off (3e-5 are).
+// Where the length exceeds |a-b| by less than the coordinates' rounding, whether there is an ellipsoid at all
+// is undecided: only that its points lie on it is asked. 100 000 cases; ISOCHRON_TEST_SAMPLES=10 in the
+// environment makes it a million.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -147,7 +148,8 @@ TEST(HardEllipse, AsNearToTheReferenceAsRoundedInputAllows) {
     EXPECT_TRUE(std::isfinite(area_rate) && area_rate >= 0) << "case " << k;
     if (!meets || !decided) continue;
     ++compared;
-    const double point_excess = std::max({x.excess(q.x, 32 * unit), y.excess(q.y, 32 * unit), z.excess(q.z, 32 * unit)});
+    const double point_excess =
+        std::max({x.excess(q.x, 32 * unit), y.excess(q.y, 32 * unit), z.excess(q.z, 32 * unit)});
     worst_point = std::max(worst_point, point_excess);
     const double rate_excess = rate.excess(area_rate, 32 * kEpsilon * area_rate);
     worst_rate = std::max(worst_rate, rate_excess);
@@ -156,9 +158,11 @@ TEST(HardEllipse, AsNearToTheReferenceAsRoundedInputAllows) {
   EXPECT_LE(outside, cases / 10000);
   EXPECT_GT(meeting, cases / 3);
   EXPECT_GT(compared, cases / 4);
-  std::printf("%d cases, %d meet, %d outside; worst over what rounding the input does: span %.1f, point %.1f, area rate "
-              "%.1f; length %.1f units in the last place\n",
-              cases, meeting, outside, worst_span, worst_point, worst_rate, worst_length);
+  std::printf(
+      "%d cases, %d meet, %d outside; worst over what rounding the input does: span %.1f, point %.1f, area "
+      "rate "
+      "%.1f; length %.1f units in the last place\n",
+      cases, meeting, outside, worst_span, worst_point, worst_rate, worst_length);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
-// The ellipse that an ellipsoid cuts out of a triangle's plane, in long double and by another route than the code's.
+// The ellipse that an ellipsoid cuts out of a triangle's plane, in long double and by another route than the
+// code's.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -14,16 +15,17 @@ inline Vec3L extended(const Vec3& v) {
   return {v.x, v.y, v.z};
 }
 
-/// In-plane axes from a Gram-Schmidt under the quadratic form, all roots of the three edge functions sorted, and the
-/// midpoint of every piece tested.
+/// In-plane axes from a Gram-Schmidt under the quadratic form, all roots of the three edge functions sorted,
+/// and the midpoint of every piece tested.
 struct ReferenceEllipse {
-  Vec3L center, e1, e2;     ///< q(phi) = center + e1 cos phi + e2 sin phi, frame as EllipseArcs has it
-  long double span = 0;     ///< radians inside the triangle
-  long double margin = 1;   ///< least relative distance from a change of topology
+  Vec3L center, e1, e2;    ///< q(phi) = center + e1 cos phi + e2 sin phi, frame as EllipseArcs has it
+  long double span = 0;    ///< radians inside the triangle
+  long double margin = 1;  ///< least relative distance from a change of topology
   bool meets_plane = false;
 
   ReferenceEllipse(const Ellipsoid& e, const Triangle& t)
-      : ReferenceEllipse(extended(e.a), extended(e.b), e.tau, {extended(t.v0), extended(t.v1), extended(t.v2)}) {}
+      : ReferenceEllipse(extended(e.a), extended(e.b), e.tau,
+                         {extended(t.v0), extended(t.v1), extended(t.v2)}) {}
 
   ReferenceEllipse(const Vec3L& a, const Vec3L& b, long double tau, const Vec3L (&v)[3]) {
     const Vec3L c = (a + b) / 2.0L, f = (b - a) / 2.0L;

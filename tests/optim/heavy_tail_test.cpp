@@ -52,7 +52,8 @@ TEST(HeavyTail, WarningNamesParametersAndGates) {
   EXPECT_EQ(tails.warning(), "");
   for (const int gate : {0, 1, 2, 2, 7}) tails.add("height", gate, 20);
   tails.add("width", 3, 25.25);
-  EXPECT_NE(tails.warning().find("height (gates 0-2, 7), width (gate 3): "), std::string::npos) << tails.warning();
+  EXPECT_NE(tails.warning().find("height (gates 0-2, 7), width (gate 3): "), std::string::npos)
+      << tails.warning();
   EXPECT_NE(tails.warning().find("25.2"), std::string::npos);
   HeavyTails many;
   for (int i = 0; i < 9; ++i) many.add(std::string(1, static_cast<char>(97 + i)), -1, 13);
@@ -62,17 +63,17 @@ TEST(HeavyTail, WarningNamesParametersAndGates) {
 
 /// The box with a block that casts shadows; coupled pairs.
 Problem box(const TemporaryFolder& folder, double sigma) {
-  const std::string file = folder.write("box.yaml",
-                                        "name: box\nscene: " PROJECT_ROOT
-                                        "/tests/data/reference/scene.yaml\nmax_bounces: 3\n"
-                                        "gates: {kind: gaussian, centers: [5.5, 6.0], sigma: 1}\n"
-                                        "parameters:\n"
-                                        "  - {name: height, type: translation, shape: block, direction: [0, 1, 0], "
-                                        "initial: 0, target: 0.1}\n"
-                                        "samples: {primal: 64, interior: 64, visibility: 64, path_length: 0}\n"
-                                        "target: {samples: 16}\n"
-                                        "estimator: {sampling: ellipsoidal}\n"
-                                        "seed: 3\n");
+  const std::string file =
+      folder.write("box.yaml", "name: box\nscene: " PROJECT_ROOT
+                               "/tests/data/reference/scene.yaml\nmax_bounces: 3\n"
+                               "gates: {kind: gaussian, centers: [5.5, 6.0], sigma: 1}\n"
+                               "parameters:\n"
+                               "  - {name: height, type: translation, shape: block, direction: [0, 1, 0], "
+                               "initial: 0, target: 0.1}\n"
+                               "samples: {primal: 64, interior: 64, visibility: 64, path_length: 0}\n"
+                               "target: {samples: 16}\n"
+                               "estimator: {sampling: ellipsoidal}\n"
+                               "seed: 3\n");
   return Problem(load_experiment(file, {"gates.sigma=" + std::to_string(sigma)}));
 }
 
@@ -83,8 +84,8 @@ double largest(const std::vector<double>& values) {
 }
 
 TEST(HeavyTail, NarrowGatesInABoxWithShadows) {
-  // Pairs of lengths 0.0003 apart that a shadow edge parts are rare and weigh 1 / 0.0003: of a few million pairs a few
-  // make most of the variance. At 0.3, 6 % of the path, nothing is heavy.
+  // Pairs of lengths 0.0003 apart that a shadow edge parts are rare and weigh 1 / 0.0003: of a few million
+  // pairs a few make most of the variance. At 0.3, 6 % of the path, nothing is heavy.
   const TemporaryFolder folder;
   const Poll go_on = [] {};
   const Problem narrow = box(folder, 0.0003), wide = box(folder, 0.3);

@@ -1,8 +1,9 @@
-// A scene that is scaled as a whole, camera and gates included, has the same images in other units: a gated image is
-// radiance per length, a derivative by a position is per length once more. Powers of two change no mantissa and must
-// give the same bits. Other factors round coordinates anew, to double precision in the estimators and to single
-// precision for rays: a ray that passes within about 1e-7 of an edge may then miss what it hit, and change its path
-// altogether. With the samples below, of fixed seeds, none does, and 1e-6 of the image's largest value holds.
+// A scene that is scaled as a whole, camera and gates included, has the same images in other units: a gated
+// image is radiance per length, a derivative by a position is per length once more. Powers of two change no
+// mantissa and must give the same bits. Other factors round coordinates anew, to double precision in the
+// estimators and to single precision for rays: a ray that passes within about 1e-7 of an edge may then miss
+// what it hit, and change its path altogether. With the samples below, of fixed seeds, none does, and 1e-6 of
+// the image's largest value holds.
 #include <gtest/gtest.h>
 
 #include "tests/render/support.h"
@@ -15,25 +16,36 @@ struct ScaleCase {
   GateShape (*shape)(double scale);
   Sampling sampling;
 };
-void PrintTo(const ScaleCase& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const ScaleCase& c, std::ostream* out) {
+  *out << c.name;
+}
 
-GateShape gaussian(double scale) { return GateShape::gaussian(0.3 * scale); }
-GateShape boxcar(double scale) { return GateShape::boxcar(0.4 * scale); }
-GateShape narrow(double scale) { return GateShape::truncated_gaussian(0.02 * scale, 0.03 * scale); }
-GateShape steady(double) { return GateShape::steady(); }
+GateShape gaussian(double scale) {
+  return GateShape::gaussian(0.3 * scale);
+}
+GateShape boxcar(double scale) {
+  return GateShape::boxcar(0.4 * scale);
+}
+GateShape narrow(double scale) {
+  return GateShape::truncated_gaussian(0.02 * scale, 0.03 * scale);
+}
+GateShape steady(double) {
+  return GateShape::steady();
+}
 
 class Scaled : public ::testing::TestWithParam<ScaleCase> {
  protected:
-  /// The image, then the derivatives term by term for a shift, a rotation and an albedo, in units of the scale.
+  /// The image, then the derivatives term by term for a shift, a rotation and an albedo, in units of the
+  /// scale.
   static std::vector<GatedImage> images(double scale) {
     Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
     scene.camera.width = scene.camera.height = 8;
     for (Vec3& p : scene.positions) p *= scale;
     scene.camera.position *= scale;
     scene.camera.look_at *= scale;
-    const TangentBasis basis =
-        make_basis(scene, {translate(scene, "block", {1, 0.3, 0}), translate(scene, "light", {0.2, 1, 0.5}),
-                           rotate_y(scene, "block", Vec3{-0.2, 0, 0.15} * scale), change_albedo(scene, "panel")});
+    const TangentBasis basis = make_basis(
+        scene, {translate(scene, "block", {1, 0.3, 0}), translate(scene, "light", {0.2, 1, 0.5}),
+                rotate_y(scene, "block", Vec3{-0.2, 0, 0.15} * scale), change_albedo(scene, "panel")});
     const GateShape shape = GetParam().shape(scale);
     const GateSet gates(shape, {5.2 * scale, 6.0 * scale});
     const double per_length = shape.is_steady() ? 1 : scale;  // gated images are radiance per length

@@ -1,13 +1,17 @@
-// Cost of one unit of precision against gate width: isochron_gate_width CSV [BATCHES]. For the cube of
+// Cost of one unit of precision against gate width: isochron_gate_width cost CSV [BATCHES]. For the cube of
 // experiments/cube.yaml (direct light dominates) and the reference box (diffuse, with shadow edges), gaussian gates
 // from 10 % to 0.1 % of the path: variance of the mean image or of its derivative by a vertical motion, times the CPU
 // seconds spent. Lower is better; standard against ellipsoidal sampling,
 // coupled and uncoupled.
+//
+// Growth of the derivative's variance: isochron_gate_width growth CSV [BATCHES]. For a floor under a lamp, with and
+// without a shadow on it, widths from 1 to 1e-5 of the path; variance per camera path.
 #include <cstdio>
 #include <cstdlib>
 
 #include "tests/benchmark/measure/cpu_time.h"
 #include "tests/render/support.h"
+#include "tests/render/width_growth.h"
 
 namespace isochron::benchmarks {
 namespace {
@@ -59,25 +63,52 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
   }
 }
 
+void measure_cost(int batches, std::FILE* csv) {
+  std::fprintf(csv, "scene,relative_width,method,quantity,mean,standard_error,variance_seconds\n");
+  measure({"cube", PROJECT_ROOT "/scenes/cube/scene.yaml", "cube", 5.4, 4, 4}, batches, csv);
+  measure({"box", PROJECT_ROOT "/tests/data/reference/scene.yaml", "block", 6.0, 3, 16}, batches, csv);
+}
+
+void measure_growth(int batches, std::FILE* csv) {
+  std::fprintf(csv, "scene,relative_width,method,mean,standard_error,variance\n");
+  for (const bool shadow : {false, true}) {
+    const Scene scene = testing::growth_scene(shadow);
+    for (const testing::GrowthMethod& method : testing::kGrowthMethods) {
+      std::vector<double> narrow, variances;
+      for (int step = 0; step <= 10; ++step) {
+        const double width = std::pow(10.0, -0.5 * step);
+        const int samples = method.sampling == Sampling::standard ? 800 : 50;
+        const Estimate e = testing::growth_estimate(scene, method, width, samples, batches);
+        const double variance = e.standard_error * e.standard_error * samples * batches * scene.camera.width *
+                                scene.camera.height;
+        std::fprintf(csv, "%s,%.4g,\"%s\",%.6g,%.6g,%.6g\n", shadow ? "shadow" : "open", width, method.name, e.mean,
+                     e.standard_error, variance);
+        if (width < 0.011) narrow.push_back(width), variances.push_back(variance);
+      }
+      std::printf("%-6s %-28s variance ~ width^%.2f below 0.01\n", shadow ? "shadow" : "open", method.name,
+                  testing::fitted_exponent(narrow, variances));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace isochron::benchmarks
 
 int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
-  if (argc < 2 || argc > 3) {
-    std::fprintf(stderr, "usage: isochron_gate_width CSV [BATCHES]\n");
+  const std::string what = argc > 1 ? argv[1] : "";
+  if (argc < 3 || argc > 4 || (what != "cost" && what != "growth")) {
+    std::fprintf(stderr, "usage: isochron_gate_width cost|growth CSV [BATCHES]\n");
     return 2;
   }
-  const int batches = argc == 3 ? std::max(2, std::atoi(argv[2])) : 64;
-  std::FILE* csv = std::fopen(argv[1], "w");
+  const int batches = argc == 4 ? std::max(2, std::atoi(argv[3])) : 64;
+  std::FILE* csv = std::fopen(argv[2], "w");
   if (!csv) {
-    std::fprintf(stderr, "isochron_gate_width: cannot write %s\n", argv[1]);
+    std::fprintf(stderr, "isochron_gate_width: cannot write %s\n", argv[2]);
     return 1;
   }
-  std::fprintf(csv, "scene,relative_width,method,quantity,mean,standard_error,variance_seconds\n");
   isochron::set_thread_count(1);
-  measure({"cube", PROJECT_ROOT "/scenes/cube/scene.yaml", "cube", 5.4, 4, 4}, batches, csv);
-  measure({"box", PROJECT_ROOT "/tests/data/reference/scene.yaml", "block", 6.0, 3, 16}, batches, csv);
+  what == "cost" ? measure_cost(batches, csv) : measure_growth(batches, csv);
   std::fclose(csv);
   return 0;
 }
