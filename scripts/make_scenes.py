@@ -7,9 +7,16 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import bunny, cube, tree
+from scenes import branches, bunny, corridor, cube, height_field, tree
 
-SCENES = {"bunny": bunny.write, "cube": cube.write, "tree": tree.write}
+SCENES = {
+    "branches": branches.write,
+    "bunny": bunny.write,
+    "corridor": corridor.write,
+    "cube": cube.write,
+    "height_field": height_field.write,
+    "tree": tree.write,
+}
 
 
 def main(arguments):

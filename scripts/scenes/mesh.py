@@ -21,6 +21,22 @@ def box(size):
     return corners * half, np.array(triangles)
 
 
+def square(edge):
+    """A square around the origin in the plane z = 0, facing +z."""
+    h = 0.5 * edge
+    return quad([(-h, -h, 0), (h, -h, 0), (h, h, 0), (-h, h, 0)])
+
+
+def face_towards(mesh, position, target):
+    """The mesh moved from the origin to `position` and turned so that its z axis points at `target`."""
+    vertices, triangles = mesh
+    z = np.asarray(target, dtype=float) - position
+    z /= np.linalg.norm(z)
+    x = np.cross((0, 1, 0) if abs(z[1]) < 0.9 else (1, 0, 0), z)
+    x /= np.linalg.norm(x)
+    return rounded((vertices @ np.stack([x, np.cross(z, x), z]) + np.asarray(position), triangles))
+
+
 def translate(mesh, offset):
     vertices, triangles = mesh
     return vertices + np.asarray(offset, dtype=float), triangles
