@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "core/math/error.h"
-#include "core/scene/yaml_reader.h"
+#include "core/scene/scene_loader.h"
 #include "optim/number_file.h"
 
 namespace isochron {
@@ -18,6 +18,7 @@ namespace {
 constexpr double kSpeedOfLight = 299792458;  // m/s
 constexpr int kMostSamples = 1 << 30;
 constexpr int kMostGates = 100000;
+constexpr int kMostBounces = 10000;
 
 /// Names become file names and columns.
 std::string file_name(const YamlValue& value) {
@@ -198,9 +199,8 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
   return spec;
 }
 
-TargetSpec read_target(const YamlValue& value, const std::filesystem::path& folder) {
+void read_target(const YamlValue& value, const std::filesystem::path& folder, TargetSpec& target) {
   YamlMap map = value.map();
-  TargetSpec target;
   if (const auto images = map.find("images")) {
     target.images = existing_file(*images, folder);
   } else {
@@ -208,14 +208,13 @@ TargetSpec read_target(const YamlValue& value, const std::filesystem::path& fold
       target.samples = static_cast<int>(samples->integer(1, kMostSamples));
     if (const auto seed = map.find("seed"))
       target.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
+    if (const auto bounces = map.find("max_bounces"))
+      target.max_bounces = static_cast<int>(bounces->integer(0, kMostBounces));
   }
   map.reject_unknown();
-  return target;
 }
 
 void read_settings(YamlMap& map, Experiment& experiment) {
-  if (const auto bounces = map.find("max_bounces"))
-    experiment.estimator.max_bounces = static_cast<int>(bounces->integer(0, 10000));
   if (const auto value = map.find("samples")) {
     YamlMap samples = value->map();
     const auto count = [&](const char* key, int least, int& into) {
@@ -313,8 +312,12 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
   const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
   experiment.name = file_name(map.require("name"));
   experiment.scene = existing_file(map.require("scene"), folder);
+  if (const auto resolution = map.find("resolution")) experiment.resolution = read_resolution(*resolution);
   experiment.gates = read_gates(map.require("gates"), folder);
-  if (const auto target = map.find("target")) experiment.target = read_target(*target, folder);
+  if (const auto bounces = map.find("max_bounces"))
+    experiment.estimator.max_bounces = static_cast<int>(bounces->integer(0, kMostBounces));
+  experiment.target.max_bounces = experiment.estimator.max_bounces;
+  if (const auto target = map.find("target")) read_target(*target, folder, experiment.target);
   if (const auto parameters = map.find("parameters")) {
     for (const YamlValue& entry : parameters->list()) {
       ParameterSpec spec = read_parameter(entry, folder, experiment.target.images.empty());

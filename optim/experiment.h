@@ -7,8 +7,10 @@
 //   estimator: sampling auto, antithetic true, guiding true
 //   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter)
 //   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0
-//   target: samples 4096, seed 7       seed 1
+//   target: samples 4096, seed 7, max_bounces as above                 seed 1
+//   resolution: the camera's
 #pragma once
+#include <array>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -81,6 +83,7 @@ struct TargetSpec {
   std::string images;  ///< absolute path of an EXR; empty: render at the target values
   int samples = 4096;
   std::uint64_t seed = 7;
+  int max_bounces = 8;  ///< of the rendered target; the experiment's own where the file does not say
 };
 
 /// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1.
@@ -111,6 +114,9 @@ struct Experiment {
   std::string file;  ///< absolute path, for messages
   std::string name;
   std::string scene;  ///< absolute path
+  /// Pixels, {width, height}, in place of the scene's; {0, 0}: as the scene says. The field of view stays across the
+  /// width.
+  std::array<int, 2> resolution{0, 0};
   GateSpec gates;
   EstimatorOptions estimator;
   bool guiding = true;  ///< of the visibility term; see Problem::estimator

@@ -93,10 +93,12 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
       fmt::format("version: {}\nname: {}\nscene: {}\nmax_bounces: {}\ngates:\n{}", quote(program_version()),
                   quote(e.name), relative(e.scene), e.estimator.max_bounces, gates_yaml(e.gates));
   auto out = std::back_inserter(text);
+  if (e.resolution[0] > 0) fmt::format_to(out, "resolution: [{}, {}]\n", e.resolution[0], e.resolution[1]);
   text += e.parameters.empty() ? "parameters: []\n" : "parameters:\n";
   for (const ParameterSpec& spec : e.parameters) text += parameter_yaml(spec);
   if (e.target.images.empty())
-    fmt::format_to(out, "target:\n  samples: {}\n  seed: {}\n", e.target.samples, e.target.seed);
+    fmt::format_to(out, "target:\n  samples: {}\n  seed: {}\n  max_bounces: {}\n", e.target.samples, e.target.seed,
+                   e.target.max_bounces);
   else
     fmt::format_to(out, "target:\n  images: {}\n", relative(e.target.images));
   fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",

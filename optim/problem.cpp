@@ -10,6 +10,18 @@
 #include "optim/loss.h"
 
 namespace isochron {
+namespace {
+
+Scene load_scene_at(const Experiment& experiment) {
+  Scene scene = load_scene(experiment.scene);
+  if (experiment.resolution[0] > 0) {
+    scene.camera.width = experiment.resolution[0];
+    scene.camera.height = experiment.resolution[1];
+  }
+  return scene;
+}
+
+}  // namespace
 
 Pass pass_of(Term term) {
   switch (term) {
@@ -37,7 +49,7 @@ GatedImage ImageMean::mean() const {
 
 Problem::Problem(Experiment experiment)
     : experiment_(std::move(experiment)),
-      scene_(load_scene(experiment_.scene)),
+      scene_(load_scene_at(experiment_)),
       gates_(make_gates(experiment_.gates)),
       parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)) {}
 
@@ -70,7 +82,9 @@ GatedImage Problem::make_target(const Poll& poll) const {
   const int parts = std::min(32, target.samples);
   const Stream stream{target.seed, 0, pass_number(Pass::target)};
   const Scene scene = parameters_->apply(parameters_->target());
-  const Renderer renderer(scene, gates_, experiment_.estimator);
+  EstimatorOptions estimator = experiment_.estimator;
+  estimator.max_bounces = target.max_bounces;
+  const Renderer renderer(scene, gates_, estimator);
   ImageMean mean;
   for (int i = 0; i < parts; ++i) {
     const SampleRange range = Share{i, parts}.of(target.samples);

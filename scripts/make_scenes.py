@@ -7,7 +7,7 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corridor, cube, height_field, tree
+from scenes import branches, bunny, corridor, cube, height_field, sofa, tree
 
 SCENES = {
     "branches": branches.write,
@@ -15,6 +15,7 @@ SCENES = {
     "corridor": corridor.write,
     "cube": cube.write,
     "height_field": height_field.write,
+    "sofa": sofa.write,
     "tree": tree.write,
 }
 

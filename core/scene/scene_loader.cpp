@@ -10,7 +10,6 @@
 #include "core/math/constants.h"
 #include "core/math/error.h"
 #include "core/scene/mesh.h"
-#include "core/scene/yaml_reader.h"
 
 namespace isochron {
 namespace {
@@ -31,11 +30,9 @@ Camera read_camera(const YamlValue& value) {
   const std::optional<YamlValue> up = map.find("up");
   if (up) camera.up = unit(up->direction());
   camera.fov = map.require("fov").number({.low = 0, .high = 180, .low_open = true, .high_open = true});
-  const YamlValue resolution = map.require("resolution");
-  const std::vector<YamlValue> sizes = resolution.list();
-  if (sizes.size() != 2) resolution.fail(fmt::format("a list of {}", sizes.size()), "[width, height]");
-  camera.width = static_cast<int>(sizes[0].integer(1, kLargestResolution));
-  camera.height = static_cast<int>(sizes[1].integer(1, kLargestResolution));
+  const auto [width, height] = read_resolution(map.require("resolution"));
+  camera.width = width;
+  camera.height = height;
   map.reject_unknown();
 
   if (camera.look_at == camera.position) look_at.fail("is the camera's position", "a point away from it");
@@ -205,6 +202,13 @@ void read_shape(const YamlValue& value, Scene& scene) {
 }
 
 }  // namespace
+
+std::array<int, 2> read_resolution(const YamlValue& value) {
+  const std::vector<YamlValue> sizes = value.list();
+  if (sizes.size() != 2) value.fail(fmt::format("a list of {}", sizes.size()), "[width, height]");
+  const auto size = [&](int i) { return static_cast<int>(sizes[i].integer(1, kLargestResolution)); };
+  return {size(0), size(1)};
+}
 
 Scene load_scene(const std::string& file) {
   Scene scene;

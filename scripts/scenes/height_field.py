@@ -41,11 +41,8 @@ def write(directory):
     along = np.linspace(-0.5 * EDGE, 0.5 * EDGE, SIDE)
     z, x = np.meshgrid(along, along, indexing="ij")
     vertices = np.stack([x, np.zeros_like(x), z], axis=-1).reshape(-1, 3)
-    corner = (np.arange(SIDE - 1)[:, None] * SIDE + np.arange(SIDE - 1)).ravel()
-    triangles = np.concatenate([np.stack([corner, corner + SIDE, corner + 1], axis=1),
-                                np.stack([corner + 1, corner + SIDE, corner + SIDE + 1], axis=1)])
     lamp = mesh.face_towards(mesh.square(LIGHT_EDGE), LIGHT_CENTRE, (0, 0, 0))
-    mesh.write_obj(directory / "terrain.obj", (vertices, triangles), "11 x 11 vertices, rows from back to front")
+    mesh.write_obj(directory / "terrain.obj", (vertices, mesh.grid(SIDE, SIDE)), "11 x 11 vertices, rows from back to front")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing the terrain")
     heights = [f"{h:.6f}" for h in terrain_heights(x, z).ravel()]
     (directory / "heights.txt").write_text("\n".join(heights) + "\n", encoding="ascii")

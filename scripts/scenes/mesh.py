@@ -37,6 +37,13 @@ def face_towards(mesh, position, target):
     return rounded((vertices @ np.stack([x, np.cross(z, x), z]) + np.asarray(position), triangles))
 
 
+def grid(rows, columns):
+    """Triangles between rows x columns vertices that are listed row by row, facing (down a column) x (along a row)."""
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    below, right = corner + columns, corner + 1
+    return np.concatenate([np.stack([corner, below, right], 1), np.stack([right, below, below + 1], 1)])
+
+
 def translate(mesh, offset):
     vertices, triangles = mesh
     return vertices + np.asarray(offset, dtype=float), triangles

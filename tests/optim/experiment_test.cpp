@@ -98,6 +98,9 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "10:42: optimizer.learning_rate: 0 is out of range (a number above 0)"},
       {"iterations: 6", "iterations: -1", "10:60: optimizer.iterations: -1 is out of range"},
       {"seed: 3", "seed: -3", "11:7: seed: -3 is out of range"},
+      {"seed: 3", "resolution: [8]", "11:13: resolution: a list of 1 ([width, height])"},
+      {"seed: 3", "resolution: [8, 0]", "11:17: resolution[1]: 0 is out of range (an integer from 1 to 32768)"},
+      {"seed: 7}", "max_bounces: -1}", "8:36: target.max_bounces: -1 is out of range"},
       {"seed: 3", "gradient: {method: exact}",
        "11:20: gradient.method: 'exact' is not known (allowed: analytic, finite"},
       {"seed: 3", "gradient: {step: 0}", "11:18: gradient.step: 0 is out of range (a number above 0)"},
@@ -167,6 +170,8 @@ TEST(Experiment, DefaultsAreFilledIn) {
   EXPECT_EQ(e.samples.visibility, 64);
   EXPECT_EQ(e.target.samples, 4096);
   EXPECT_EQ(e.target.seed, 7u);
+  EXPECT_EQ(e.target.max_bounces, 8);
+  EXPECT_EQ(e.resolution, (std::array<int, 2>{0, 0}));
   EXPECT_EQ(e.seed, 1u);
   EXPECT_EQ(make_gates(e.gates).size(), 1);
   EXPECT_TRUE(make_gates(e.gates).shape().is_steady());
@@ -194,7 +199,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
   folder.write("table.txt", "-1 0\n0 1\n0 0.5\n1.5 0\n");
   const std::string vertices =
       "seed: 9007199254740993\nestimator: {sampling: ellipsoidal, antithetic: false, guiding: false}\n"
-      "gradient: {method: finite_difference, step: 0.003}\n";
+      "gradient: {method: finite_difference, step: 0.003}\nresolution: [12, 9]\n";
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
   for (const char* other :
        {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
@@ -203,6 +208,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
         "scene_unit_m: 0.33}",
         "{kind: tabulated, centers: [3], file: table.txt}"}) {
     std::string text = replaced(replaced(tiny_experiment(), gates, other), "seed: 3\n", vertices);
+    text = replaced(text, "seed: 7}", "seed: 7, max_bounces: 3}");
     text = replaced(
         text, "  - {name: power",
         "  - {name: dent, type: vertices, shape: block, direction: normal, initial: values.txt, target: "
@@ -232,6 +238,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_FALSE(back.estimator.antithetic);
     EXPECT_FALSE(back.guiding);
     EXPECT_EQ(back.gradient.step, 0.003);
+    EXPECT_EQ(back.resolution, (std::array<int, 2>{12, 9}));
+    EXPECT_EQ(back.target.max_bounces, 3);
     ASSERT_EQ(back.parameters.size(), 7u);
     EXPECT_EQ(back.parameters[5].type, ParameterType::ior);
     EXPECT_EQ(back.parameters[5].material, "glass");

@@ -76,6 +76,39 @@ class ScenesTest(unittest.TestCase):
             expected = [areas.get(axis, 0) for axis in range(3)]
             np.testing.assert_allclose(total, expected, rtol=1e-9, atol=1e-9, err_msg=name)
 
+    def test_branches_face_outwards(self):
+        corners = read_obj(ROOT / "scenes/branches/branches.obj")
+        self.assertEqual(len(corners), 7 * 12)
+        np.testing.assert_allclose(area_vectors(corners).sum(0), 0, atol=1e-4)
+        for bar in corners.reshape(7, 12, 3, 3):  # closed and convex: every face looks away from the middle
+            outwards = bar.mean(1) - bar.mean((0, 1))
+            self.assertTrue((np.einsum("ij,ij->i", outwards, area_vectors(bar)) > 0).all())
+
+    def test_corridor_faces_inwards_and_is_open_at_one_end(self):
+        corners = read_obj(ROOT / "scenes/corridor/corridor.obj")
+        # Closed but for the opening, a unit square in the plane z = 0, which adds nothing to the flux of position.
+        volume = -np.einsum("ij,ij->i", corners.mean(1), area_vectors(corners)).sum() / 3
+        self.assertAlmostEqual(volume, 1.75 + 1.25, places=9)
+        np.testing.assert_allclose(area_vectors(corners).sum(0), [0, 0, 1], atol=1e-9)
+        end = corners.reshape(-1, 3)[corners.reshape(-1, 3)[:, 0] > 1.7]
+        self.assertEqual(len(np.unique(end, axis=0)), 4)
+
+    def test_height_field_and_sofa_face_the_light(self):
+        for scene, mesh, towards, area in (("height_field", "terrain", (0, 1, 0), 4),
+                                           ("sofa", "sofa", (-(0.5**0.5), 0.5**0.5, 0), 1.8)):
+            corners = read_obj(ROOT / f"scenes/{scene}/{mesh}.obj")
+            facing = area_vectors(corners) @ towards
+            self.assertTrue((facing > 0).all(), scene)
+            self.assertAlmostEqual(facing.sum(), area, places=4)
+
+    def test_lamps_shine_at_what_they_light(self):
+        for scene, target in (("branches", (1, 0, 0)), ("corridor", (-0.5, 0.5, -1.25)), ("height_field", (0, 0, 0)),
+                              ("sofa", (0.75, 0.75, 0))):
+            corners = read_obj(ROOT / f"scenes/{scene}/lamp.obj")
+            towards = target - corners.mean((0, 1))
+            area = area_vectors(corners).sum(0)
+            np.testing.assert_allclose(area / np.linalg.norm(area), towards / np.linalg.norm(towards), atol=1e-3)
+
 
 if __name__ == "__main__":
     unittest.main()

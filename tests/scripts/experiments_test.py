@@ -1,0 +1,71 @@
+#!/usr/bin/python3
+"""Every experiment of this repository runs, resumes to the same result and, unless it is there to show a failure, comes
+closer to its target: a few iterations with few pixels and samples, by fixed seeds. Closer in the parameters: with so
+few samples the loss is mostly noise.
+
+usage: experiments_test.py PROGRAM
+"""
+
+import csv
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = sys.argv.pop(1)
+
+# Image size, samples per pixel and number of iterations at which the way to the target shows, and learning rate (None:
+# the experiment's own). Experiments that are not listed take the first entry; theirs need not come closer.
+DEFAULT = ([4, 4], 4, 3, None)
+CLOSER = {
+    "branches": ([12, 12], 16, 6, None),
+    "cube": ([48, 48], 4, 20, None),
+    "height_field": ([12, 12], 16, 6, None),
+}
+
+
+class ExperimentsTest(unittest.TestCase):
+    def run_program(self, *arguments):
+        done = subprocess.run([PROGRAM, *map(str, arguments), "--quiet", "--no-plots"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_experiments(self):
+        experiments = sorted(ROOT.glob("experiments/*.yaml"))
+        self.assertLessEqual(set(CLOSER), {e.stem for e in experiments})
+        for experiment in experiments:
+            with self.subTest(experiment.stem), tempfile.TemporaryDirectory() as folder:
+                self.check(experiment, pathlib.Path(folder) / "run")
+
+    def check(self, experiment, run):
+        resolution, samples, iterations, rate = CLOSER.get(experiment.stem, DEFAULT)
+        settings = [f"resolution={resolution}", f"target.samples={4 * samples}", f"optimizer.iterations={iterations}"]
+        if rate:
+            settings.append(f"optimizer.learning_rate={rate}")
+        overrides = [word for setting in settings for word in ("--set", setting)]
+        self.run_program("run", experiment, "-o", run, "--samples", samples, *overrides)
+        summary = yaml.safe_load((run / "summary.yaml").read_text())
+        self.assertIn(summary["status"], ("iterations_reached", "diverged"))
+        self.assertEqual(summary["iterations"], iterations)
+        if experiment.stem in CLOSER:
+            self.assertLess(summary["param_rmse_final"], 0.99 * summary["param_rmse_initial"])
+
+        # As if the run had been stopped within its last iteration.
+        final, log = (run / "final.exr").read_bytes(), self.log(run)
+        for file in ("checkpoint.yaml", "final.exr", "summary.yaml"):
+            (run / file).unlink()
+        self.run_program("resume", run)
+        self.assertEqual((run / "final.exr").read_bytes(), final)
+        self.assertEqual(self.log(run), log)
+
+    def log(self, run):
+        """The log's rows without their seconds."""
+        with open(run / "log.csv", encoding="ascii", newline="") as file:
+            return [row[:1] + row[2:] for row in csv.reader(file)]
+
+
+if __name__ == "__main__":
+    unittest.main()
