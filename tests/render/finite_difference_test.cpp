@@ -3,10 +3,11 @@
 //
 // Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at 4 standard errors of the difference (false
 // alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below 5 % of the
-// derivative's scale (15 % in the others): the terms' root mean square over gates and over all motions, which have
+// derivative's scale (15 % in the glossy one, 50 % with glass): the terms' root mean square over gates and over all motions, which have
 // comparable speeds; over gates for a material's parameter. The steps are small enough that their bias, of second order, stays below that.
 // Motions of the glass itself have no such limit: next to an edge of the block light goes from face to face over a distance
-// that vanishes, where the derivative's samples grow like one over it. Their tails are heavy, and their z-tests weak.
+// that vanishes, where the derivative's samples grow like one over it. Their tails are heavy, and their z-tests weak. The
+// glass's roughness changes these images too little to be resolved either; its z-test only catches gross errors.
 // ISOCHRON_TEST_SAMPLES=16 in the environment takes 16 times the samples, for errors four times smaller.
 #include <gtest/gtest.h>
 
@@ -55,7 +56,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
     Motion motion;
     double step;
     bool geometry = true;
-    bool heavy = false;  ///< samples without a finite variance
+    bool unresolved = false;  ///< no limit to the standard error
   };
   const bool glass = c.look == Look::glass;
   std::vector<Parameter> parameters = {
@@ -67,7 +68,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
       {"vertex within a surface", translate(scene, "panel", {-1, 0, 0.3}, at(middle)), 0.01},
       {"albedo", change_albedo(scene, glass ? "grey" : "block"), 0.01, false}};
   if (glass) parameters.push_back({"ior", change_ior(scene, "block"), 0.01, false});
-  if (c.look != Look::diffuse) parameters.push_back({"roughness", change_roughness(scene, "block"), 0.01, false});
+  if (c.look != Look::diffuse) parameters.push_back({"roughness", change_roughness(scene, "block"), 0.01, false, glass});
   std::vector<Motion> motions;
   for (const Parameter& p : parameters) motions.push_back(p.motion);
   const TangentBasis basis = make_basis(scene, motions);
@@ -93,9 +94,11 @@ TEST_P(FiniteDifference, TotalDerivative) {
   double motion_scale = 0;
   int motion_count = 0;
   for (std::size_t p = 0; p < parameters.size(); ++p)
-    if (parameters[p].geometry && !parameters[p].heavy) motion_scale = std::hypot(motion_scale, size_of(p)), ++motion_count;
+    if (parameters[p].geometry && !parameters[p].unresolved)
+      motion_scale = std::hypot(motion_scale, size_of(p)), ++motion_count;
   motion_scale /= std::sqrt(motion_count);
 
+  const double limit = c.look == Look::diffuse ? 0.05 : c.look == Look::glossy ? 0.15 : 0.5;
   EstimatorOptions reference_options = options;
   reference_options.sampling = Sampling::standard;
   for (std::size_t p = 0; p < parameters.size(); ++p) {
@@ -112,8 +115,8 @@ TEST_P(FiniteDifference, TotalDerivative) {
       EXPECT_LT(std::abs(z_score(total, difference[g])), 4)
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
-      if (parameters[p].heavy) continue;
-      EXPECT_LT(error, (c.look == Look::diffuse ? 0.05 : 0.15) / std::sqrt(factor) * scale)
+      if (parameters[p].unresolved) continue;
+      EXPECT_LT(error, limit / std::sqrt(factor) * scale)
           << parameters[p].name << ", gate " << g << ": ours " << total.standard_error << ", finite difference "
           << difference[g].standard_error;
     }
