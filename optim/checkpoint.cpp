@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "core/math/error.h"
 #include "optim/experiment.h"
@@ -26,20 +28,27 @@ std::string checksum(const std::string& text) {
   return fmt::format("{:016x}", hash);
 }
 
-std::string list(const std::vector<double>& values, std::size_t begin, std::size_t count) {
-  const auto first = values.begin() + static_cast<std::ptrdiff_t>(begin);
-  return fmt::format("[{}]", fmt::join(first, first + static_cast<std::ptrdiff_t>(count), ", "));
+std::string list(const std::vector<double>& values) {
+  return fmt::format("[{}]", fmt::join(values, ", "));
 }
 
 /// YAML writes special values with a dot; yaml-cpp reads them that way only.
 std::string scalar(double value) {
-  return std::isfinite(value) ? exact(value) : ".nan";
+  return std::isfinite(value) ? exact(value) : std::isnan(value) ? ".nan" : value > 0 ? ".inf" : "-.inf";
 }
 
 /// Raised inside this file when a checkpoint is not whole.
 struct Damaged : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+std::vector<std::pair<const char*, std::vector<double>*>> lists_of(SafeguardState& state) {
+  return {{"recent", &state.recent},
+          {"best_theta", &state.best_theta},
+          {"block", &state.block},
+          {"block_before", &state.block_before},
+          {"theta_sum", &state.theta_sum}};
+}
 
 Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters) {
   const std::size_t tail = text.rfind(kChecksumKey);
@@ -53,12 +62,9 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   Checkpoint c;
   c.iteration = root["iteration"].as<int>();
   c.seconds = root["seconds"].as<double>();
-  c.rejected = root["rejected"].as<int>();
-  c.rejected_in_row = root["rejected_in_row"].as<int>();
   c.loss_initial = root["loss_initial"].as<double>();
   c.image_rmse_initial = root["image_rmse_initial"].as<double>();
   c.param_rmse_initial = root["param_rmse_initial"].as<double>();
-  c.adam.steps = root["adam_steps"].as<long long>();
   const YAML::Node entries = root["parameters"];
   if (entries.size() != parameters.blocks().size())
     throw InputError(fmt::format("{}: parameters: {} there; the experiment has {}", file, entries.size(),
@@ -66,21 +72,22 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const YAML::Node entry = entries[i];
     const Parameters::Block& block = parameters.blocks()[i];
-    const auto append = [&](const char* key, std::vector<double>& into) {
-      const auto values = entry[key].as<std::vector<double>>();
-      into.insert(into.end(), values.begin(), values.end());
-      return static_cast<int>(values.size());
-    };
     const std::string name = entry["name"].as<std::string>();
-    const int count = append("value", c.theta);
-    append("m", c.adam.m);
-    append("v", c.adam.v);
+    const auto values = entry["value"].as<std::vector<double>>();
+    const int count = static_cast<int>(values.size());
+    c.theta.insert(c.theta.end(), values.begin(), values.end());
     if (name != block.name || count != block.count)
       throw InputError(fmt::format("{}: parameters: '{}' with {} values; the experiment has '{}' with {}",
                                    file, name, count, block.name, block.count));
   }
-  if (c.adam.m.size() != c.theta.size() || c.adam.v.size() != c.theta.size())
-    throw Damaged("values are missing");
+  for (const auto& entry : root["optimizer"])
+    c.optimizer[entry.first.as<std::string>()] = entry.second.as<std::vector<double>>();
+  const YAML::Node safeguard = root["safeguard"];
+  c.safeguard.rate = safeguard["rate"].as<double>();
+  c.safeguard.rejected = safeguard["rejected"].as<int>();
+  c.safeguard.rejected_in_row = safeguard["rejected_in_row"].as<int>();
+  c.safeguard.best_level = safeguard["best_level"].as<double>();
+  for (const auto& [key, values] : lists_of(c.safeguard)) *values = safeguard[key].as<std::vector<double>>();
   return c;
 }
 
@@ -90,19 +97,25 @@ Checkpoint::Checkpoint()
     : loss_initial(kUnknown), image_rmse_initial(kUnknown), param_rmse_initial(kUnknown) {}
 
 void save_checkpoint(const std::string& folder, const Checkpoint& c, const Parameters& parameters) {
-  AdamState adam = c.adam;
-  adam.m.resize(c.theta.size(), 0.0);
-  adam.v.resize(c.theta.size(), 0.0);
   std::string text = fmt::format(
-      "version: {}\niteration: {}\nseconds: {}\nrejected: {}\nrejected_in_row: {}\nloss_initial: {}\n"
-      "image_rmse_initial: {}\nparam_rmse_initial: {}\nadam_steps: {}\nparameters:{}\n",
-      program_version(), c.iteration, scalar(c.seconds), c.rejected, c.rejected_in_row,
-      scalar(c.loss_initial), scalar(c.image_rmse_initial), scalar(c.param_rmse_initial), adam.steps,
-      parameters.blocks().empty() ? " []" : "");
-  for (const Parameters::Block& block : parameters.blocks())
-    text += fmt::format("  - name: {}\n    value: {}\n    m: {}\n    v: {}\n", block.name,
-                        list(c.theta, block.begin, block.count), list(adam.m, block.begin, block.count),
-                        list(adam.v, block.begin, block.count));
+      "version: {}\niteration: {}\nseconds: {}\nloss_initial: {}\nimage_rmse_initial: "
+      "{}\nparam_rmse_initial: {}\n"
+      "parameters:{}\n",
+      program_version(), c.iteration, scalar(c.seconds), scalar(c.loss_initial), scalar(c.image_rmse_initial),
+      scalar(c.param_rmse_initial), parameters.blocks().empty() ? " []" : "");
+  auto out = std::back_inserter(text);
+  for (const Parameters::Block& block : parameters.blocks()) {
+    const auto begin = c.theta.begin() + block.begin;
+    fmt::format_to(out, "  - name: {}\n    value: [{}]\n", block.name,
+                   fmt::join(begin, begin + block.count, ", "));
+  }
+  text += c.optimizer.empty() ? "optimizer: {}\n" : "optimizer:\n";
+  for (const auto& [key, values] : c.optimizer) fmt::format_to(out, "  {}: {}\n", key, list(values));
+  SafeguardState safeguard = c.safeguard;
+  fmt::format_to(out, "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n",
+                 scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row,
+                 scalar(safeguard.best_level));
+  for (const auto& [key, values] : lists_of(safeguard)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
   text += kChecksumKey + checksum(text) + "\n";
   const std::string latest = folder + "/checkpoint.yaml", previous = folder + "/checkpoint.previous.yaml";
   const std::string fresh = folder + "/checkpoint.new.yaml";

@@ -5,18 +5,18 @@
 #include <string>
 #include <vector>
 
-#include "optim/adam.h"
+#include "optim/optimizer.h"
 #include "optim/parameters.h"
+#include "optim/safeguard.h"
 
 namespace isochron {
 
 struct Checkpoint {
   int iteration = 0;   ///< iterations done; the next row of the log has this number
   double seconds = 0;  ///< spent on them
-  int rejected = 0;    ///< steps rejected so far
-  int rejected_in_row = 0;
   std::vector<double> theta;
-  AdamState adam;
+  OptimizerState optimizer;  ///< empty before the first iteration
+  SafeguardState safeguard;
   /// Of iteration 0, for the summary; NaN before it.
   double loss_initial, image_rmse_initial, param_rmse_initial;
   Checkpoint();

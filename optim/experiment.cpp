@@ -188,6 +188,15 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
     else
       direction.fail("is neither", "[x, y, z], normal or free");
   }
+  if (spec.type == ParameterType::vertices) {
+    if (const auto found = find("smoothing")) {
+      YamlMap smoothing = found->map();
+      if (const auto diffusion = smoothing.find("diffusion"))
+        spec.diffusion = diffusion->number(NumberRange::non_negative());
+      if (const auto slopes = smoothing.find("slopes")) spec.slopes = slopes->number(NumberRange::non_negative());
+      smoothing.reject_unknown();
+    }
+  }
   spec.initial = read_values(require("initial"), folder);
   if (target_required)
     spec.target = read_values(require("target"), folder);
@@ -210,8 +219,49 @@ void read_target(const YamlValue& value, const std::filesystem::path& folder, Ta
       target.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
     if (const auto bounces = map.find("max_bounces"))
       target.max_bounces = static_cast<int>(bounces->integer(0, kMostBounces));
+    if (const auto value_of_noise = map.find("noise")) {
+      YamlMap noise = value_of_noise->map();
+      // So many that their noise, a millionth, no longer matters.
+      target.photons = noise.require("photons").number({.low = 0, .high = 1e12, .low_open = true});
+      noise.reject_unknown();
+    }
   }
   map.reject_unknown();
+}
+
+LossSpec read_loss(const YamlValue& value) {
+  YamlMap map = value.map();
+  LossSpec loss;
+  loss.kind = static_cast<LossKind>(map.require("kind").choice({"squared", "huber", "cauchy"}));
+  if (loss.kind != LossKind::squared)
+    if (const auto scale = map.find("scale")) loss.scale = scale->number(NumberRange::positive());
+  map.reject_unknown();
+  return loss;
+}
+
+OptimizerSpec read_optimizer(const YamlValue& value) {
+  constexpr int kMostIterations = std::numeric_limits<int>::max() - 2;
+  YamlMap map = value.map();
+  OptimizerSpec optimizer;
+  if (const auto method = map.find("method"))
+    optimizer.method = static_cast<OptimizerMethod>(method->choice({"adam", "lbfgs", "levenberg_marquardt"}));
+  if (const auto rate = map.find("learning_rate"))
+    optimizer.learning_rate = rate->number(NumberRange::positive());
+  if (const auto iterations = map.find("iterations"))
+    optimizer.iterations = static_cast<int>(iterations->integer(0, kMostIterations));
+  if (const auto tolerance = map.find("tolerance"))
+    optimizer.tolerance = tolerance->number(NumberRange::non_negative());
+  if (const auto stop_value = map.find("stop")) {
+    YamlMap stop = stop_value->map();
+    // Two losses are the least that have a standard error.
+    optimizer.stop_window = static_cast<int>(stop.require("window").integer(2, 100000));
+    stop.reject_unknown();
+  }
+  if (optimizer.method == OptimizerMethod::lbfgs)
+    if (const auto inner = map.find("inner_iterations"))
+      optimizer.inner_iterations = static_cast<int>(inner->integer(1, 1000));
+  map.reject_unknown();
+  return optimizer;
 }
 
 void read_settings(YamlMap& map, Experiment& experiment) {
@@ -247,20 +297,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
     }
     gradient.reject_unknown();
   }
-  if (const auto value = map.find("optimizer")) {
-    YamlMap optimizer = value->map();
-    if (const auto method = optimizer.find("method"))
-      if (method->choice({"adam", "lbfgs", "levenberg_marquardt"}) != 0)
-        method->fail(fmt::format("'{}' is not available yet", method->text()), "allowed: adam");
-    if (const auto rate = optimizer.find("learning_rate"))
-      experiment.optimizer.learning_rate = rate->number(NumberRange::positive());
-    if (const auto iterations = optimizer.find("iterations"))
-      experiment.optimizer.iterations =
-          static_cast<int>(iterations->integer(0, std::numeric_limits<int>::max() - 1));
-    if (const auto tolerance = optimizer.find("tolerance"))
-      experiment.optimizer.tolerance = tolerance->number(NumberRange::non_negative());
-    optimizer.reject_unknown();
-  }
+  if (const auto value = map.find("loss")) experiment.loss = read_loss(*value);
+  if (const auto value = map.find("optimizer")) experiment.optimizer = read_optimizer(*value);
   if (const auto seed = map.find("seed"))
     experiment.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
 }
@@ -327,6 +365,9 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
     }
   }
   read_settings(map, experiment);
+  for (const ParameterSpec& spec : experiment.parameters)
+    if (spec.diffusion > 0 && experiment.optimizer.method != OptimizerMethod::adam)
+      spec.fail("smoothing", "diffusion works with the method adam alone", "slopes for the other methods");
   if (const auto version = map.find("version")) version->text();
   map.reject_unknown();
   return experiment;

@@ -6,8 +6,9 @@
 //   samples: 64 for each of primal, interior, visibility, path_length
 //   estimator: sampling auto, antithetic true, guiding true
 //   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter)
-//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0
-//   target: samples 4096, seed 7, max_bounces as above                 seed 1
+//   loss: kind squared                (huber, cauchy: scale 1)
+//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; lbfgs: inner_iterations 5
+//   target: samples 4096, seed 7, max_bounces as above, noise none     seed 1
 //   resolution: the camera's
 #pragma once
 #include <array>
@@ -72,6 +73,10 @@ struct ParameterSpec {
   std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
                                                       ///< empty (all but initial)
 
+  /// Of type vertices, see smoothing.h; 0: none.
+  double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
+  double slopes = 0;     ///< weight of the penalty on uneven offsets, in units of the target's mean square
+
   /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
   std::map<std::string, YamlValue> where;
   /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
@@ -84,6 +89,7 @@ struct TargetSpec {
   int samples = 4096;
   std::uint64_t seed = 7;
   int max_bounces = 8;  ///< of the rendered target; the experiment's own where the file does not say
+  double photons = 0;  ///< of add_photon_noise; 0: no noise
 };
 
 /// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1.
@@ -104,10 +110,26 @@ struct GradientSpec {
   bool step_given = false;  ///< whether the file gives it
 };
 
+enum class LossKind { squared, huber, cauchy };
+
+/// What is minimised: see RobustLoss.
+struct LossSpec {
+  LossKind kind = LossKind::squared;
+  double scale = 1;  ///< in units of the target's root mean square
+};
+
+enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
+const char* name(OptimizerMethod method);
+
 struct OptimizerSpec {
-  double learning_rate = 0.02;  ///< units of the parameter per iteration
+  OptimizerMethod method = OptimizerMethod::adam;
+  /// adam: units of the parameter per iteration. lbfgs: length of the first trial step, same unit.
+  /// levenberg_marquardt: without meaning.
+  double learning_rate = 0.02;
   int iterations = 100;
   double tolerance = 0;  ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
+  int stop_window = 0;   ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
+  int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
 };
 
 struct Experiment {
@@ -124,6 +146,7 @@ struct Experiment {
   TargetSpec target;
   SampleSpec samples;
   GradientSpec gradient;
+  LossSpec loss;
   OptimizerSpec optimizer;
   std::uint64_t seed = 1;
 };

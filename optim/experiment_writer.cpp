@@ -64,6 +64,8 @@ std::string parameter_yaml(const ParameterSpec& spec) {
                    spec.direction_kind == VertexDirection::normal ? "normal" : "free");
   else if (spec.type == ParameterType::translation || spec.type == ParameterType::vertices)
     fmt::format_to(out, "    direction: {}\n", vector(spec.direction));
+  if (spec.diffusion > 0 || spec.slopes > 0)
+    fmt::format_to(out, "    smoothing: {{diffusion: {}, slopes: {}}}\n", spec.diffusion, spec.slopes);
   fmt::format_to(out, "    initial: {}\n", number_or_list(spec.initial));
   if (!spec.target.empty()) fmt::format_to(out, "    target: {}\n", number_or_list(spec.target));
   if (!spec.lower.empty()) fmt::format_to(out, "    lower: {}\n", number_or_list(spec.lower));
@@ -81,6 +83,11 @@ const char* name(ParameterType type) {
   constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo",
                                     "roughness",   "ior",      "emission"};
   return kNames[static_cast<int>(type)];
+}
+
+const char* name(OptimizerMethod method) {
+  constexpr const char* kNames[] = {"adam", "lbfgs", "levenberg_marquardt"};
+  return kNames[static_cast<int>(method)];
 }
 
 std::string resolved_yaml(const Experiment& e, const std::string& folder) {
@@ -101,6 +108,7 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
                    e.target.max_bounces);
   else
     fmt::format_to(out, "target:\n  images: {}\n", relative(e.target.images));
+  if (e.target.photons > 0) fmt::format_to(out, "  noise: {{photons: {}}}\n", e.target.photons);
   fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
                  e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
   fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  guiding: {}\n",
@@ -110,8 +118,15 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
   // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.
   if (!analytic || e.gradient.step_given) fmt::format_to(out, "  step: {}\n", e.gradient.step);
-  fmt::format_to(out, "optimizer:\n  method: adam\n  learning_rate: {}\n  iterations: {}\n  tolerance: {}\n",
-                 e.optimizer.learning_rate, e.optimizer.iterations, e.optimizer.tolerance);
+  constexpr const char* kLosses[] = {"squared", "huber", "cauchy"};
+  fmt::format_to(out, "loss:\n  kind: {}\n", kLosses[static_cast<int>(e.loss.kind)]);
+  if (e.loss.kind != LossKind::squared) fmt::format_to(out, "  scale: {}\n", e.loss.scale);
+  const OptimizerSpec& optimizer = e.optimizer;
+  fmt::format_to(out, "optimizer:\n  method: {}\n  learning_rate: {}\n  iterations: {}\n  tolerance: {}\n",
+                 name(optimizer.method), optimizer.learning_rate, optimizer.iterations, optimizer.tolerance);
+  if (optimizer.stop_window > 0) fmt::format_to(out, "  stop: {{window: {}}}\n", optimizer.stop_window);
+  if (optimizer.method == OptimizerMethod::lbfgs)
+    fmt::format_to(out, "  inner_iterations: {}\n", optimizer.inner_iterations);
   fmt::format_to(out, "seed: {}\n", e.seed);
   return text;
 }

@@ -186,6 +186,21 @@ void Parameters::bind_values(const ParameterSpec& spec, int count) {
   }
 }
 
+Parameters::VertexField Parameters::vertex_field(const Block& block) const {
+  for (std::size_t s = 0; s < motions_.size(); ++s)
+    for (const Motion& motion : motions_[s]) {
+      if (motion.type != ParameterType::vertices || motion.first_component != block.begin) continue;
+      VertexField field{block.name, block.begin, motion.direction_kind == VertexDirection::free ? 3 : 1, 1, {}};
+      if (motion.direction_kind == VertexDirection::fixed) field.unit = length(motion.direction);
+      field.vertices.resize(block.count / field.stride);
+      for (std::size_t v = 0; v < motion.slot.size(); ++v)
+        if (motion.slot[v] >= 0)
+          field.vertices[motion.slot[v]] = scene_.shapes[s].first_vertex + static_cast<int>(v);
+      return field;
+    }
+  throw std::logic_error("not a parameter of vertices: " + block.name);
+}
+
 bool Parameters::target_known() const {
   return std::none_of(target_.begin(), target_.end(), [](double value) { return std::isnan(value); });
 }

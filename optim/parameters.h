@@ -34,6 +34,17 @@ class Parameters {
   };
   const std::vector<Block>& blocks() const { return blocks_; }
 
+  /// The vertices of one parameter of type `vertices`: component `axis` of vertices[i] is the unknown
+  /// begin + stride i + axis.
+  struct VertexField {
+    std::string name;
+    int begin;
+    int stride;   ///< 3 for free vertices, else 1
+    double unit;  ///< length of the offset per unit of an unknown
+    std::vector<int> vertices;  ///< in Scene::positions
+  };
+  VertexField vertex_field(const Block& block) const;
+
   const std::vector<double>& initial() const { return initial_; }
   /// Target values. Components without one are NaN.
   const std::vector<double>& target() const { return target_; }

@@ -8,6 +8,7 @@
 #include "core/math/error.h"
 #include "core/scene/scene_loader.h"
 #include "optim/loss.h"
+#include "optim/photon_noise.h"
 
 namespace isochron {
 namespace {
@@ -51,7 +52,15 @@ Problem::Problem(Experiment experiment)
     : experiment_(std::move(experiment)),
       scene_(load_scene_at(experiment_)),
       gates_(make_gates(experiment_.gates)),
-      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)) {}
+      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)) {
+  for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
+    const ParameterSpec& spec = experiment_.parameters[i];
+    const Parameters::Block& block = parameters_->blocks()[i];
+    if (spec.diffusion > 0)
+      preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
+    if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
+  }
+}
 
 void Problem::require_parameters() const {
   if (experiment_.parameters.empty())
@@ -65,13 +74,21 @@ GatedImage Problem::render(const std::vector<double>& theta, const Stream& strea
 
 GatedImage Problem::read_target(const std::string& file) const {
   GatedImage image = read_exr(file);
-  const GatedImage wanted(scene_.camera.width, scene_.camera.height, gates_.size(), scene_.grey ? 1 : 3);
-  const auto shape = [](const GatedImage& i) {
-    return fmt::format("{} x {} pixels, {} gates, {} channels", i.width, i.height, i.gates, i.channels);
+  const Camera& camera = scene_.camera;
+  const auto require = [&](bool equal, const std::string& found, const std::string& wanted) {
+    if (!equal)
+      throw InputError(
+          fmt::format("{}: {} in the target images (the experiment has {})", file, found, wanted));
   };
-  if (!image.same_shape(wanted))
-    throw InputError(
-        fmt::format("{}: target images have {}; the experiment has {}", file, shape(image), shape(wanted)));
+  require(image.width == camera.width && image.height == camera.height,
+          fmt::format("{} x {} pixels", image.width, image.height),
+          fmt::format("{} x {}", camera.width, camera.height));
+  require(image.gates == gates_.size(), fmt::format("{} gates", image.gates),
+          fmt::format("{}", gates_.size()));
+  const int channels = scene_.grey ? 1 : 3;
+  require(image.channels == channels,
+          image.channels == 1 ? "one grey channel (Y)" : "three channels (R, G, B)",
+          channels == 1 ? "one grey channel, Y" : "three channels, R, G and B");
   return image;
 }
 
@@ -91,7 +108,21 @@ GatedImage Problem::make_target(const Poll& poll) const {
     mean.add(renderer.render(stream, range), range.count());
     poll();
   }
-  return mean.mean();
+  GatedImage image = mean.mean();
+  if (target.photons > 0)
+    add_photon_noise(image, target.photons, {target.seed, 0, pass_number(Pass::photon_noise)});
+  return image;
+}
+
+RobustLoss Problem::robust_loss(const GatedImage& target) const {
+  const double scale = experiment_.loss.scale * std::sqrt(mean_square(target));
+  return scale > 0 ? RobustLoss{experiment_.loss.kind, scale} : RobustLoss{};
+}
+
+double Problem::loss(const GatedImage& image, const GatedImage& target,
+                     const std::vector<double>& theta) const {
+  const double of_image = mean_loss(image, target, robust_loss(target));
+  return penalty_.empty() ? of_image : of_image + mean_square(target) * penalty_.value(theta);
 }
 
 EstimatorOptions Problem::estimator(int visibility_samples) const {
@@ -109,8 +140,9 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const Renderer renderer(scene, gates_, estimator(share.of(samples.visibility).count()), &basis);
   Evaluation result;
   result.image = renderer.render(stream(Pass::primal, iteration), share.of(samples.primal));
-  result.loss = mean_squared_error(result.image, target);
-  const GatedImage adjoint = loss_adjoint(result.image, target);
+  result.loss = loss(result.image, target, theta);
+  result.mean_squared_error = mean_loss(result.image, target);
+  const GatedImage adjoint = loss_adjoint(result.image, target, robust_loss(target));
   poll();
   if (experiment_.gradient.method == GradientMethod::finite_difference) {
     for (int i = 0; i < parameters_->size(); ++i) {
@@ -119,6 +151,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
       result.gradient.push_back(inner_product(adjoint, derivative));
       poll();
     }
+    penalty_.add_gradient(theta, mean_square(target), result.gradient);
     return result;
   }
   std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
@@ -129,6 +162,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
     poll();
   }
   result.gradient = basis.transpose_apply(dof_gradient);
+  penalty_.add_gradient(theta, mean_square(target), result.gradient);
   return result;
 }
 

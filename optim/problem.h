@@ -9,7 +9,10 @@
 #include "core/render/renderer.h"
 #include "core/scene/scene.h"
 #include "optim/experiment.h"
+#include "optim/loss.h"
+#include "optim/objective.h"
 #include "optim/parameters.h"
+#include "optim/smoothing.h"
 
 namespace isochron {
 
@@ -20,7 +23,8 @@ enum class Pass : std::uint32_t {
   visibility = 2,
   path_length = 3,
   target = 4,
-  finite_difference = 5
+  finite_difference = 5,
+  photon_noise = 6
 };
 
 /// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.
@@ -38,12 +42,6 @@ using Poll = std::function<void()>;
 /// Thrown by a Poll after the user asked to stop.
 struct Interrupted {};
 
-struct Evaluation {
-  GatedImage image;
-  double loss = 0;               ///< mean squared error
-  std::vector<double> gradient;  ///< of the loss, one per scalar unknown
-};
-
 class Problem {
  public:
   /// Loads the scene and binds the parameters. Throws InputError.
@@ -53,6 +51,9 @@ class Problem {
   const Scene& scene() const { return scene_; }
   const GateSet& gates() const { return gates_; }
   const Parameters& parameters() const { return *parameters_; }
+  const Preconditioner& preconditioner() const { return preconditioner_; }
+  /// Of the offsets' slopes, to be multiplied by the target's mean square.
+  const PairPenalty& penalty() const { return penalty_; }
 
   /// Throws InputError when the experiment has no parameters: nothing to differentiate.
   void require_parameters() const;
@@ -64,8 +65,9 @@ class Problem {
   /// Gated images at theta.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
-  /// The images that the optimisation aims at: rendered at the target values or read from a file. Throws
-  /// InputError when the file's shape is not that of this experiment's images.
+  /// The images that the optimisation aims at: rendered at the target values, with photon noise where it is
+  /// asked for, or read from a file. Throws InputError when the file's shape is not that of this experiment's
+  /// images.
   GatedImage make_target(const Poll& poll) const;
   /// Reads a target image and checks its shape against this experiment's.
   GatedImage read_target(const std::string& file) const;
@@ -74,8 +76,16 @@ class Problem {
   /// a small share of their number.
   EstimatorOptions estimator(int visibility_samples) const;
 
+  /// The experiment's loss, made absolute by the target's root mean square. Squared where the target is
+  /// black.
+  RobustLoss robust_loss(const GatedImage& target) const;
+
+  /// Loss of an image rendered at theta, the penalty included.
+  double loss(const GatedImage& image, const GatedImage& target, const std::vector<double>& theta) const;
+
   /// Image, loss and gradient at theta from the random numbers of one iteration. Unbiased for image and
-  /// gradient (the loss has the variance of the image added to it).
+  /// gradient (the loss has the variance of the image added to it; for robust losses both hold for small
+  /// noise only).
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}) const;
 
@@ -91,6 +101,8 @@ class Problem {
   Scene scene_;
   GateSet gates_;
   std::unique_ptr<Parameters> parameters_;
+  Preconditioner preconditioner_;
+  PairPenalty penalty_;
 };
 
 Pass pass_of(Term term);

@@ -1,5 +1,5 @@
-// The optimisation loop and its folder. See checkpoint.h for what survives a kill, log.h for the rows of
-// log.csv.
+// A run and its folder: the loop of loop.h with files. See checkpoint.h for what survives a kill, log.h for
+// the rows of log.csv.
 //
 // Order of writing: experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before
 // them, in iteration 0, initial.exr), at last final.exr and summary.yaml. Every random number depends on
@@ -10,11 +10,9 @@
 #include <string>
 
 #include "optim/experiment.h"
+#include "optim/loop.h"
 
 namespace isochron {
-
-enum class RunStatus { converged, iterations_reached, diverged, interrupted };
-const char* name(RunStatus status);
 
 struct Progress {
   int iteration = 0, iterations = 0;
@@ -31,12 +29,6 @@ struct RunOptions {
   std::function<void(const Progress&)> progress;    ///< after every row of the log
   std::function<void(const std::string&)> warning;  ///< one line
 };
-
-/// A step whose loss or gradient is not finite is rejected: parameters and optimiser stay as they were. So
-/// many in a row end the run as diverged.
-inline constexpr int kMostRejectedInRow = 5;
-/// A run that ends with more than this times the loss it began with has diverged.
-inline constexpr double kDivergedLossRatio = 10;
 
 /// Optimises from the initial values. Throws InputError, before any rendering, when the experiment does not
 /// fit its scene, has no parameters, or the folder cannot be written or holds a run already.

@@ -86,7 +86,7 @@ class Program : public testing::Test {
   /// Parameters and optimiser state of the last checkpoint, exact.
   std::string state(const std::string& out) const {
     const std::string text = folder_.read(out + "/checkpoint.yaml");
-    return text.substr(text.find("adam_steps"), text.find("checksum") - text.find("adam_steps"));
+    return text.substr(text.find("parameters:"), text.find("checksum") - text.find("parameters:"));
   }
 
   void expect_same_run(const std::string& a, const std::string& b) const {
@@ -262,7 +262,7 @@ TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
                           "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
   EXPECT_EQ(result.status, 1);
   const std::string summary = folder_.read("out/summary.yaml");
-  EXPECT_NE(summary.find("status: diverged\niterations: 5\n"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("status: diverged\niterations: 4\n"), std::string::npos) << summary;
   EXPECT_NE(summary.find("rejected_steps: 5\n"), std::string::npos);
   EXPECT_NE(summary.find("  height: 0.2\n  power: 1e+300\n"), std::string::npos);
 }

@@ -88,10 +88,15 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"interior: 16", "interior: -2", "9:33: samples.interior: -2 is out of range"},
       {"path_length", "pathlength",
        "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},
-      {"method: adam", "method: lbfgs",
-       "10:21: optimizer.method: 'lbfgs' is not available yet (allowed: adam)"},
-      {"method: adam", "method: levenberg_marquardt",
-       "10:21: optimizer.method: 'levenberg_marquardt' is not available"},
+      {"iterations: 6", "iterations: 6, inner_iterations: 3",
+       "10:63: optimizer.inner_iterations: is not a known key"},
+      {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, inner_iterations: 0",
+       "10:46: optimizer.inner_iterations: 0 is out of range"},
+      {"iterations: 6", "stop: {window: 1}", "10:63: optimizer.stop.window: 1 is out of range"},
+      {"seed: 7}", "seed: 7, noise: {photons: -1}}", "8:49: target.noise.photons: -1 is out of range"},
+      {"seed: 3", "loss: {kind: absolute}",
+       "11:14: loss.kind: 'absolute' is not known (allowed: squared, huber, cauchy"},
+      {"seed: 3", "loss: {kind: huber, scale: 0}", "11:28: loss.scale: 0 is out of range (a number above 0)"},
       {"method: adam", "method: sgd",
        "10:21: optimizer.method: 'sgd' is not known (allowed: adam, lbfgs, levenberg_"},
       {"learning_rate: 0.02", "learning_rate: 0",
@@ -150,7 +155,7 @@ TEST(Experiment, OverridesAreCheckedLikeTheFile) {
   EXPECT_FALSE(changed.estimator.antithetic);
   EXPECT_FALSE(changed.guiding);
   for (const char* wrong : {"optimizer.iterations=-9", "parameters[7].initial=1", "nothing=1",
-                            "gates.sigma=", "gates.sigma", "optimizer.method=lbfgs"}) {
+                            "gates.sigma=", "gates.sigma", "optimizer.method=newton"}) {
     try {
       load_experiment(file, {wrong});
       ADD_FAILURE() << "accepted: " << wrong;
@@ -220,6 +225,9 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
         "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
         "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
         "  - {name: power");
+    text = replaced(text, "seed: 7}", "seed: 7, noise: {photons: 12.5}}");
+    text = replaced(text, "method: adam", "method: lbfgs, inner_iterations: 3, stop: {window: 7}");
+    text += "loss: {kind: cauchy, scale: 0.3}\n";
     const Experiment original = load_experiment(folder.write("tiny.yaml", text));
     const std::string out = folder.file("runs/deep");
     std::filesystem::create_directories(out);
@@ -243,6 +251,12 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     ASSERT_EQ(back.parameters.size(), 7u);
     EXPECT_EQ(back.parameters[5].type, ParameterType::ior);
     EXPECT_EQ(back.parameters[5].material, "glass");
+    EXPECT_EQ(back.target.photons, 12.5);
+    EXPECT_EQ(back.loss.kind, LossKind::cauchy);
+    EXPECT_EQ(back.loss.scale, 0.3);
+    EXPECT_EQ(back.optimizer.method, OptimizerMethod::lbfgs);
+    EXPECT_EQ(back.optimizer.inner_iterations, 3);
+    EXPECT_EQ(back.optimizer.stop_window, 7);
     EXPECT_EQ(back.parameters[1].initial, (std::vector<double>{0.1, 0.2, 0.3, 0.4}));
     EXPECT_EQ(back.parameters[1].upper, (std::vector<double>{1, 2, 3, 4}));
     EXPECT_EQ(back.parameters[1].direction_kind, VertexDirection::normal);

@@ -1,0 +1,48 @@
+// The loop around an optimiser: evaluate, judge, step. Knows no files.
+//
+// Row i is the evaluation at the parameters before step i, with the random numbers of iteration i. At the end
+// one more row is evaluated where the final parameters are not those of the last row.
+//
+// Final parameters: the mean over the last window where the loss has settled (see safeguard.h); those of the
+// lowest level where the optimisation diverged; else the last. Not those of the least loss: near the optimum
+// that picks noise.
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "optim/checkpoint.h"
+#include "optim/optimizer.h"
+
+namespace isochron {
+
+enum class RunStatus { converged, iterations_reached, diverged, interrupted };
+const char* name(RunStatus status);
+
+enum class FinalChoice { last, average, best };
+const char* name(FinalChoice choice);
+
+/// A run that ends with more than this times the loss it began with has diverged.
+inline constexpr double kDivergedLossRatio = 10;
+
+struct LoopOptions {
+  int iterations = 100;
+  double converged_rmse =
+      0;  ///< ends the loop once the image's root mean square error is at most this; 0: never
+  /// After every evaluation, before the step; `closing`: of the final parameters.
+  std::function<void(const Evaluation& now, const std::vector<double>& theta, bool closing)> row;
+  std::function<void()> save;  ///< after every step, with the state ready for a checkpoint
+  std::function<void(const std::string&)> warning;  ///< one line
+};
+
+struct LoopResult {
+  RunStatus status = RunStatus::iterations_reached;
+  FinalChoice choice = FinalChoice::last;
+};
+
+/// Goes on from `state`, whose theta lies within the bounds, and keeps it up to date; at the end its theta
+/// holds the final parameters. What the objective throws leaves the state as it was before the iteration.
+LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_window,
+                    const LoopOptions& options, Checkpoint& state);
+
+}  // namespace isochron

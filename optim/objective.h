@@ -1,0 +1,39 @@
+// What an optimiser asks of the problem that it solves, and what it is told.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "core/image/image.h"
+
+namespace isochron {
+
+/// Estimates at one point.
+struct Evaluation {
+  GatedImage image;
+  double loss = 0;                ///< what is minimised
+  double mean_squared_error = 0;  ///< of the image alone
+  std::vector<double> gradient;   ///< of the loss, one entry per unknown
+  /// Of linearise() alone: the Gauss-Newton matrix of the loss, its second derivative where residuals are
+  /// linear; symmetric, row after row. Two estimates from a noisy Jacobian, their difference is its noise:
+  /// one from two independent halves of the samples (unbiased, may be indefinite), one from all of them at
+  /// once (semidefinite, on average too large).
+  std::vector<double> curvature, curvature_bound;
+};
+
+/// A loss whose estimates depend on theta and `iteration` alone: equal iterations share their random numbers,
+/// so that differences between points of one iteration are far less noisy than the loss.
+class Objective {
+ public:
+  virtual ~Objective() = default;
+  /// Bounds of the unknowns, infinite where there is none; thetas below lie within.
+  virtual const std::vector<double>& lower() const = 0;
+  virtual const std::vector<double>& upper() const = 0;
+  virtual double loss(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
+  /// Loss and gradient; `loss` is that of the function above. Residual and derivative come from independent
+  /// random numbers.
+  virtual Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
+  /// The same with curvatures.
+  virtual Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
+};
+
+}  // namespace isochron

@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+
+#include "optim/log.h"
+#include "optim/loop.h"
+
+namespace isochron {
+
+/// Text of summary.yaml. `last`: the last row, that of the final parameters unless the run was interrupted;
+/// `state` holds those parameters. Unknown numbers are null.
+std::string summary_yaml(const LoopResult& result, const Checkpoint& state, const LogRow& last,
+                         const Parameters& parameters);
+
+}  // namespace isochron

@@ -1,0 +1,153 @@
+// The objective that the optimisers see, rendered; and each of them on the tiny scene.
+#include "optim/rendered_objective.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/math/error.h"
+#include "optim/estimates.h"
+#include "optim/loop.h"
+#include "tests/optim/tiny_scene.h"
+
+namespace isochron {
+namespace {
+
+const Poll kGoOn = [] {};
+
+class Rendered : public testing::Test {
+ protected:
+  Rendered() {
+    write_tiny_scene(folder_);
+    file_ = folder_.write("tiny.yaml", tiny_experiment());
+  }
+  TemporaryFolder folder_;
+  std::string file_;
+};
+
+TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
+  for (const char* loss : {"loss={kind: squared}", "loss={kind: cauchy, scale: 0.3}"}) {
+    const Problem problem(load_experiment(file_, {loss}));
+    const GatedImage target = problem.make_target(kGoOn);
+    const RenderedObjective objective(problem, target, kGoOn);
+    const std::vector<double> theta = problem.parameters().initial();
+    const Evaluation at = objective.linearise(theta, 5), plain = objective.evaluate(theta, 5);
+    EXPECT_EQ(at.loss, plain.loss);
+    EXPECT_EQ(at.loss, objective.loss(theta, 5));
+    EXPECT_EQ(at.mean_squared_error, plain.mean_squared_error);
+
+    // Both halves together are all of the samples.
+    const Scene scene = problem.parameters().apply(theta);
+    const TangentBasis basis = problem.parameters().tangent(theta);
+    const Renderer renderer(scene, problem.gates(), problem.experiment().estimator, &basis);
+    std::vector<GatedImage> jacobian;
+    for (Term term : {Term::interior, Term::visibility}) {
+      const auto images = renderer.derive(term, problem.stream(pass_of(term), 5), {0, 16});
+      if (jacobian.empty()) jacobian.assign(2, GatedImage(8, 8, 2, 1));
+      for (int i : {0, 1})
+        for (std::size_t k = 0; k < images[i].data.size(); ++k) jacobian[i].data[k] += images[i].data[k];
+    }
+    const RobustLoss robust = problem.robust_loss(target);
+    const GatedImage adjoint = loss_adjoint(at.image, target, robust);
+    for (int i : {0, 1}) {
+      const double slope = inner_product(adjoint, jacobian[i]);
+      EXPECT_NEAR(at.gradient[i], slope, 1e-12 * std::abs(slope));
+      EXPECT_NEAR(plain.gradient[i], slope, 1e-10 * std::abs(slope));
+      for (int j : {0, 1}) {
+        double sum = 0;
+        for (std::size_t k = 0; k < target.data.size(); ++k)
+          sum += robust.weight(at.image.data[k] - target.data[k]) * jacobian[i].data[k] * jacobian[j].data[k];
+        EXPECT_NEAR(at.curvature_bound[2 * i + j], 2 * sum / 128, 1e-12 * at.curvature_bound[0]);
+      }
+    }
+    EXPECT_EQ(at.curvature[1], at.curvature[2]);
+  }
+}
+
+TEST_F(Rendered, CurvatureIsUnbiased) {
+  const Problem few(
+      load_experiment(file_, {"samples={primal: 1, interior: 2, visibility: 2, path_length: 0}"}));
+  const Problem many(
+      load_experiment(file_, {"samples={primal: 1, interior: 8192, visibility: 8192, path_length: 0}"}));
+  const GatedImage target = few.make_target(kGoOn);
+  const std::vector<double> theta = few.parameters().initial();
+  const Evaluation exact = RenderedObjective(many, target, kGoOn).linearise(theta, 0);
+  BatchStatistics statistics;
+  const RenderedObjective objective(few, target, kGoOn);
+  for (std::uint32_t i = 1; i <= 200; ++i) {
+    const Evaluation at = objective.linearise(theta, i);
+    statistics.add({at.curvature[0], at.curvature[1], at.curvature[3], at.curvature_bound[0]}, 1);
+  }
+  const Statistics mean = statistics.result();
+  const double expected[] = {exact.curvature[0], exact.curvature[1], exact.curvature[3]};
+  for (int i : {0, 1, 2})  // 5 standard errors: by chance 6e-7 each, seed fixed
+    EXPECT_LT(std::abs(mean.mean[i] - expected[i]), 5 * mean.standard_error[i]) << i;
+  EXPECT_GT(expected[0], 10 * mean.standard_error[0]);
+  EXPECT_GT(mean.mean[3] - expected[0], 10 * mean.standard_error[3]);  // what the halves are for
+}
+
+TEST_F(Rendered, SizeOfTheJacobianIsLimited) {
+  const std::string experiment = replaced(tiny_experiment(), "[4.5, 5.5]", "{start: 3, stop: 6, count: 40}");
+  folder_.write("scene.yaml", replaced(folder_.read("scene.yaml"), "[8, 8]", "[2000, 1000]"));
+  const std::string file = folder_.write("large.yaml", experiment);
+  EXPECT_NO_THROW(require_jacobian_fits(Problem(load_experiment(file))));
+  try {
+    require_jacobian_fits(Problem(load_experiment(file, {"optimizer.method=levenberg_marquardt"})));
+    ADD_FAILURE() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what())
+                  .find("needs 2.56 GB for the Jacobian of 80000000 residuals by 2 unknowns (allowed: 2 GB"),
+              std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
+  const std::string text = replaced(
+      tiny_experiment(), "type: translation, shape: block, direction: [0, 1, 0], initial: 0.2, target: 0}",
+      "type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, smoothing: "
+      "{slopes: 3}}");
+  const std::string file = folder_.write("dent.yaml", text);
+  const Problem with(load_experiment(file)),
+      without(load_experiment(file, {"parameters[0].smoothing={slopes: 0}"}));
+  const GatedImage target = with.make_target(kGoOn);
+  const std::vector<double> theta = with.parameters().initial();
+  const Evaluation a = RenderedObjective(with, target, kGoOn).linearise(theta, 0),
+                   b = RenderedObjective(without, target, kGoOn).linearise(theta, 0);
+  // Edges of the block's two triangles: four sides of length 1 and one diagonal of sqrt(2), from vertex 0
+  // to 2.
+  const double unit = 3 * mean_square(target) / 5;
+  const double squares = 0.01 + 0.01 + 0.09 + 0.01 + 0.04 / 2;
+  EXPECT_NEAR(a.loss - b.loss, unit * squares, 1e-12 * a.loss);
+  EXPECT_NEAR(a.gradient[0] - b.gradient[0], unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
+  EXPECT_NEAR(a.curvature[2] - b.curvature[2], -unit * 2 / 2, 1e-12 * a.loss);
+  EXPECT_EQ(a.mean_squared_error, b.mean_squared_error);
+  EXPECT_NEAR(RenderedObjective(with, target, kGoOn).evaluate(theta, 0).gradient[0], a.gradient[0],
+              1e-9 * std::abs(a.gradient[0]));
+}
+
+TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
+  for (const char* optimizer : {"{method: adam, learning_rate: 0.05, iterations: 120}",
+                                "{method: lbfgs, learning_rate: 0.05, iterations: 12, inner_iterations: 5}",
+                                "{method: levenberg_marquardt, iterations: 12}"}) {
+    const Problem problem(
+        load_experiment(file_, {std::string("optimizer=") + optimizer, "target.samples=4096"}));
+    const GatedImage target = problem.make_target(kGoOn);
+    const RenderedObjective objective(problem, target, kGoOn);
+    const OptimizerSpec& spec = problem.experiment().optimizer;
+    const auto method = make_optimizer(spec, problem.preconditioner());
+    Checkpoint state;
+    state.theta = problem.parameters().initial();
+    LoopOptions options;
+    options.iterations = spec.iterations;
+    options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
+    options.save = [] {};
+    EXPECT_EQ(run_loop(objective, *method, 0, options, state).status, RunStatus::iterations_reached)
+        << optimizer;
+    EXPECT_NEAR(state.theta[0], 0, 0.04) << optimizer;
+    EXPECT_NEAR(state.theta[1], 10, 0.5) << optimizer;
+  }
+}
+
+}  // namespace
+}  // namespace isochron

@@ -1,0 +1,198 @@
+// Every optimiser through its interface, on problems whose answer is known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "optim/loop.h"
+#include "optim/quadratic_model.h"
+#include "tests/optim/synthetic_objective.h"
+
+namespace isochron {
+namespace {
+
+struct Stopped {};
+
+const Preconditioner kNone;
+
+OptimizerSpec spec_of(OptimizerMethod method) {
+  OptimizerSpec spec;
+  spec.method = method;
+  spec.learning_rate = 0.05;
+  return spec;
+}
+
+/// Runs `iterations` steps from (1, 0.2) or from `state`; saves the last checkpoint in it.
+LoopResult run(const Objective& objective, const OptimizerSpec& spec, int iterations, Checkpoint& state) {
+  if (state.theta.empty()) state.theta = {1, 0.2};
+  const auto optimizer = make_optimizer(spec, kNone);
+  LoopOptions options;
+  options.iterations = iterations;
+  options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
+  options.save = [] {};
+  return run_loop(objective, *optimizer, spec.stop_window, options, state);
+}
+
+class Solvers : public testing::TestWithParam<OptimizerMethod> {
+ protected:
+  OptimizerSpec spec() const { return spec_of(GetParam()); }
+};
+
+INSTANTIATE_TEST_SUITE_P(Methods, Solvers,
+                         testing::Values(OptimizerMethod::adam, OptimizerMethod::lbfgs,
+                                         OptimizerMethod::levenberg_marquardt),
+                         [](const auto& method) { return std::string(name(method.param)); });
+
+TEST_P(Solvers, ReachTheTargetOfAnExactProblem) {
+  const ExponentialFit fit;
+  Checkpoint state;
+  const int iterations = GetParam() == OptimizerMethod::adam ? 600 : 15;
+  EXPECT_EQ(run(fit, spec(), iterations, state).status, RunStatus::iterations_reached);
+  const double tolerance = GetParam() == OptimizerMethod::adam ? 1e-3 : 1e-6;
+  EXPECT_NEAR(state.theta[0], 2, tolerance);
+  EXPECT_NEAR(state.theta[1], 0.7, tolerance);
+  // Where there is no noise, Adam's own swings about the optimum are rises.
+  EXPECT_LE(state.safeguard.rejected, GetParam() == OptimizerMethod::adam ? 3 : 0);
+}
+
+TEST_P(Solvers, ReachTheTargetThroughNoise) {
+  // 60 residuals of noise 0.1; a Jacobian of which each half is as much noise as signal (entries 0.1 to 1).
+  ExponentialFit fit;
+  fit.residual_noise = 0.1;
+  fit.jacobian_noise = 0.5;
+  Checkpoint state;
+  run(fit, spec(), GetParam() == OptimizerMethod::adam ? 300 : 40, state);
+  // One fit to one draw of the noise has standard deviations 0.04 and 0.035. Five of them, 6e-7 by chance.
+  EXPECT_NEAR(state.theta[0], 2, 0.2);
+  EXPECT_NEAR(state.theta[1], 0.7, 0.17);
+}
+
+TEST_P(Solvers, DoNotDependOnTheUnits) {
+  // Loss in other units, by a power of two: the same bits.
+  class Scaled : public ExponentialFit {
+   public:
+    Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override {
+      Evaluation result = ExponentialFit::linearise(theta, iteration);
+      for (auto* v : {&result.gradient, &result.curvature, &result.curvature_bound})
+        for (double& x : *v) x *= 0x1p-100;
+      return result;
+    }
+  } scaled;
+  scaled.inject = [](auto&, double loss) { return 0x1p-100 * loss; };
+  const ExponentialFit fit;
+  Checkpoint a, b;
+  run(fit, spec(), 6, a);
+  run(scaled, spec(), 6, b);
+  EXPECT_EQ(a.theta, b.theta);
+}
+
+TEST_P(Solvers, StayWithinBounds) {
+  ExponentialFit fit;
+  fit.low = {0.5, 0.1};
+  fit.high = {1.5,
+              10};  // a = 2 is out of reach; the best b for a = 1.5 is 0.4514 (bisection of the derivative)
+  fit.inject = [&](const std::vector<double>& theta, double loss) {
+    EXPECT_TRUE(theta[0] >= 0.5 && theta[0] <= 1.5 && theta[1] >= 0.1 && theta[1] <= 10);
+    return loss;
+  };
+  Checkpoint state;
+  run(fit, spec(), GetParam() == OptimizerMethod::adam ? 600 : 25, state);
+  EXPECT_NEAR(state.theta[0], 1.5, 1e-12);
+  const auto slope = [&](double b) { return fit.linearise({1.5, b}, 0).gradient[1]; };
+  double low = 0.1, high = 2;
+  while (high - low > 1e-12) (slope((low + high) / 2) < 0 ? low : high) = (low + high) / 2;
+  EXPECT_NEAR(state.theta[1], low, GetParam() == OptimizerMethod::adam ? 2e-3 : 1e-4);
+}
+
+TEST_P(Solvers, ResumeFromAnyIterationBitForBit) {
+  ExponentialFit fit;
+  fit.residual_noise = 0.1;
+  fit.jacobian_noise = 0.3;
+  Checkpoint whole;
+  run(fit, spec(), 9, whole);
+  for (int cut : {1, 4, 8}) {
+    // Stopped in the midst of a step, or, where that asks for nothing, right after it.
+    Checkpoint state;
+    state.theta = {1, 0.2};
+    bool stepping = false;
+    ExponentialFit stopping = fit;
+    stopping.inject = [&](const std::vector<double>&, double loss) {
+      if (stepping && state.iteration == cut) throw Stopped{};
+      return loss;
+    };
+    const auto optimizer = make_optimizer(spec(), kNone);
+    LoopOptions options;
+    options.iterations = 9;
+    options.row = [&](const Evaluation&, const std::vector<double>&, bool) { stepping = true; };
+    options.save = [&] {
+      stepping = false;
+      if (GetParam() == OptimizerMethod::adam && state.iteration == cut) throw Stopped{};
+    };
+    EXPECT_THROW(run_loop(stopping, *optimizer, 0, options, state), Stopped);
+    EXPECT_EQ(state.iteration, cut);
+    run(fit, spec(), 9, state);
+    EXPECT_EQ(state.theta, whole.theta) << "cut at " << cut;
+    EXPECT_EQ(state.optimizer, whole.optimizer);
+    EXPECT_EQ(state.safeguard.recent, whole.safeguard.recent);
+  }
+}
+
+TEST_P(Solvers, SurviveALossThatIsNotFinite) {
+  ExponentialFit fit;
+  fit.inject = [](const std::vector<double>& theta, double loss) {
+    return theta[0] > 1.9 ? std::numeric_limits<double>::quiet_NaN()
+                          : loss;  // the target lies behind the wall
+  };
+  Checkpoint state;
+  run(fit, spec(), GetParam() == OptimizerMethod::adam ? 200 : 20, state);
+  EXPECT_TRUE(std::isfinite(state.theta[0]) && std::isfinite(state.theta[1]));
+  EXPECT_LE(state.theta[0], 1.9);
+  EXPECT_GT(state.theta[0], 1.3);
+}
+
+TEST(Lbfgs, NeedsFarFewerGradientsThanAdam) {
+  const ExponentialFit lbfgs_fit, lm_fit;
+  Checkpoint a, b;
+  run(lbfgs_fit, spec_of(OptimizerMethod::lbfgs), 6, a);
+  run(lm_fit, spec_of(OptimizerMethod::levenberg_marquardt), 8, b);
+  EXPECT_NEAR(a.theta[1], 0.7, 1e-3);
+  EXPECT_NEAR(b.theta[1], 0.7, 1e-3);
+  EXPECT_LT(lbfgs_fit.gradients, 80);
+  EXPECT_EQ(lm_fit.gradients, 9);  // one linearisation per row: none is thrown away
+}
+
+TEST(QuadraticModel, HasTheGradientAndTheCurvature) {
+  const ExponentialFit fit;
+  const Evaluation at = fit.linearise({1.9, 0.65}, 0);
+  const QuadraticModel model = quadratic_model(at);
+  const Eigen::MatrixXd j = model.jacobian * model.scale.asDiagonal() * std::sqrt(2 * at.loss);
+  const Eigen::VectorXd g = j.transpose() * model.residual * std::sqrt(2 * at.loss);
+  for (int i : {0, 1}) EXPECT_NEAR(g[i], at.gradient[i], 1e-12 * std::abs(at.gradient[i]));
+  const Eigen::MatrixXd curvature = j.transpose() * j;
+  for (int i = 0; i < 4; ++i) EXPECT_NEAR(curvature(i / 2, i % 2), at.curvature[i], 1e-10 * at.curvature[0]);
+  EXPECT_NEAR((model.jacobian.transpose() * model.jacobian)(1, 1), 1, 1e-12);
+}
+
+TEST(QuadraticModel, RaisesWhatNoiseMadeNegative) {
+  Evaluation at;
+  at.loss = 1e-6;
+  at.gradient = {0, 0, 0};
+  at.curvature_bound = {4, 0, 0, 0, 1, 0, 0, 0, 0};
+  at.curvature = {2, 0, 0, 0, -0.25,
+                  0, 0, 0, 0};  // relative to the bound: 0.5, -0.25 and an unknown without effect
+  const QuadraticModel model = quadratic_model(at);
+  const Eigen::MatrixXd j = model.jacobian * model.scale.asDiagonal() * std::sqrt(2 * at.loss);
+  const Eigen::MatrixXd curvature = j.transpose() * j;
+  EXPECT_NEAR(curvature(0, 0), 2, 1e-12);
+  EXPECT_NEAR(curvature(1, 1), 0.25, 1e-12);
+  EXPECT_GT(curvature(2, 2), 0);
+  // A gradient too steep for the loss: the model must not fall below zero, |residual|^2 <= 1.
+  at.gradient = {1e-2, 0, 0};  // would fall by 1e-4 / 4
+  const QuadraticModel steep = quadratic_model(at);
+  EXPECT_NEAR(steep.residual.squaredNorm(), 1, 1e-12);
+  const Eigen::VectorXd slope = steep.jacobian.transpose() * steep.residual;
+  EXPECT_NEAR(slope[0] * steep.scale[0] * 2 * at.loss, 1e-2, 1e-14);
+}
+
+}  // namespace
+}  // namespace isochron
