@@ -132,9 +132,9 @@ class LevenbergMarquardt : public Optimizer {
 
  private:
   static constexpr int kMostTrials = 5;
-  /// Of the trust region, relative to the model's unit diagonal: damping is 1 / radius. The first hardly
-  /// damps.
-  static constexpr double kFirstRadius = 1e4, kLeastRadius = 1e-2;
+  /// Of the trust region, relative to the model's unit diagonal: damping is 1 / radius. The first hardly damps,
+  /// the least halves a step: noise can make all trials of an iteration fail, which must not stop the next.
+  static constexpr double kFirstRadius = 1e4, kLeastRadius = 1;
   double radius_ = kFirstRadius;
 };
 

@@ -198,11 +198,27 @@ TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
 }
 
 TEST_F(Program, ResultsDoNotDependOnThreads) {
-  ASSERT_EQ(run(run_command("one", {"--threads", "1"})).status, 0);
-  ASSERT_EQ(run(run_command("two", {"--threads", "2"})).status, 0);
-  expect_same_run("one", "two");
-  ASSERT_EQ(run(run_command("seed", {"--seed", "4"})).status, 0);
-  EXPECT_NE(log("one"), log("seed"));
+  for (const std::string method : {"adam", "lbfgs", "levenberg_marquardt"}) {
+    const std::string set = "optimizer={method: " + method + ", iterations: 4}";
+    ASSERT_EQ(run(run_command(method + "1", {"--threads", "1", "--set", set})).status, 0);
+    ASSERT_EQ(run(run_command(method + "2", {"--threads", "2", "--set", set})).status, 0);
+    expect_same_run(method + "1", method + "2");
+  }
+  ASSERT_EQ(run(run_command("seed", {"--seed", "4", "--set", "optimizer={iterations: 4}"})).status, 0);
+  EXPECT_NE(log("adam1"), log("seed"));
+}
+
+TEST_F(Program, EveryMethodResumesToTheSameBits) {
+  for (const std::string method : {"lbfgs", "levenberg_marquardt"}) {
+    const std::vector<std::string> set = {"--set", "optimizer={method: " + method + ", iterations: 6}"};
+    ASSERT_EQ(run(run_command(method, set)).status, 0);
+    for (int signal : {SIGKILL, SIGINT}) {
+      const std::string out = method + std::to_string(signal);
+      run(run_command(out, set), signal, [&] { return rows(out) >= 3; });
+      EXPECT_EQ(run({"resume", folder_.file(out), "--no-plots", "--quiet"}).status, 0);
+      expect_same_run(method, out);
+    }
+  }
 }
 
 TEST_F(Program, KilledAnywhereAndResumedGivesTheSameBits) {
