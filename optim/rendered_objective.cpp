@@ -45,7 +45,7 @@ void add_half(const Problem& problem, const std::vector<double>& theta, std::uin
   const int group = std::max(1, static_cast<int>(std::min(kGroupBytes / bytes, 1e6)));
   for (int first = 0; first < unknowns; first += group) {
     const TangentBasis basis = select_columns(all, first, std::min(group, unknowns - first));
-    const Renderer renderer(scene, problem.gates(), problem.experiment().estimator, &basis);
+    const Renderer renderer(scene, problem.gates(), problem.estimator(samples.visibility), &basis);
     for (Term term : kTerms) {
       if (samples.term(term) == 0) continue;
       const auto images =

@@ -39,7 +39,7 @@ TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
     // Both halves together are all of the samples.
     const Scene scene = problem.parameters().apply(theta);
     const TangentBasis basis = problem.parameters().tangent(theta);
-    const Renderer renderer(scene, problem.gates(), problem.experiment().estimator, &basis);
+    const Renderer renderer(scene, problem.gates(), problem.estimator(16), &basis);
     std::vector<GatedImage> jacobian;
     for (Term term : {Term::interior, Term::visibility}) {
       const auto images = renderer.derive(term, problem.stream(pass_of(term), 5), {0, 16});
