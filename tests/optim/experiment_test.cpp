@@ -225,7 +225,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
         "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
         "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
         "  - {name: power");
-    text = replaced(text, "seed: 7}", "seed: 7, noise: {photons: 12.5}}");
+    text = replaced(text, "max_bounces: 3}", "max_bounces: 3, noise: {photons: 12.5}}");
     text = replaced(text, "method: adam", "method: lbfgs, inner_iterations: 3, stop: {window: 7}");
     text += "loss: {kind: cauchy, scale: 0.3}\n";
     const Experiment original = load_experiment(folder.write("tiny.yaml", text));
