@@ -26,6 +26,10 @@ class ScaledLoss : public ceres::FirstOrderFunction {
         first_(&now),
         best_(start),
         best_loss_(now.loss) {
+    for (std::size_t i = 0; i < start.size(); ++i) {
+      lower_.push_back(std::max(objective.lower()[i], start[i] - kReach * step));
+      upper_.push_back(std::min(objective.upper()[i], start[i] + kReach * step));
+    }
     double largest = 0, largest_move = 0;
     for (std::size_t i = 0; i < start.size(); ++i) {
       if (size[i] > 0) unit_[i] = 1 / std::sqrt(size[i]);
@@ -51,7 +55,7 @@ class ScaledLoss : public ceres::FirstOrderFunction {
       std::vector<double> free(n), theta(n);
       for (std::size_t i = 0; i < n; ++i) {
         free[i] = start_[i] + unit_[i] * u[i];
-        theta[i] = std::clamp(free[i], objective_.lower()[i], objective_.upper()[i]);
+        theta[i] = std::clamp(free[i], lower_[i], upper_[i]);
       }
       Evaluation fresh;
       const Evaluation* e = &fresh;
@@ -79,11 +83,14 @@ class ScaledLoss : public ceres::FirstOrderFunction {
  private:
   /// Whether unknown i cannot follow its descent: on a bound and drawn outwards, or beyond it.
   bool blocked(std::size_t i, double value, double slope) const {
-    const double lower = objective_.lower()[i], upper = objective_.upper()[i];
+    const double lower = lower_[i], upper = upper_[i];
     return value < lower || value > upper || (value == lower && slope > 0) || (value == upper && slope < 0);
   }
 
+  static constexpr double kReach =
+      10;  ///< of an iteration, in first steps: a curvature made of noise leads anywhere
   const Objective& objective_;
+  std::vector<double> lower_, upper_;
   std::vector<double> start_;
   std::uint32_t iteration_;
   double scale_;
@@ -97,11 +104,11 @@ class ScaledLoss : public ceres::FirstOrderFunction {
 class Lbfgs : public Optimizer {
  public:
   Lbfgs(double first_step, int inner_iterations)
-      : first_step_(first_step), inner_iterations_(inner_iterations), step_(first_step) {}
+      : first_step_(first_step), inner_iterations_(inner_iterations) {}
 
   std::vector<double> step(const Objective& objective, const Evaluation& now,
                            const std::vector<double>& theta, std::uint32_t iteration, double rate) override {
-    auto* loss = new ScaledLoss(objective, now, theta, iteration, step_, gradient_size(now.gradient));
+    auto* loss = new ScaledLoss(objective, now, theta, iteration, first_step_, gradient_size(now.gradient));
     const ceres::GradientProblem problem(loss);  // owns it
     if (!loss->can_move()) return theta;
     ceres::GradientProblemSolver::Options options;
@@ -121,23 +128,12 @@ class Lbfgs : public Optimizer {
     // found.
     loss->rethrow();
     std::vector<double> next = loss->best();
-    double moved = 0;
-    for (std::size_t i = 0; i < next.size(); ++i) {
-      moved = std::max(moved, std::abs(next[i] - theta[i]));
-      next[i] = theta[i] + rate * (next[i] - theta[i]);
-    }
-    step_ = std::clamp(moved, step_ / 8, first_step_);
+    for (std::size_t i = 0; i < next.size(); ++i) next[i] = theta[i] + rate * (next[i] - theta[i]);
     return next;
   }
-  void reset() override {
-    step_ = first_step_;
-    squares_.clear();
-  }
-  OptimizerState state() const override { return {{"step", {step_}}, {"squares", squares_}}; }
-  void restore(const OptimizerState& state) override {
-    step_ = state.at("step").at(0);
-    squares_ = state.at("squares");
-  }
+  void reset() override { squares_.clear(); }
+  OptimizerState state() const override { return {{"squares", squares_}}; }
+  void restore(const OptimizerState& state) override { squares_ = state.at("squares"); }
 
  private:
   /// Root of the running mean of the square of each component, a factor common to all left out.
@@ -154,7 +150,6 @@ class Lbfgs : public Optimizer {
   static constexpr int kMostTrials = 8;  ///< of one line search
   double first_step_;
   int inner_iterations_;
-  double step_;
   std::vector<double> squares_;
 };
 

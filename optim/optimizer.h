@@ -41,8 +41,8 @@ std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner&
 /// conditions), all on the random numbers of that iteration; the pairs that approximate the curvature are
 /// gathered anew, since they are of use only on one and the same function. The point of least loss among all
 /// that were tried is kept. Bounds: the loss is evaluated at the nearest point within them and is constant
-/// beyond. The first trial step of the first iteration has the length `first_step` (largest component, > 0),
-/// later ones that of the iteration before at most.
+/// beyond. The first trial step of each iteration has the length `first_step` (largest component, > 0); no
+/// unknown moves further than 10 times that in one iteration.
 std::unique_ptr<Optimizer> make_lbfgs(double first_step, int inner_iterations);
 
 /// Levenberg-Marquardt of Ceres on the linearised objective. One iteration is one accepted step; trial points
