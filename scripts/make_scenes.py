@@ -7,13 +7,14 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corridor, cube, height_field, sofa, tree
+from scenes import branches, bunny, corridor, cube, glass_bunny, height_field, sofa, tree
 
 SCENES = {
     "branches": branches.write,
     "bunny": bunny.write,
     "corridor": corridor.write,
     "cube": cube.write,
+    "glass_bunny": glass_bunny.write,
     "height_field": height_field.write,
     "sofa": sofa.write,
     "tree": tree.write,

@@ -12,7 +12,7 @@ from . import mesh
 CENTRE = np.array([0.75, 0.75, 0])
 LENGTH, WIDTH = 1.5, 1.2
 # Height over the ramp along the profile, from the front's lower edge to the top of the back.
-SEAT = np.array([0.02, 0.1, 0.04, -0.06, -0.12, -0.02, 0.06, 0.06])
+SEAT = np.array([0.02, 0.1, 0.04, -0.05, -0.09, -0.02, 0.06, 0.06])
 ARMREST = np.array([0.05, 0.14, 0.18, 0.18, 0.1, 0.06, 0.08, 0.08])
 ARM = np.array([1, 0.25, 0, 0, 0, 0.25, 1])  # across the width
 LIGHT_EDGE = 0.6
@@ -22,9 +22,9 @@ SCENE = """\
 # Written by scripts/make_scenes.py; lengths in scene units, y is up.
 camera:
   position: [0.6, 0.8, 2.6]
-  look_at:  [-1, 0.8, 0.1]
+  look_at:  [-1, 0.8, 0]
   up:       [0, 1, 0]
-  fov: 24                 # degrees, across the image's width
+  fov: 30                 # degrees, across the image's width
   resolution: [12, 12]    # width, height
 materials:
   white: {type: diffuse, albedo: 0.8}
@@ -44,12 +44,12 @@ def write(directory):
     across = np.array([0, 0, -1])
     u, v = np.linspace(-0.5, 0.5, len(SEAT))[:, None], np.linspace(-0.5, 0.5, len(ARM))
     heights = SEAT[:, None] * (1 - ARM) + ARMREST[:, None] * ARM
-    initial = 0.06 + 0.08 * np.cos(np.pi * u) * np.cos(np.pi * v) + 0.04 * (u + v)
+    initial = 0.04 + 0.05 * np.cos(np.pi * u) * np.cos(np.pi * v) + 0.03 * (u + v)
     vertices = CENTRE + (LENGTH * u * up_ramp)[:, None] + (WIDTH * v)[:, None] * across + heights[..., None] * normal
     sofa = mesh.rounded((vertices.reshape(-1, 3), mesh.grid(*heights.shape)))
     lamp = mesh.face_towards(mesh.square(LIGHT_EDGE), LIGHT_CENTRE, CENTRE)
     wall = mesh.quad([(-1, -0.4, 1.4), (-1, -0.4, -1.4), (-1, 2, -1.4), (-1, 2, 1.4)])
-    occluder = mesh.quad([(-0.25, -0.4, 1), (1.6, -0.4, 1), (1.6, 2.3, 1), (-0.25, 2.3, 1)])
+    occluder = mesh.quad([(0.05, -0.4, 1), (1.6, -0.4, 1), (1.6, 2.3, 1), (0.05, 2.3, 1)])
     mesh.write_obj(directory / "sofa.obj", sofa, "8 x 7 vertices, rows from the front's lower edge to the top")
     mesh.write_obj(directory / "wall.obj", wall, "Wall that the sofa faces")
     mesh.write_obj(directory / "occluder.obj", occluder, "Panel, facing the camera")
