@@ -18,9 +18,9 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 METHODS = {
-    "adam": "{method: adam, learning_rate: 0.01, iterations: 100}",
-    "lbfgs": "{method: lbfgs, learning_rate: 0.01, inner_iterations: 5, iterations: 20}",
-    "levenberg_marquardt": "{method: levenberg_marquardt, iterations: 40}",
+    "adam": "{method: adam, learning_rate: 0.02, iterations: 100}",
+    "lbfgs": "{method: lbfgs, learning_rate: 0.01, inner_iterations: 5, iterations: 15}",
+    "levenberg_marquardt": "{method: levenberg_marquardt, iterations: 20}",
 }
 
 
