@@ -82,10 +82,7 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
                                        int component, const Poll& poll) {
   const double step = check_step(problem, theta, component);
   const int samples = problem.experiment().samples.primal, batches = check_batches(problem);
-  EstimatorOptions options = problem.experiment().estimator;
-  const Scene centre = problem.parameters().apply(theta);
-  // One choice for all images: `automatic` could choose differently on either side.
-  options.sampling = Renderer(centre, problem.gates(), options).sampling();
+  const EstimatorOptions& options = problem.estimator();
   constexpr std::array<double, 3> kSteps = {1, 0.5, 0.25};
   std::vector<Scene> scenes;  // above and below, step by step
   std::array<double, 3> distances;

@@ -108,7 +108,7 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
   const int samples = problem.experiment().samples.primal;
   const int batches = batches_for("primal", samples);
   const Scene scene = problem.parameters().apply(theta);
-  const Renderer renderer(scene, problem.gates(), problem.experiment().estimator);
+  const Renderer renderer(scene, problem.gates(), problem.estimator());
   const Stream stream = problem.stream(Pass::primal);
   DerivativeEstimate result = collect("image", samples, batches, 1, poll, [&](SampleRange range) {
     return std::vector<GatedImage>{renderer.render(stream, range)};

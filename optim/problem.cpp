@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/math/error.h"
+#include "core/render/measure_mix.h"
 #include "core/scene/scene_loader.h"
 #include "optim/loss.h"
 #include "optim/photon_noise.h"
@@ -62,6 +63,18 @@ Problem::Problem(Experiment experiment)
   }
 }
 
+const EstimatorOptions& Problem::estimator() const {
+  if (!estimator_) {
+    EstimatorOptions options = experiment_.estimator;
+    const std::vector<double> theta = parameters_->initial();
+    const Scene scene = parameters_->apply(theta);
+    const TangentBasis basis = parameters_->tangent(theta);
+    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix));
+    estimator_ = options;
+  }
+  return *estimator_;
+}
+
 void Problem::require_parameters() const {
   if (experiment_.parameters.empty())
     throw InputError(experiment_.file + ": parameters: there is none (at least one is needed here)");
@@ -69,7 +82,7 @@ void Problem::require_parameters() const {
 
 GatedImage Problem::render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const {
   const Scene scene = parameters_->apply(theta);
-  return Renderer(scene, gates_, experiment_.estimator).render(stream, range);
+  return Renderer(scene, gates_, estimator()).render(stream, range);
 }
 
 GatedImage Problem::read_target(const std::string& file) const {
@@ -99,9 +112,9 @@ GatedImage Problem::make_target(const Poll& poll) const {
   const int parts = std::min(32, target.samples);
   const Stream stream{target.seed, 0, pass_number(Pass::target)};
   const Scene scene = parameters_->apply(parameters_->target());
-  EstimatorOptions estimator = experiment_.estimator;
-  estimator.max_bounces = target.max_bounces;
-  const Renderer renderer(scene, gates_, estimator);
+  EstimatorOptions options = estimator();
+  options.max_bounces = target.max_bounces;
+  const Renderer renderer(scene, gates_, options);
   ImageMean mean;
   for (int i = 0; i < parts; ++i) {
     const SampleRange range = Share{i, parts}.of(target.samples);
@@ -127,7 +140,7 @@ double Problem::loss(const GatedImage& image, const GatedImage& target,
 
 EstimatorOptions Problem::estimator(int visibility_samples) const {
   constexpr double kLearningShare = 0.06;
-  EstimatorOptions options = experiment_.estimator;
+  EstimatorOptions options = estimator();
   if (experiment_.guiding) options.guiding_samples = kLearningShare * visibility_samples;
   return options;
 }

@@ -2,6 +2,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/gates/gate.h"
@@ -24,7 +25,8 @@ enum class Pass : std::uint32_t {
   path_length = 3,
   target = 4,
   finite_difference = 5,
-  photon_noise = 6
+  photon_noise = 6,
+  mix = 7
 };
 
 /// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.
@@ -54,6 +56,10 @@ class Problem {
   const Preconditioner& preconditioner() const { return preconditioner_; }
   /// Of the offsets' slopes, to be multiplied by the target's mean square.
   const PairPenalty& penalty() const { return penalty_; }
+
+  /// The experiment's, with the mix of techniques that automatic sampling settles on, once for all values of the
+  /// parameters: by a trial at their initial values.
+  const EstimatorOptions& estimator() const;
 
   /// Throws InputError when the experiment has no parameters: nothing to differentiate.
   void require_parameters() const;
@@ -103,6 +109,7 @@ class Problem {
   std::unique_ptr<Parameters> parameters_;
   Preconditioner preconditioner_;
   PairPenalty penalty_;
+  mutable std::optional<EstimatorOptions> estimator_;
 };
 
 Pass pass_of(Term term);

@@ -189,6 +189,12 @@ GateSet::GateSet(GateShape shape, std::vector<double> centers)
   sorted_.insert(sorted_.end(), kBlock, sorted_.back());
 }
 
+double GateSet::relative_width() const {
+  double sum = 0;
+  for (double center : centers_) sum += center;
+  return shape_.width() * size() / sum;
+}
+
 double GateSet::mixture_pdf(double l) const {
   if (shape_.is_steady()) return 0;
   double sum = 0;

@@ -180,6 +180,8 @@ class GateSet {
   double sample_mixture(double pick, double u) const {
     return center(std::min(static_cast<int>(pick * size()), size() - 1)) + shape_.sample(u);
   }
+  /// Standard deviation of the gates over the mean of their centres; steady: infinity.
+  double relative_width() const;
   /// Density of `sample_mixture`. Zero for the steady gate.
   double mixture_pdf(double l) const;
 

@@ -17,9 +17,9 @@ namespace isochron {
 
 /// What the gate's derivative asks of a pass.
 struct GatePass {
-  bool value = false;        ///< lengths drawn from W
-  GateUse use = GateUse::value;
-  bool pairs = false;        ///< lengths drawn in pairs from dW
+  bool value = false;  ///< lengths drawn from W
+  GateWeights use;     ///< of those
+  bool pairs = false;  ///< lengths drawn in pairs from dW
   PairPart part = PairPart::smooth;
   bool coupled = true;
 };
@@ -37,16 +37,16 @@ class EllipsoidalConnections {
   /// One camera path through `pixel` with connections at every vertex. Contributions to the pixel itself are scaled by
   /// `scale`; those of the camera's own connections, which land on any pixel, by `scale` / number of pixels.
   void sample(int pixel, double scale, Rng& rng) {
-    draw_targets(rng);
-    if (targets_.empty()) return;
-    const double splat_scale = scale / scene_.camera.pixels();
+    const Rgb splat_scale(scale / scene_.camera.pixels());
     const int max_bounces = worker_.options.max_bounces;
     worker_.start_path_at_camera();
+    draw_targets(GatePick::kImage, rng);
     for (const Target& target : targets_) {
-      connect_emitter(target, pixel, Rgb(splat_scale), rng);
-      if (max_bounces >= 1) connect_surface(target, pixel, Rgb(splat_scale), rng);
+      connect_emitter(target, pixel, splat_scale, rng);
+      if (max_bounces >= 1) connect_surface(target, pixel, splat_scale, rng);
     }
-    if (max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
+    draw_targets(pixel, rng);
+    if (targets_.empty() || max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
     connect_along(pixel, scale, max_bounces, rng);
   }
 
@@ -61,6 +61,7 @@ class EllipsoidalConnections {
       t.tau[0] = lengths[i];
       t.present[0] = true;
       t.index = static_cast<int>(i);
+      t.scale = 1;
       targets_.push_back(t);
     }
     connect_along(-1, 1, max_bounces, rng);
@@ -91,6 +92,7 @@ class EllipsoidalConnections {
   struct Target {
     double tau[2] = {0, 0};
     bool present[2] = {false, false};
+    bool jump[2] = {false, false};  ///< at a jump of the gate
     bool pair = false;
     int gate = 0;   ///< of a pair
     int index = 0;  ///< among the lengths gathered for
@@ -111,32 +113,40 @@ class EllipsoidalConnections {
     double weight() const { return side[0].value.max() + side[1].value.max(); }
   };
 
-  void draw_targets(Rng& rng) {
+  /// Lengths for connections that serve `pixel` (or, of the camera's own, the whole image).
+  void draw_targets(int pixel, Rng& rng) {
     const GateSet& gates = worker_.gates;
     const GateShape& shape = gates.shape();
     targets_.clear();
     if (pass_.value) {
-      const double pick = rng.uniform(), u = rng.uniform();
+      double pick = rng.uniform();
+      const double u = rng.uniform();
       Target t;
-      t.tau[0] = gates.sample_mixture(pick, u);
-      t.present[0] = t.tau[0] > 0;
+      if (const int gate = worker_.pick.sample(pixel, pick); gate >= 0) {
+        t.tau[0] = gates.center(gate) + shape.sample(u);
+        t.present[0] = t.tau[0] > 0;
+      }
       if (t.present[0]) {
-        t.scale = 1 / gates.mixture_pdf(t.tau[0]);
+        t.scale = 1 / worker_.pick.length_pdf(pixel, t.tau[0]);
         targets_.push_back(t);
       }
     }
     if (pass_.pairs) {
-      const double pick = rng.uniform(), u = rng.uniform();
+      double pick = rng.uniform();
+      const double u = rng.uniform();
       Target t;
       t.pair = true;
-      t.gate = std::min(static_cast<int>(pick * gates.size()), gates.size() - 1);
-      t.scale = shape.pair_mass(pass_.part) * gates.size();
-      if (!(t.scale > 0)) return;
+      t.gate = worker_.pick.sample(pixel, pick);
+      const double mass = shape.pair_mass(pass_.part);
+      if (!(mass > 0) || t.gate < 0) return;
+      t.scale = mass / worker_.pick.probability(pixel, t.gate);
       const CoupledPair pair = shape.sample_pair(pass_.part, u);
       t.tau[0] = gates.center(t.gate) + pair.plus;
       t.tau[1] = gates.center(t.gate) + pair.minus;
       t.present[0] = pair.has_plus && t.tau[0] > 0;
       t.present[1] = pair.has_minus && t.tau[1] > 0;
+      t.jump[0] = pair.plus_is_jump;
+      t.jump[1] = pair.minus_is_jump;
       if (pass_.coupled) {
         targets_.push_back(t);
       } else {
@@ -171,7 +181,7 @@ class EllipsoidalConnections {
     const EllipsoidBvh& bvh = ends_are_static(y.triangle) ? scene_.moving_triangles : scene_.all_triangles;
     worker_.candidates.clear();
     bvh.query_surfaces(x.p, y.p, low, high, worker_.candidates);
-    worker_.arcs += static_cast<long long>(worker_.candidates.size());
+    worker_.arcs += 1 + worker_.candidates.size();
 
     const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
     ArcPair chosen;
@@ -193,11 +203,9 @@ class EllipsoidalConnections {
       if (q.value.is_black()) continue;
       const bool seen = path.size() == 1 ? worker_.visible_from_camera(q.point) : worker_.visible(x, q.point);
       if (!seen || !worker_.visible(q.point, y)) continue;
-      const double by_surface = pdf_y / (q.span * q.area_rate);
-      const double by_emitter = walk_pdf(q.point) * emitter_arc_pdf(q.point, y);
       worker_.path.push(scene_, q.point);
       worker_.path.push(scene_, y);
-      deliver(target, i, q.pixel, q.value * (inverse_probability * by_surface / (by_surface + by_emitter)));
+      deliver(target, i, q.pixel, q.value * inverse_probability, &ArcDensities::surface);
       worker_.path.pop();
       worker_.path.pop();
     }
@@ -213,6 +221,7 @@ class EllipsoidalConnections {
     if (!(high > 0)) return;
     worker_.candidates.clear();
     scene_.emitter_triangles.query(x.p, x.p, low, high, worker_.candidates);
+    worker_.arcs += 1 + worker_.candidates.size();
     if (worker_.candidates.empty()) return;
 
     const Ellipsoid spheres[2] = {{x.p, x.p, 2 * (target.tau[0] - before)}, {x.p, x.p, 2 * (target.tau[1] - before)}};
@@ -232,17 +241,8 @@ class EllipsoidalConnections {
       const ArcPoint& y = chosen.side[i];
       if (y.value.is_black()) continue;
       if (!(path.size() == 1 ? worker_.visible_from_camera(y.point) : worker_.visible(x, y.point))) continue;
-      double weight = 1;
-      if (path.size() > (kGathers ? 2 : 1)) {
-        const SurfacePoint& previous = path.vertex[path.size() - 2];
-        const double by_emitter = vertex_pdf() / (y.span * y.area_rate);
-        const double by_surface =
-            scene_.outside(previous, x) ? scene_.emitter_pdf(y.point.triangle) * surface_arc_pdf(previous, x, y.point)
-                                        : 0;
-        weight = by_emitter / (by_emitter + by_surface);
-      }
       worker_.path.push(scene_, y.point);
-      deliver(target, i, y.pixel, y.value * (inverse_probability * weight));
+      deliver(target, i, y.pixel, y.value * inverse_probability, &ArcDensities::emitter);
       worker_.path.pop();
     }
   }
@@ -329,58 +329,40 @@ class EllipsoidalConnections {
     out.point = y;
   }
 
-  /// Density per area with which a walk that stands at the path's last vertex goes on to q (from the camera: by a
-  /// random point of a random pixel).
-  double walk_pdf(const SurfacePoint& q) const { return step_pdf(worker_.path.size() - 1, q); }
-  /// The same for the path's own last vertex.
-  double vertex_pdf() const { return step_pdf(worker_.path.size() - 2, worker_.path.back()); }
-
-  double step_pdf(int from, const SurfacePoint& q) const {
+  /// Share of a contribution found by `technique`, over the connections' share of the samples.
+  double mis_weight(const Target& target, int i, int pixel, double ArcDensities::* technique) const {
+    // No other technique finds lengths at a jump, and these serve one gate.
+    const bool jump = target.jump[i];
     const Path& path = worker_.path;
-    const SurfacePoint& x = path.vertex[from];
-    const double to_area = solid_angle_to_area(x.p, q);
-    if (from == 0)
-      return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
-    const Scattering s(path.vertex[from - 1].p, x, q.p);
-    return s.pdf_towards_light(scene_.material_of(x.triangle)) * to_area;
-  }
-
-  /// Density of y on its emitter triangle's arc as seen from q, per area and length.
-  double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const {
-    const double distance = length(y.p - q.p);
-    EllipseArcs arcs;
-    const int t = y.triangle;
-    if (!clip_ellipse({q.p, q.p, 2 * distance}, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
-      return 0;
-    return 1 / (arcs.total_span * distance);
-  }
-
-  /// Density of q on its triangle's arc between foci x and y, per area and length.
-  double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const {
-    const Ellipsoid ellipsoid(x.p, y.p, length(q.p - x.p) + length(q.p - y.p));
-    EllipseArcs arcs;
-    const int t = q.triangle;
-    if (!ellipsoid.valid() ||
-        !clip_ellipse(ellipsoid, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
-      return 0;
-    const Vec3 d = q.p - arcs.center;
-    const double e11 = dot(arcs.e1, arcs.e1), e12 = dot(arcs.e1, arcs.e2), e22 = dot(arcs.e2, arcs.e2);
-    const double d1 = dot(d, arcs.e1), d2 = dot(d, arcs.e2);
-    const double phi = std::atan2(d2 * e11 - d1 * e12, d1 * e22 - d2 * e12);
-    return 1 / (arcs.total_span * area_per_angle_and_length(ellipsoid, arcs, phi, q.n));
+    const GatePick& pick = worker_.pick;
+    const ArcDensities d = worker_.techniques.arcs(path, kGathers, [&](int from) {
+      if constexpr (kGathers) return 1.0;  // the same for all
+      const int served = from == 0 ? GatePick::kImage : pixel;
+      return jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]);
+    });
+    const double sum = d.surface + d.emitter;
+    if (!(sum > 0)) return 0;
+    if constexpr (kGathers) return d.*technique / sum;
+    const double share = worker_.ellipsoidal_share;
+    const double gain = target.pair ? worker_.pair_gain : 1;
+    const double ours = jump || share == 1 ? 1 : worker_.techniques.ellipsoidal_weight(path, pixel, share, gain);
+    return ours / share * (d.*technique / sum);
   }
 
   /// The worker's path is complete and as long as side i of the target says.
-  void deliver(const Target& target, int i, int pixel, const Rgb& value) {
+  void deliver(const Target& target, int i, int pixel, const Rgb& unweighted, double ArcDensities::* technique) {
+    if constexpr (!kGathers)
+      if (!worker_.matters(worker_.path)) return;
+    const Rgb value = unweighted * (mis_weight(target, i, pixel, technique) * target.scale);
     if constexpr (kGathers) {
       receiver_.take(target.index, worker_.path.size() - 2, value);
     } else if (!target.pair) {
-      if (worker_.matters(worker_.path)) worker_.emit(worker_.path, pixel, value * target.scale, target.tau[0], pass_.use);
+      worker_.emit(worker_.path, pixel, value, target.tau[0], pass_.use);
     } else if constexpr (Sink::kDifferential) {
       differentiate_path(scene_, worker_.path.vertex.data(), worker_.path.size(), true, worker_.differential);
       if (worker_.differential.empty()) return;
       worker_.sink.bind(worker_.differential);
-      worker_.sink.add_length_rate(pixel, target.gate, value * (i == 0 ? target.scale : -target.scale));
+      worker_.sink.add_length_rate(pixel, target.gate, i == 0 ? value : value * -1.0);
     }
   }
 

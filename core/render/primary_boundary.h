@@ -88,7 +88,7 @@ class PrimaryBoundary {
       Rng walk_rng = shared;
       for (const GatheredLight& light :
            light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng))
-        worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, GateUse::value);
+        worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, kValueOnly);
     }
     note_guide(worker_.sink, table, x);
   }

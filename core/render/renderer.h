@@ -1,6 +1,7 @@
 // The renderer's public face: gated images, their derivatives term by term, and loss gradients.
 #pragma once
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/gates/gate.h"
@@ -21,11 +22,18 @@ struct BoundaryTechniques {
   bool light_arcs = true;   ///< ellipsoidal connections beyond the segment, where gates are narrow
 };
 
+/// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
+/// standard. Strictly between, multiple importance sampling combines the two.
+struct SamplingMix {
+  double image = 0, interior = 0;
+};
+
 struct EstimatorOptions {
-  int max_bounces = 8;                       ///< scattering vertices on a path, >= 0
-  Sampling sampling = Sampling::automatic;   ///< automatic: by gate width
-  bool antithetic = true;                    ///< coupled pairs for the gate's derivative under ellipsoidal sampling
-  BoundaryTechniques boundary{};
+  int max_bounces = 8;                      ///< scattering vertices on a path, >= 0
+  Sampling sampling = Sampling::automatic;
+  bool antithetic = true;                   ///< coupled pairs for the gate's derivative under ellipsoidal sampling
+  std::optional<SamplingMix> mix = {};      ///< of automatic sampling, see measure_mix; none: by the gates' width alone
+  BoundaryTechniques boundary = {};
   /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.
   double guiding_samples = 0;
 };
@@ -61,10 +69,12 @@ class Renderer {
   void add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
                     std::vector<double>& dof_gradient) const;
 
-  /// What `automatic` resolved to.
-  Sampling sampling() const;
+  /// What the options resolved to.
+  const SamplingMix& mix() const;
   /// Rays traced so far by this renderer (all threads).
   long long rays() const;
+  /// Rays and arcs so far, which cost about the same: stands for time, but is the same on every machine.
+  long long work() const;
 
  private:
   struct Impl;

@@ -13,12 +13,11 @@
 
 namespace isochron {
 
-/// How the gate enters a contribution.
-enum class GateUse {
-  value,            ///< W d ln F
-  value_and_slope,  ///< W d ln F + W' dl
-  slope             ///< W' dl alone
+/// How the gate enters a contribution: value * W d ln F + slope * W' dl.
+struct GateWeights {
+  double value = 1, slope = 1;
 };
+inline constexpr GateWeights kValueOnly{1, 0};
 
 class PrimalSink {
  public:
@@ -62,12 +61,11 @@ class TangentSink {
       });
   }
 
-  void add(int pixel, const Rgb& value, double length, GateUse use) {
-    const double f = use == GateUse::slope ? 0 : 1, l = use == GateUse::value ? 0 : 1;
+  void add(int pixel, const Rgb& value, double length, GateWeights use) {
     gates_.for_each_derivative(length, [&](int g, double w, double slope) {
       for (int column : touched_) {
         const Rates& rates = rates_[column];
-        splat(column, pixel, g, value, w * f, slope * l * rates.length, rates);
+        splat(column, pixel, g, value, w * use.value, slope * use.slope * rates.length, rates);
       }
     });
   }
@@ -120,7 +118,7 @@ class AdjointSink {
 
   void bind(const LocalDifferential& differential) { differential_ = &differential; }
 
-  void add(int pixel, const Rgb& value, double length, GateUse use) {
+  void add(int pixel, const Rgb& value, double length, GateWeights use) {
     // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
     Rgb weight;
     double slope_weight = 0;
@@ -131,9 +129,7 @@ class AdjointSink {
         slope_weight += a[c] * slope * value[c];
       }
     });
-    if (use == GateUse::slope) weight = {};
-    if (use == GateUse::value) slope_weight = 0;
-    scatter(weight, slope_weight);
+    scatter(weight * use.value, slope_weight * use.slope);
   }
 
   void add_length_rate(int pixel, int gate, const Rgb& value) {

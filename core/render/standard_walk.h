@@ -70,21 +70,31 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
   while (path.size() > base) path.pop();
 }
 
-/// One camera path through `pixel`; contributions are scaled by `scale`.
+/// One camera path through `pixel`; contributions are scaled by `scale`. `pairs`: the slope of the gate is shared with
+/// ellipsoidal connections in coupled pairs.
 template <class Sink>
-void sample_standard(Worker<Sink>& worker, int pixel, double scale, Rng& rng) {
+void sample_standard(Worker<Sink>& worker, int pixel, double scale, bool pairs, Rng& rng) {
   struct Visitor {
     Worker<Sink>& worker;
     int pixel;
     double scale;
+    bool pairs;
     bool wants() const { return worker.matters(worker.path); }
     void take(const Rgb& value) {
-      worker.emit(worker.path, pixel, value * scale, worker.path.length.back(), GateUse::value_and_slope);
+      GateWeights weights;
+      if (const double share = worker.ellipsoidal_share; share > 0) {
+        // This technique's share in the balance heuristic, over the share of the samples.
+        weights.value = (1 - worker.techniques.ellipsoidal_weight(worker.path, pixel, share, 1)) / (1 - share);
+        weights.slope = pairs ? (1 - worker.techniques.ellipsoidal_weight(worker.path, pixel, share, worker.pair_gain)) /
+                                    (1 - share)
+                              : weights.value;
+      }
+      worker.emit(worker.path, pixel, value * scale, worker.path.length.back(), weights);
     }
   };
   if (!worker.start_camera_path(pixel, rng)) return;
   walk_standard(worker, worker.path, worker.options.max_bounces, {worker.gates.lower(), worker.gates.upper()}, rng,
-                Visitor{worker, pixel, scale});
+                Visitor{worker, pixel, scale, pairs});
 }
 
 }  // namespace isochron

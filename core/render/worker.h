@@ -3,6 +3,7 @@
 #include "core/math/random.h"
 #include "core/render/renderer.h"
 #include "core/render/sinks.h"
+#include "core/render/techniques.h"
 
 namespace isochron {
 
@@ -11,14 +12,29 @@ struct Worker {
   const PreparedScene& scene;
   const GateSet& gates;
   const EstimatorOptions& options;
+  const GatePick& pick;
+  double ellipsoidal_share = 0;  ///< of the samples; the others are standard
+  double pair_gain = 1;  ///< by how much pairs count for more than their density
+  Techniques techniques;
   Sink sink;
   Path path;
   LocalDifferential differential;
   std::vector<int> candidates;
-  long long rays = 0, arcs = 0;
+  long long rays = 0;
+  long long arcs = 0;  ///< triangles looked at for arcs, and the queries that found them
 
-  Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator, Sink target)
-      : scene(prepared), gates(gate_set), options(estimator), sink(std::move(target)), path(estimator.max_bounces) {}
+  Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator,
+         const GatePick& gate_pick, Sink target)
+      : scene(prepared),
+        gates(gate_set),
+        options(estimator),
+        pick(gate_pick),
+        techniques(prepared, gate_pick),
+        sink(std::move(target)),
+        path(estimator.max_bounces) {}
+
+  /// Rays and arcs, which cost about the same.
+  double work() const { return static_cast<double>(rays + arcs); }
 
   bool visible(const SurfacePoint& x, const SurfacePoint& y) {
     ++rays;
@@ -59,14 +75,14 @@ struct Worker {
   }
 
   /// Hands the complete path p (last vertex on an emitter) to the sink.
-  void emit(const Path& p, int pixel, const Rgb& value, double length, GateUse use) {
+  void emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use) {
     if constexpr (Sink::kDifferential) {
-      differentiate_path(scene, p.vertex.data(), p.size(), use == GateUse::slope, differential);
+      differentiate_path(scene, p.vertex.data(), p.size(), false, differential);
       if (differential.empty()) return;
       sink.bind(differential);
       sink.add(pixel, value, length, use);
     } else {
-      sink.add(pixel, value, length);
+      sink.add(pixel, value * use.value, length);
     }
   }
 };

@@ -164,7 +164,7 @@ void BM_AdjointScatter(benchmark::State& state) {
     sink.bind(differentials[i]);
     sink.add(static_cast<int>(i), Rgb(1.0),
              5 + 4 * static_cast<double>(i) / static_cast<double>(four.paths.size()),
-             GateUse::value_and_slope);
+             GateWeights{});
     i = (i + 1) % four.paths.size();
   }
   benchmark::DoNotOptimize(gradient.data());

@@ -1,0 +1,50 @@
+// Which gate a connection's length is drawn for. Images: every gate alike. Gradients of a loss: in proportion to what
+// the gate's image counts in it, |dLoss/dImage|, of the pixel that the connection serves, or of the whole image for
+// connections of the camera itself, which may land on any pixel.
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "core/gates/gate.h"
+#include "core/image/image.h"
+
+namespace isochron {
+
+class GatePick {
+ public:
+  /// Stands for the whole image where a pixel is asked for.
+  static constexpr int kImage = -1;
+
+  /// Every gate alike. `gates` must outlive this.
+  explicit GatePick(const GateSet& gates) : gates_(gates) {}
+  GatePick(const GateSet& gates, const GatedImage& adjoint);
+
+  /// Gate for a pixel (or kImage); `u` in (0, 1) is replaced by a fresh uniform number. -1 where no gate counts.
+  int sample(int pixel, double& u) const {
+    if (rows_.empty()) {
+      const double scaled = u * gates_.size();
+      const int gate = std::min(static_cast<int>(scaled), gates_.size() - 1);
+      u = scaled - gate;
+      return gate;
+    }
+    return sample_row(pixel, u);
+  }
+  double probability(int pixel, int gate) const {
+    return rows_.empty() ? 1.0 / gates_.size() : rows_[row(pixel) + gate];
+  }
+  /// Density per length of picking a gate and then a length from it.
+  double length_pdf(int pixel, double length) const {
+    double sum = 0;
+    gates_.for_each_value(length, [&](int gate, double w) { sum += probability(pixel, gate) * w; });
+    return sum / gates_.shape().mass();
+  }
+
+ private:
+  int sample_row(int pixel, double& u) const;
+  std::size_t row(int pixel) const { return static_cast<std::size_t>(pixel + 1) * gates_.size(); }
+
+  const GateSet& gates_;
+  std::vector<double> rows_;  ///< probabilities; the image's row first, then one per pixel; empty: uniform
+};
+
+}  // namespace isochron

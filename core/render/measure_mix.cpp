@@ -1,0 +1,93 @@
+#include "core/render/measure_mix.h"
+
+#include <cmath>
+
+namespace isochron {
+namespace {
+
+/// Outside of these widths, relative to the path length, one technique is far better in every scene measured.
+constexpr double kAlwaysConnect = 0.002, kNeverConnect = 0.5;
+constexpr double kShares[] = {0, 0.3, 1};
+constexpr int kBatches = 8, kSamples = 4, kPixels = 256;
+
+/// The camera's image in fewer pixels.
+Scene reduced(const Scene& scene) {
+  Scene small = scene;
+  const double factor = std::sqrt(kPixels / (double{1} * scene.camera.width * scene.camera.height));
+  if (factor < 1) {
+    // Whole pixels, so that the fields of view still agree across the width; the height may lose part of a pixel.
+    small.camera.width = std::max(1, static_cast<int>(factor * scene.camera.width));
+    small.camera.height =
+        std::max(1, scene.camera.height * small.camera.width / scene.camera.width);
+  }
+  return small;
+}
+
+/// One column: all columns of the basis with random signs.
+TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
+  std::vector<double> sign;
+  Rng rng(stream, 0, 0);
+  for (int column = 0; column < basis.columns; ++column) sign.push_back(rng.uniform() < 0.5 ? -1 : 1);
+  TangentBasis one;
+  one.columns = 1;
+  one.row_begin.push_back(0);
+  for (std::size_t row = 0; row + 1 < basis.row_begin.size(); ++row) {
+    double sum = 0;
+    for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e)
+      sum += sign[basis.entries[e].column] * basis.entries[e].coefficient;
+    if (basis.moves(static_cast<int>(row))) one.entries.push_back({0, sum});
+    one.row_begin.push_back(static_cast<int>(one.entries.size()));
+  }
+  return one;
+}
+
+/// Sum over pixels and gates of the variance between batches of images, times the work behind them.
+template <class Estimate>
+double variance_and_work(const Renderer& renderer, Estimate&& estimate) {
+  std::vector<double> mean, squares;
+  for (int b = 0; b < kBatches; ++b) {
+    const GatedImage image = estimate(SampleRange{b * kSamples, (b + 1) * kSamples});
+    mean.resize(image.data.size());
+    squares.resize(image.data.size());
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+      const double d = image.data[i] - mean[i];
+      mean[i] += d / (b + 1);
+      squares[i] += d * (image.data[i] - mean[i]);
+    }
+  }
+  double sum = 0;
+  for (double s : squares) sum += s;
+  return sum * static_cast<double>(renderer.work());
+}
+
+}  // namespace
+
+SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
+                        const TangentBasis* basis, const Stream& stream) {
+  const double width = gates.relative_width();
+  if (options.sampling == Sampling::standard || width > kNeverConnect) return {0, 0};
+  if (options.sampling == Sampling::ellipsoidal || width < kAlwaysConnect) return {1, 1};
+  const Scene small = reduced(scene);
+  const TangentBasis one = combined(basis ? *basis : TangentBasis{}, stream);
+  SamplingMix best;
+  double least_image = INFINITY, least_interior = INFINITY;
+  for (const double share : kShares) {
+    EstimatorOptions trial = options;
+    trial.mix = SamplingMix{share, share};
+    const auto keep = [&](double cost, double& least, double& choice) {
+      // Nothing seen says nothing: a technique that never hit the gates is no good one.
+      if (cost > 0 && cost < least) least = cost, choice = share;
+    };
+    const Renderer images(small, gates, trial);
+    keep(variance_and_work(images, [&](SampleRange range) { return images.render(stream, range); }), least_image,
+         best.image);
+    if (!basis || basis->columns == 0) continue;
+    const Renderer derivatives(small, gates, trial, &one);
+    keep(variance_and_work(derivatives,
+                           [&](SampleRange range) { return derivatives.derive(Term::interior, stream, range)[0]; }),
+         least_interior, best.interior);
+  }
+  return best;
+}
+
+}  // namespace isochron

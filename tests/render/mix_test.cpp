@@ -1,0 +1,173 @@
+// Standard sampling and ellipsoidal connections combined, the gate that connections pick, and how automatic sampling
+// decides. The combination must give what standard sampling alone gives, in every term and for every kind of gate.
+//
+// Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each, below 1e-3 for the file),
+// fixed seeds. The combination's own standard error must be below 4 % of the scale of what is compared (the root mean
+// square over gates), 8 % for derivatives, so that a technique that is counted twice, dropped or weighted by a wrong
+// factor fails.
+#include <gtest/gtest.h>
+
+#include "core/render/gate_pick.h"
+#include "core/render/measure_mix.h"
+#include "tests/render/support.h"
+
+namespace isochron::testing {
+namespace {
+
+struct Case {
+  const char* name;
+  GateShape shape;
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+class Combined : public ::testing::TestWithParam<Case> {};
+
+TEST_P(Combined, GivesWhatStandardSamplingGives) {
+  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = 16;
+  Material& panel = scene.materials[scene.find_material("panel")];
+  panel.type = MaterialType::rough_conductor;
+  panel.roughness = 0.5;
+  const TangentBasis basis = make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2}),
+                                                translate(scene, "light", {0.4, 0, 0.3})});
+  const GateSet gates(GetParam().shape, {5.0, 6.0});
+  EstimatorOptions standard{.max_bounces = 3, .sampling = Sampling::standard}, combined{.max_bounces = 3};
+  combined.mix = SamplingMix{0.3, 0.3};
+  const Renderer reference(scene, gates, standard, &basis), ours(scene, gates, combined, &basis);
+  constexpr int kBatches = 32;
+  const auto expected = image_means(reference, 2, 60, kBatches, {41, 0, 0});
+  const auto image = image_means(ours, 2, 40, kBatches, {42, 0, 0});
+  for (int g = 0; g < 2; ++g) {
+    EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5) << image[g].mean << ", standard " << expected[g].mean;
+    EXPECT_LT(image[g].standard_error, 0.04 * expected[g].mean);
+  }
+  // Smooth parts and jumps are shared out differently between the two terms; their sum must agree.
+  const auto total = [&](const Renderer& renderer, int samples, std::uint64_t seed) {
+    auto sum = term_means(renderer, Term::interior, 2, 2, samples, kBatches, {seed, 0, 0});
+    const auto jumps = term_means(renderer, Term::path_length, 2, 2, samples / 2, kBatches, {seed, 0, 0});
+    for (int m = 0; m < 2; ++m)
+      for (int g = 0; g < 2; ++g) {
+        sum[m][g].mean += jumps[m][g].mean;
+        sum[m][g].standard_error = std::hypot(sum[m][g].standard_error, jumps[m][g].standard_error);
+      }
+    return sum;
+  };
+  const auto exact = total(reference, 240, 43), derivative = total(ours, 120, 44);
+  for (int m = 0; m < 2; ++m) {
+    const double scale = std::hypot(exact[m][0].mean, exact[m][1].mean) / std::sqrt(2.0);
+    for (int g = 0; g < 2; ++g) {
+      EXPECT_LT(std::abs(z_score(derivative[m][g], exact[m][g])), 4.5)
+          << "motion " << m << " gate " << g << ": " << derivative[m][g].mean << ", standard " << exact[m][g].mean;
+      EXPECT_LT(derivative[m][g].standard_error, 0.08 * scale) << "motion " << m << " gate " << g;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Gates, Combined,
+    ::testing::Values(Case{"gaussian", GateShape::gaussian(0.15)},
+                      Case{"truncated", GateShape::truncated_gaussian(0.2, 0.25)},
+                      Case{"boxcar", GateShape::boxcar(0.5)},
+                      Case{"table", GateShape::tabulated({-0.3, -0.1, -0.1, 0.2, 0.4}, {0.2, 0.8, 1.4, 0.6, 0.1})}),
+    [](const auto& test) { return test.param.name; });
+
+GatedImage uneven_adjoint(int width, int height, int gates) {
+  GatedImage adjoint(width, height, gates, 1);
+  Rng rng(Stream{7, 0, 0}, 0, 0);
+  for (int pixel = 0; pixel < adjoint.pixels(); ++pixel)
+    for (int g = 0; g < gates; ++g) {
+      const double u = rng.uniform();
+      adjoint.at(pixel, g) = u < 0.3 ? 0 : (u - 0.5) * std::pow(10.0, -g);
+    }
+  return adjoint;
+}
+
+/// Gradients whose connections pick gates by their adjoint, against the same sum over derivative images.
+TEST(GatePick, LeavesGradientsUnbiased) {
+  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = 8;
+  const TangentBasis basis = make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2})});
+  const GatedImage adjoint = uneven_adjoint(8, 8, 3);
+  for (const GateShape& shape : {GateShape::gaussian(0.2), GateShape::truncated_gaussian(0.2, 0.3)}) {
+    const GateSet gates(shape, {5.0, 5.5, 6.0});
+    const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = Sampling::ellipsoidal}, &basis);
+    for (const Term term : kTerms) {
+      if (term == Term::path_length && shape.kind() == GateKind::gaussian) continue;
+      Batches by_image, by_gate;
+      for (int b = 0; b < 64; ++b) {
+        const SampleRange range{b * 32, (b + 1) * 32};
+        const GatedImage image = renderer.derive(term, {51, 0, 0}, range)[0];
+        double sum = 0;
+        for (std::size_t i = 0; i < image.data.size(); ++i) sum += adjoint.data[i] * image.data[i];
+        by_image.add(sum);
+        std::vector<double> gradient(DofLayout(scene).size(), 0.0);
+        renderer.add_gradient(term, adjoint, {52, 0, 0}, range, gradient);
+        by_gate.add(basis.transpose_apply(gradient)[0]);
+      }
+      const Estimate a = by_image.estimate(), b = by_gate.estimate();
+      EXPECT_LT(std::abs(z_score(a, b)), 4.5) << name(term) << ": " << a.mean << ", " << b.mean;
+      // Two of three gates hardly count: not looking at them pays.
+      if (term != Term::visibility) EXPECT_LT(b.standard_error, 0.8 * a.standard_error) << name(term);
+    }
+  }
+}
+
+TEST(GatePick, ProbabilitiesAndDensity) {
+  const GateSet gates(GateShape::gaussian(0.3), {5.0, 5.4, 6.5});
+  GatedImage adjoint = uneven_adjoint(4, 4, 3);
+  for (int g = 0; g < 3; ++g) adjoint.at(5, g) = 0;
+  for (const GatePick& pick : {GatePick(gates), GatePick(gates, adjoint)}) {
+    for (int pixel = GatePick::kImage; pixel < 4; ++pixel) {
+      double total = 0;
+      int counts[3] = {0, 0, 0};
+      constexpr int kDraws = 30000;
+      for (int i = 0; i < kDraws; ++i) {
+        double u = (i + 0.5) / kDraws;
+        const int gate = pick.sample(pixel, u);
+        ASSERT_GE(gate, 0);
+        ASSERT_GT(u, 0);
+        ASSERT_LT(u, 1);
+        ++counts[gate];
+      }
+      for (int g = 0; g < 3; ++g) {
+        EXPECT_NEAR(counts[g], kDraws * pick.probability(pixel, g), 2);  // evenly spread numbers
+        total += pick.probability(pixel, g);
+      }
+      EXPECT_NEAR(total, 1, 1e-12);
+      double integral = 0;  // the trapezoidal rule on a smooth function that vanishes at both ends
+      for (int i = 0; i < 4000; ++i) integral += pick.length_pdf(pixel, 2 + 0.002 * i) * 0.002;
+      EXPECT_NEAR(integral, 1, 1e-9);
+    }
+  }
+  double u = 0.4;
+  EXPECT_EQ(GatePick(gates, adjoint).sample(5, u), -1);
+}
+
+TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {
+  const Scene scene = load_scene(PROJECT_ROOT "/scenes/cube/scene.yaml");
+  const TangentBasis basis = make_basis(scene, {translate(scene, "cube", {0, 1, 0})});
+  const auto mix = [&](double width, Sampling sampling = Sampling::automatic) {
+    const GateSet gates(GateShape::gaussian(width * 5.4), {5.4});
+    return measure_mix(scene, gates, {.max_bounces = 4, .sampling = sampling}, &basis, {1, 0, 0});
+  };
+  for (const double width : {1e-4, 0.005}) {
+    EXPECT_EQ(mix(width).image, 1) << width;
+    EXPECT_EQ(mix(width).interior, 1) << width;
+  }
+  for (const double width : {0.3, 1.0}) {
+    EXPECT_EQ(mix(width).image, 0) << width;
+    EXPECT_EQ(mix(width).interior, 0) << width;
+  }
+  EXPECT_EQ(mix(0.3, Sampling::ellipsoidal).interior, 1);
+  EXPECT_EQ(mix(0.005, Sampling::standard).interior, 0);
+  set_thread_count(1);
+  const SamplingMix one = mix(0.05);
+  set_thread_count(2);
+  const SamplingMix two = mix(0.05);
+  set_thread_count(0);
+  EXPECT_EQ(one.image, two.image);
+  EXPECT_EQ(one.interior, two.interior);
+}
+
+}  // namespace
+}  // namespace isochron::testing
