@@ -1,6 +1,6 @@
-// Which gate a connection's length is drawn for. Images: every gate alike. Gradients of a loss: in proportion to what
-// the gate's image counts in it, |dLoss/dImage|, of the pixel that the connection serves, or of the whole image for
-// connections of the camera itself, which may land on any pixel.
+// Which gate a connection's length is drawn for. Images: every gate alike. Gradients of a loss: in proportion
+// to what the gate's image counts in it, |dLoss/dImage|, of the pixel that the connection serves, or of the
+// whole image for connections of the camera itself, which may land on any pixel.
 #pragma once
 #include <optional>
 #include <vector>
@@ -19,7 +19,8 @@ class GatePick {
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
   GatePick(const GateSet& gates, const GatedImage& adjoint);
 
-  /// Gate for a pixel (or kImage); `u` in (0, 1) is replaced by a fresh uniform number. -1 where no gate counts.
+  /// Gate for a pixel (or kImage); `u` in (0, 1) is replaced by a fresh uniform number. -1 where no gate
+  /// counts.
   int sample(int pixel, double& u) const {
     if (rows_.empty()) {
       const double scaled = u * gates_.size();

@@ -8,17 +8,20 @@ namespace {
 /// Outside of these widths, relative to the path length, one technique is far better in every scene measured.
 constexpr double kAlwaysConnect = 0.002, kNeverConnect = 0.5;
 constexpr double kShares[] = {0, 0.3, 1};
-constexpr int kBatches = 8, kSamples = 4, kPixels = 256;
+constexpr int kBatches = 12, kSamples = 4, kPixels = 256;
+/// The combination must look this much better than either technique alone: trials are noisy, and what it can
+/// lose where it is not the best is more than what it can win.
+constexpr double kClearlyBetter = 0.7;
 
 /// The camera's image in fewer pixels.
 Scene reduced(const Scene& scene) {
   Scene small = scene;
   const double factor = std::sqrt(kPixels / (double{1} * scene.camera.width * scene.camera.height));
   if (factor < 1) {
-    // Whole pixels, so that the fields of view still agree across the width; the height may lose part of a pixel.
+    // Whole pixels, so that the fields of view still agree across the width; the height may lose part of a
+    // pixel.
     small.camera.width = std::max(1, static_cast<int>(factor * scene.camera.width));
-    small.camera.height =
-        std::max(1, scene.camera.height * small.camera.width / scene.camera.width);
+    small.camera.height = std::max(1, scene.camera.height * small.camera.width / scene.camera.width);
   }
   return small;
 }
@@ -69,24 +72,25 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   if (options.sampling == Sampling::ellipsoidal || width < kAlwaysConnect) return {1, 1};
   const Scene small = reduced(scene);
   const TangentBasis one = combined(basis ? *basis : TangentBasis{}, stream);
-  SamplingMix best;
-  double least_image = INFINITY, least_interior = INFINITY;
-  for (const double share : kShares) {
-    EstimatorOptions trial = options;
-    trial.mix = SamplingMix{share, share};
-    const auto keep = [&](double cost, double& least, double& choice) {
+  const auto choose = [&](const TangentBasis* moving, auto&& estimate) {
+    double cost[3];
+    for (int i = 0; i < 3; ++i) {
+      EstimatorOptions trial = options;
+      trial.mix = SamplingMix{kShares[i], kShares[i]};
+      const Renderer renderer(small, gates, trial, moving);
+      cost[i] = variance_and_work(renderer, [&](SampleRange range) { return estimate(renderer, range); });
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
-      if (cost > 0 && cost < least) least = cost, choice = share;
-    };
-    const Renderer images(small, gates, trial);
-    keep(variance_and_work(images, [&](SampleRange range) { return images.render(stream, range); }), least_image,
-         best.image);
-    if (!basis || basis->columns == 0) continue;
-    const Renderer derivatives(small, gates, trial, &one);
-    keep(variance_and_work(derivatives,
-                           [&](SampleRange range) { return derivatives.derive(Term::interior, stream, range)[0]; }),
-         least_interior, best.interior);
-  }
+      if (!(cost[i] > 0)) cost[i] = INFINITY;
+    }
+    const int alone = cost[0] <= cost[2] ? 0 : 2;
+    return kShares[cost[1] < kClearlyBetter * cost[alone] ? 1 : alone];
+  };
+  SamplingMix best;
+  best.image = choose(nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
+  if (basis && basis->columns > 0)
+    best.interior = choose(&one, [&](const Renderer& r, SampleRange range) {
+      return r.derive(Term::interior, stream, range)[0];
+    });
   return best;
 }
 

@@ -1,11 +1,13 @@
 // How the techniques that may find a complete path share it.
 //
-// Surface arcs and emitter arcs (ellipsoidal connections) by the balance heuristic: their densities are per area at the
-// path's last two vertices, without the camera walk that they have in common. Connections of the camera itself serve
-// every pixel; so that they compare, walks count as starting at a random point of a random pixel.
+// Surface arcs and emitter arcs (ellipsoidal connections) by the balance heuristic: their densities are per
+// area at the path's last two vertices, without the camera walk that they have in common. Connections of the
+// camera itself serve every pixel; so that they compare, walks count as starting at a random point of a
+// random pixel.
 //
-// Standard sampling and ellipsoidal connections by a balance heuristic with an estimate for the latter: connections
-// pick one of all the arcs that an ellipsoid leaves on the scene, whose common length no single path knows.
+// Standard sampling and ellipsoidal connections by a balance heuristic with an estimate for the latter:
+// connections pick one of all the arcs that an ellipsoid leaves on the scene, whose common length no single
+// path knows.
 #pragma once
 #include "core/geometry/ellipsoid.h"
 #include "core/render/gate_pick.h"
@@ -21,8 +23,8 @@ class Techniques {
  public:
   Techniques(const PreparedScene& scene, const GatePick& pick) : scene_(scene), pick_(pick) {}
 
-  /// Of the complete path x0 .. x(K). `length_pdf(k)`: density of the path's length in connections of x(k). `walks_only`:
-  /// x0 makes no connections (it is no camera).
+  /// Of the complete path x0 .. x(K). `length_pdf(k)`: density of the path's length in connections of x(k).
+  /// `walks_only`: x0 makes no connections (it is no camera).
   template <class LengthPdf>
   ArcDensities arcs(const Path& path, bool walks_only, LengthPdf&& length_pdf) const {
     const int last = path.size() - 1;
@@ -33,12 +35,13 @@ class Techniques {
     ArcDensities d;
     if (!scene_.outside(q, y)) return d;
     d.emitter = step_pdf(path, last - 2, q) * emitter_arc_pdf(q, y) * length_pdf(last - 1);
-    if (scene_.outside(x, q)) d.surface = scene_.emitter_pdf(y.triangle) * surface_arc_pdf(x, q, y) * length_pdf(last - 2);
+    if (scene_.outside(x, q))
+      d.surface = scene_.emitter_pdf(y.triangle) * surface_arc_pdf(x, q, y) * length_pdf(last - 2);
     return d;
   }
 
-  /// Share of the path that ellipsoidal connections take when they are `share` of the samples and count for `gain` times
-  /// their density; standard sampling takes the rest.
+  /// Share of the path that ellipsoidal connections take when they are `share` of the samples and count for
+  /// `gain` times their density; standard sampling takes the rest.
   double ellipsoidal_weight(const Path& path, int pixel, double share, double gain) const {
     const int last = path.size() - 1;
     const SurfacePoint& y = path.vertex[last];
@@ -55,26 +58,29 @@ class Techniques {
       if (!scene_.outside(q, y)) return 0;
       const double to_q = path.length[last - 1] - path.length[last - 2], pdf_q = step_pdf(path, last - 2, q);
       standard = pdf_q * (pdf_y + step_pdf(path, last - 1, y));
-      // Ellipsoids cross the scene on a few closed curves, where dA = |q-a| |q-b| / sqrt(tau^2 - |P(b-a)|^2) dphi dtau.
+      // Ellipsoids cross the scene on a few closed curves, where dA = |q-a| |q-b| / sqrt(tau^2 - |P(b-a)|^2)
+      // dphi dtau.
       constexpr double kCurves = 1;
       const Vec3 d = y.p - x.p;
       const double in_plane = isochron::length_squared(d) - dot(d, q.n) * dot(d, q.n);
       const double rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
       ellipsoidal = pdf_q * pick_.length_pdf(pixel, length) / across;
       if (scene_.outside(x, q))
-        ellipsoidal += pdf_y * pick_.length_pdf(last == 2 ? GatePick::kImage : pixel, length) / (2 * kPi * kCurves * rate);
+        ellipsoidal += pdf_y * pick_.length_pdf(last == 2 ? GatePick::kImage : pixel, length) /
+                       (2 * kPi * kCurves * rate);
     }
     return gain * share * ellipsoidal / (gain * share * ellipsoidal + (1 - share) * standard);
   }
 
  private:
-  /// Density per area with which a walk that stands at the path's vertex `from` goes on to q (from the camera: by a
-  /// random point of a random pixel).
+  /// Density per area with which a walk that stands at the path's vertex `from` goes on to q (from the
+  /// camera: by a random point of a random pixel).
   double step_pdf(const Path& path, int from, const SurfacePoint& q) const {
     const SurfacePoint& x = path.vertex[from];
     const double to_area = solid_angle_to_area(x.p, q);
     if (from == 0)
-      return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
+      return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area /
+             scene_.camera.pixels();
     const Scattering s(path.vertex[from - 1].p, x, q.p);
     return s.pdf_towards_light(scene_.material_of(x.triangle)) * to_area;
   }
@@ -84,7 +90,8 @@ class Techniques {
     const double distance = length(y.p - q.p);
     EllipseArcs arcs;
     const int t = y.triangle;
-    if (!clip_ellipse({q.p, q.p, 2 * distance}, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
+    if (!clip_ellipse({q.p, q.p, 2 * distance}, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2),
+                      arcs))
       return 0;
     return 1 / (arcs.total_span * distance);
   }

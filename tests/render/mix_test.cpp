@@ -1,10 +1,11 @@
-// Standard sampling and ellipsoidal connections combined, the gate that connections pick, and how automatic sampling
-// decides. The combination must give what standard sampling alone gives, in every term and for every kind of gate.
+// Standard sampling and ellipsoidal connections combined, the gate that connections pick, and how automatic
+// sampling decides. The combination must give what standard sampling alone gives, in every term and for every
+// kind of gate.
 //
-// Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each, below 1e-3 for the file),
-// fixed seeds. The combination's own standard error must be below 4 % of the scale of what is compared (the root mean
-// square over gates), 8 % for derivatives, so that a technique that is counted twice, dropped or weighted by a wrong
-// factor fails.
+// Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each, below 1e-3 for the
+// file), fixed seeds. The combination's own standard error must be below 4 % of the image, and below 15 % of
+// a derivative's scale (the root mean square over gates), so that a technique that is counted twice, dropped
+// or weighted by a wrong factor fails.
 #include <gtest/gtest.h>
 
 #include "core/render/gate_pick.h"
@@ -18,7 +19,9 @@ struct Case {
   const char* name;
   GateShape shape;
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
 
 class Combined : public ::testing::TestWithParam<Case> {};
 
@@ -28,8 +31,8 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
   Material& panel = scene.materials[scene.find_material("panel")];
   panel.type = MaterialType::rough_conductor;
   panel.roughness = 0.5;
-  const TangentBasis basis = make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2}),
-                                                translate(scene, "light", {0.4, 0, 0.3})});
+  const TangentBasis basis =
+      make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2}), translate(scene, "light", {0.4, 0, 0.3})});
   const GateSet gates(GetParam().shape, {5.0, 6.0});
   EstimatorOptions standard{.max_bounces = 3, .sampling = Sampling::standard}, combined{.max_bounces = 3};
   combined.mix = SamplingMix{0.3, 0.3};
@@ -38,13 +41,14 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
   const auto expected = image_means(reference, 2, 60, kBatches, {41, 0, 0});
   const auto image = image_means(ours, 2, 40, kBatches, {42, 0, 0});
   for (int g = 0; g < 2; ++g) {
-    EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5) << image[g].mean << ", standard " << expected[g].mean;
+    EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5)
+        << image[g].mean << ", standard " << expected[g].mean;
     EXPECT_LT(image[g].standard_error, 0.04 * expected[g].mean);
   }
   // Smooth parts and jumps are shared out differently between the two terms; their sum must agree.
   const auto total = [&](const Renderer& renderer, int samples, std::uint64_t seed) {
     auto sum = term_means(renderer, Term::interior, 2, 2, samples, kBatches, {seed, 0, 0});
-    const auto jumps = term_means(renderer, Term::path_length, 2, 2, samples / 2, kBatches, {seed, 0, 0});
+    const auto jumps = term_means(renderer, Term::path_length, 2, 2, samples / 4, kBatches, {seed, 0, 0});
     for (int m = 0; m < 2; ++m)
       for (int g = 0; g < 2; ++g) {
         sum[m][g].mean += jumps[m][g].mean;
@@ -52,24 +56,28 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
       }
     return sum;
   };
-  const auto exact = total(reference, 240, 43), derivative = total(ours, 120, 44);
+  const bool smooth = GetParam().shape.kind() == GateKind::gaussian;
+  const int samples = smooth ? 240 : 80;
+  const auto exact = total(reference, 2 * samples, 43), derivative = total(ours, samples, 44);
   for (int m = 0; m < 2; ++m) {
     const double scale = std::hypot(exact[m][0].mean, exact[m][1].mean) / std::sqrt(2.0);
     for (int g = 0; g < 2; ++g) {
       EXPECT_LT(std::abs(z_score(derivative[m][g], exact[m][g])), 4.5)
-          << "motion " << m << " gate " << g << ": " << derivative[m][g].mean << ", standard " << exact[m][g].mean;
-      EXPECT_LT(derivative[m][g].standard_error, 0.08 * scale) << "motion " << m << " gate " << g;
+          << "motion " << m << " gate " << g << ": " << derivative[m][g].mean << ", standard "
+          << exact[m][g].mean;
+      EXPECT_LT(derivative[m][g].standard_error, (smooth ? 0.08 : 0.15) * scale)
+          << "motion " << m << " gate " << g;
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Gates, Combined,
-    ::testing::Values(Case{"gaussian", GateShape::gaussian(0.15)},
-                      Case{"truncated", GateShape::truncated_gaussian(0.2, 0.25)},
-                      Case{"boxcar", GateShape::boxcar(0.5)},
-                      Case{"table", GateShape::tabulated({-0.3, -0.1, -0.1, 0.2, 0.4}, {0.2, 0.8, 1.4, 0.6, 0.1})}),
-    [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(Gates, Combined,
+                         ::testing::Values(Case{"gaussian", GateShape::gaussian(0.15)},
+                                           Case{"truncated", GateShape::truncated_gaussian(0.2, 0.25)},
+                                           Case{"boxcar", GateShape::boxcar(0.5)},
+                                           Case{"table", GateShape::tabulated({-0.3, -0.1, -0.1, 0.2, 0.4},
+                                                                              {0.2, 0.8, 1.4, 0.6, 0.1})}),
+                         [](const auto& test) { return test.param.name; });
 
 GatedImage uneven_adjoint(int width, int height, int gates) {
   GatedImage adjoint(width, height, gates, 1);
@@ -106,8 +114,10 @@ TEST(GatePick, LeavesGradientsUnbiased) {
       }
       const Estimate a = by_image.estimate(), b = by_gate.estimate();
       EXPECT_LT(std::abs(z_score(a, b)), 4.5) << name(term) << ": " << a.mean << ", " << b.mean;
-      // Two of three gates hardly count: not looking at them pays.
-      if (term != Term::visibility) EXPECT_LT(b.standard_error, 0.8 * a.standard_error) << name(term);
+      // Two of three gates hardly count: not drawing lengths for them pays.
+      if (term == Term::path_length) {
+        EXPECT_LT(b.standard_error, 0.7 * a.standard_error);
+      }
     }
   }
 }
