@@ -335,8 +335,11 @@ class EllipsoidalConnections {
     const bool jump = target.jump[i];
     const Path& path = worker_.path;
     const GatePick& pick = worker_.pick;
+    // Only where the camera's own connections, which serve the whole image, compete with another's do densities of the
+    // length differ between the two techniques.
+    const bool same_length_pdf = kGathers || pick.uniform() || path.size() != 4;
     const ArcDensities d = worker_.techniques.arcs(path, kGathers, [&](int from) {
-      if constexpr (kGathers) return 1.0;  // the same for all
+      if (same_length_pdf) return 1.0;
       const int served = from == 0 ? GatePick::kImage : pixel;
       return jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]);
     });

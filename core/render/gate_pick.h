@@ -19,6 +19,7 @@ class GatePick {
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
   GatePick(const GateSet& gates, const GatedImage& adjoint);
 
+  bool uniform() const { return rows_.empty(); }
   /// Gate for a pixel (or kImage); `u` in (0, 1) is replaced by a fresh uniform number. -1 where no gate
   /// counts.
   int sample(int pixel, double& u) const {

@@ -67,7 +67,8 @@ TEST_P(FiniteDifference, TotalDerivative) {
       {"vertex of a silhouette", translate(scene, "block", {-0.3, 1, 0.5}, at(corner)), 0.02, true, glass},
       {"vertex within a surface", translate(scene, "panel", {-1, 0, 0.3}, at(middle)), 0.01},
       {"albedo", change_albedo(scene, glass ? "grey" : "block"), 0.01, false}};
-  if (glass) parameters.push_back({"ior", change_ior(scene, "block"), 0.01, false});
+  if (glass)
+    parameters.push_back({"ior", change_ior(scene, "block"), 0.01, false, c.sampling == Sampling::ellipsoidal});
   if (c.look != Look::diffuse) parameters.push_back({"roughness", change_roughness(scene, "block"), 0.01, false, glass});
   std::vector<Motion> motions;
   for (const Parameter& p : parameters) motions.push_back(p.motion);

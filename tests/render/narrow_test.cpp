@@ -6,6 +6,7 @@
 // standard error itself must be below 3 % of the derivative's scale (root of the terms' summed squares).
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
@@ -56,7 +57,8 @@ double integrate(double a, double b, int pieces, F&& f) {
   return 0.5 * h * sum;
 }
 
-/// What the pixel sees, by quadrature over the lamp. A gate's jumps cost an error of the order of one piece.
+/// What the pixel sees, by quadrature over the lamp; along z piece by piece between the ends of the gate's support, where
+/// it may jump.
 double pixel_value(const GateShape& gate, double center, const Shift& s) {
   // The camera's ray meets the shifted floor here; the pixel is so small that one point stands for it.
   const double t = (kCamera.y - s.floor.y) / kCamera.y;
@@ -68,11 +70,23 @@ double pixel_value(const GateShape& gate, double center, const Shift& s) {
   const double shadow_x = d.x + (edge_x - d.x) * (lamp_y - d.y) / (edge_y - d.y);
   const double left = std::max(-kLampHalf + s.lamp.x, shadow_x), right = kLampHalf + s.lamp.x;
   const double h = lamp_y - d.y;
-  return integrate(left, right, 400, [&](double x) {
-    return integrate(-kLampHalf + s.lamp.z, kLampHalf + s.lamp.z, 400, [&](double z) {
-      const double r2 = (x - d.x) * (x - d.x) + h * h + (z - d.z) * (z - d.z);
-      return kRadiance * kAlbedo / kPi * h * h / (r2 * r2) * gate.value(first + std::sqrt(r2) - center);
-    });
+  return integrate(left, right, 600, [&](double x) {
+    const double across = (x - d.x) * (x - d.x) + h * h;
+    std::vector<double> ends = {-kLampHalf + s.lamp.z, kLampHalf + s.lamp.z};
+    for (const double offset : {gate.lower(), gate.upper()}) {
+      const double r = center + offset - first, squared = r * r - across;
+      if (!(r > 0 && squared > 0)) continue;
+      for (const double z : {d.z - std::sqrt(squared), d.z + std::sqrt(squared)})
+        if (z > ends[0] && z < ends[1]) ends.push_back(z);
+    }
+    std::sort(ends.begin(), ends.end());
+    double sum = 0;
+    for (std::size_t i = 1; i < ends.size(); ++i)
+      sum += integrate(ends[i - 1], ends[i], 60, [&](double z) {
+        const double r2 = across + (z - d.z) * (z - d.z);
+        return kRadiance * kAlbedo / kPi * h * h / (r2 * r2) * gate.value(first + std::sqrt(r2) - center);
+      });
+    return sum;
   });
 }
 
