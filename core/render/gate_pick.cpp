@@ -1,45 +1,38 @@
 #include "core/render/gate_pick.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace isochron {
 
 GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint) : gates_(gates) {
-  const int count = gates.size(), pixels = adjoint.width * adjoint.height;
-  rows_.assign(static_cast<std::size_t>(pixels + 1) * count, 0.0);
-  const auto normalise = [&](int pixel) {
-    double* p = &rows_[row(pixel)];
-    double sum = 0;
-    for (int g = 0; g < count; ++g) sum += p[g];
-    if (sum > 0)
-      for (int g = 0; g < count; ++g) p[g] /= sum;
+  const int count = gates.size(), pixels = adjoint.pixels();
+  below_.assign(static_cast<std::size_t>(pixels + 1) * (count + 1), 0.0);
+  const auto accumulate = [&](int pixel) {
+    double* p = &below_[row(pixel)];
+    for (int g = 0; g < count; ++g) p[g + 1] += p[g];
+    if (const double sum = p[count]; sum > 0)
+      for (int g = 1; g <= count; ++g) p[g] = g == count ? 1 : p[g] / sum;
   };
+  double* image = &below_[row(kImage)];
   for (int pixel = 0; pixel < pixels; ++pixel) {
+    double* p = &below_[row(pixel)];
     for (int g = 0; g < count; ++g) {
-      double sum = 0;
-      for (int c = 0; c < adjoint.channels; ++c) sum += std::abs(adjoint.data[adjoint.index(pixel, g) + c]);
-      rows_[row(pixel) + g] = sum;
-      rows_[g] += sum;
+      for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
+      image[g + 1] += p[g + 1];
     }
-    normalise(pixel);
+    accumulate(pixel);
   }
-  normalise(kImage);
+  accumulate(kImage);
 }
 
 int GatePick::sample_row(int pixel, double& u) const {
-  const double* p = &rows_[row(pixel)];
-  int last = -1;
-  for (int g = 0; g < gates_.size(); ++g) {
-    if (!(p[g] > 0)) continue;
-    if (u < p[g]) {
-      u /= p[g];
-      return g;
-    }
-    u -= p[g];
-    last = g;
-  }
-  if (last >= 0) u = 0.5;  // round-off has taken u past the end
-  return last;
+  const double* p = &below_[row(pixel)];
+  const int count = gates_.size();
+  if (!(p[count] > 0)) return -1;
+  const int gate = static_cast<int>(std::upper_bound(p + 1, p + count, u) - p) - 1;
+  u = (u - p[gate]) / (p[gate + 1] - p[gate]);
+  return gate;
 }
 
 }  // namespace isochron

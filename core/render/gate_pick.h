@@ -19,11 +19,11 @@ class GatePick {
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
   GatePick(const GateSet& gates, const GatedImage& adjoint);
 
-  bool uniform() const { return rows_.empty(); }
+  bool uniform() const { return below_.empty(); }
   /// Gate for a pixel (or kImage); `u` in (0, 1) is replaced by a fresh uniform number. -1 where no gate
   /// counts.
   int sample(int pixel, double& u) const {
-    if (rows_.empty()) {
+    if (below_.empty()) {
       const double scaled = u * gates_.size();
       const int gate = std::min(static_cast<int>(scaled), gates_.size() - 1);
       u = scaled - gate;
@@ -32,7 +32,7 @@ class GatePick {
     return sample_row(pixel, u);
   }
   double probability(int pixel, int gate) const {
-    return rows_.empty() ? 1.0 / gates_.size() : rows_[row(pixel) + gate];
+    return below_.empty() ? 1.0 / gates_.size() : below_[row(pixel) + gate + 1] - below_[row(pixel) + gate];
   }
   /// Density per length of picking a gate and then a length from it.
   double length_pdf(int pixel, double length) const {
@@ -43,10 +43,11 @@ class GatePick {
 
  private:
   int sample_row(int pixel, double& u) const;
-  std::size_t row(int pixel) const { return static_cast<std::size_t>(pixel + 1) * gates_.size(); }
+  std::size_t row(int pixel) const { return static_cast<std::size_t>(pixel + 1) * (gates_.size() + 1); }
 
   const GateSet& gates_;
-  std::vector<double> rows_;  ///< probabilities; the image's row first, then one per pixel; empty: uniform
+  std::vector<double>
+      below_;  ///< cumulative probabilities from 0; the image's row first, then one per pixel; empty: uniform
 };
 
 }  // namespace isochron
