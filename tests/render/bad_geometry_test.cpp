@@ -1,6 +1,7 @@
 // Scenes and gates in which there is nothing to see, or in which parameters have gone too far.
 #include <gtest/gtest.h>
 
+#include "core/render/measure_mix.h"
 #include "support.h"
 
 namespace isochron::testing {
@@ -13,7 +14,9 @@ struct Everything {
 
 Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling,
                           const TangentBasis& basis, int samples = 16) {
-  const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = sampling}, &basis);
+  EstimatorOptions options{.max_bounces = 3, .sampling = sampling};
+  if (sampling == Sampling::automatic) options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 2});
+  const Renderer renderer(scene, gates, options, &basis);
   Everything all;
   const GatedImage image = renderer.render({1, 0, 0}, {0, samples});
   all.numbers = image.data;
@@ -97,6 +100,35 @@ TEST_P(BadGeometry, FlattenedTrianglesGiveFiniteResults) {
   EXPECT_EQ(run_everything(scene_, gates, GetParam(), basis()).not_finite, 0);
 }
 
+TEST_P(BadGeometry, EdgeOnFacesGiveFiniteResults) {
+  const GateSet gates(GateShape::truncated_gaussian(0.2, 0.4), {4.9, 5.6});
+  const Shape& block = scene_.shapes[scene_.find_shape("block")];
+  const Shape& light = scene_.shapes[scene_.find_shape("light")];
+  const Vec3 camera = scene_.camera.position;
+  int places = 0, lit = 0;
+  const auto check = [&](const char* what, const Vec3& position) {
+    scene_.camera.position = position;
+    const Everything all = run_everything(scene_, gates, GetParam(), basis());
+    EXPECT_EQ(all.not_finite, 0) << what;
+    ++places;
+    lit += all.non_zero > 100;
+  };
+  // Exactly, as all heights of the plane are the same number.
+  double top = -INFINITY;
+  for (int i = 0; i < block.vertex_count; ++i) top = std::max(top, scene_.positions[block.first_vertex + i].y);
+  check("the plane of the block's top", {camera.x, top, camera.z});
+  check("the plane of the light", {camera.x, scene_.positions[light.first_vertex].y, camera.z});
+  for (const int t : {0, 3, 6}) {
+    const auto& v = scene_.triangles[block.first_triangle + t].vertex;
+    const Vec3 p = scene_.positions[v[0]], q = scene_.positions[v[1]], r = scene_.positions[v[2]];
+    const Vec3 n = normalize(cross(q - p, r - p));
+    check("a plane of the block", camera - n * dot(n, camera - p));
+    check("an edge seen as a point", p + (p - q) * 2.0);
+    check("an edge seen as a point from its other end", q + (q - p) * 2.0);
+  }
+  EXPECT_GE(lit, places / 2);  // some are outside of the room
+}
+
 TEST_P(BadGeometry, SceneWithoutLampIsDark) {
   scene_.shapes[scene_.find_shape("light")].emission = {};
   const TangentBasis moving = basis();
@@ -104,9 +136,11 @@ TEST_P(BadGeometry, SceneWithoutLampIsDark) {
   EXPECT_EQ(run_everything(scene_, GateSet(GateShape::steady(), {0}), GetParam(), moving).non_zero, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(, BadGeometry, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
+INSTANTIATE_TEST_SUITE_P(, BadGeometry, ::testing::Values(Sampling::standard, Sampling::ellipsoidal, Sampling::automatic),
                          [](const auto& test) {
-                           return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
+                           return std::string(test.param == Sampling::standard      ? "Standard"
+                                              : test.param == Sampling::ellipsoidal ? "Ellipsoidal"
+                                                                                    : "Automatic");
                          });
 
 }  // namespace
