@@ -164,16 +164,19 @@ std::vector<Step> split_path(const std::string& path, const std::string& text) {
   return steps;
 }
 
-/// Puts an override's value into the tree and returns its path.
-std::string apply_override(YAML::Node node, const std::string& text) {
+/// Puts an override's value into the tree and adds its path to `overridden`. Sections on the way that the file leaves out
+/// are made, and added too.
+void apply_override(YAML::Node node, const std::string& text, std::vector<std::string>& overridden) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) throw InputError("--set " + text + ": must be KEY.PATH=VALUE");
   const std::string path = text.substr(0, equals), source = "--set " + path;
   const std::vector<Step> steps = split_path(path, text);
   const YAML::Node value = parse_document(source, text.substr(equals + 1));
+  std::string here;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
     const bool last = i + 1 == steps.size();
+    here += step.index ? fmt::format("[{}]", *step.index) : (i > 0 ? "." : "") + step.key;
     YAML::Node next;
     if (step.index) {
       if (!node.IsSequence() || *step.index >= node.size())
@@ -185,14 +188,19 @@ std::string apply_override(YAML::Node node, const std::string& text) {
       if (!node.IsMap())
         throw InputError(
             fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
-      if (last) node[step.key] = value;
+      if (last) {
+        node[step.key] = value;
+      } else if (!std::as_const(node)[step.key].IsDefined() && !steps[i + 1].index) {
+        node[step.key] = YAML::Node(YAML::NodeType::Map);
+        overridden.push_back(here);
+      }
       const YAML::Node found = std::as_const(node)[step.key];
       if (!found.IsDefined()) throw InputError(fmt::format("{}: there is no key '{}'", source, step.key));
       next.reset(found);
     }
     node.reset(next);
   }
-  return path;
+  overridden.push_back(path);
 }
 
 }  // namespace
@@ -411,7 +419,7 @@ YamlValue open_yaml(const std::string& file, const std::vector<std::string>& ove
   const YAML::Node root = parse_document(file, read_text(file));
   auto document = std::make_shared<YamlValue::Document>();
   document->file = file;
-  for (const std::string& text : overrides) document->overridden.push_back(apply_override(root, text));
+  for (const std::string& text : overrides) apply_override(root, text, document->overridden);
   return YamlValue(document, root, "");
 }
 

@@ -180,6 +180,38 @@ TEST_F(Program, CheckAgreesWithFiniteDifferences) {
   EXPECT_EQ(folder_.read("out/check.csv").find("height"), std::string::npos);
 }
 
+TEST_F(Program, GatesThatNoPathReaches) {
+  // Zeros everywhere, and a run that has nothing to go by stays where it is and ends as it should.
+  const std::string file = folder_.file("tiny.yaml");
+  for (const char* sampling : {"standard", "ellipsoidal", "auto"}) {
+    const std::vector<std::string> change = {"--set", "gates.centers=[90, 0.1]", "--set",
+                                             std::string("estimator.sampling=") + sampling};
+    const auto with = [&](std::vector<std::string> arguments) {
+      arguments.insert(arguments.end(), change.begin(), change.end());
+      return arguments;
+    };
+    const std::string out = folder_.file(sampling);
+    EXPECT_EQ(run(with({"render", file, "-o", out, "--no-plots"})).status, 0);
+    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")), "gate,mean,standard_error\n0,0,0\n1,0,0\n");
+    const Result derive = run(with({"derive", file, "-o", out, "--no-plots", "--quiet"}));
+    EXPECT_EQ(derive.status, 0);
+    EXPECT_EQ(derive.errors, "");
+    std::istringstream rows(folder_.read(sampling + std::string("/derive.csv")));
+    std::string row;
+    std::getline(rows, row);
+    while (std::getline(rows, row)) EXPECT_NE(row.find(",0,0,0"), std::string::npos) << row;
+    EXPECT_EQ(run(with({"gradient", file, "-o", out})).status, 0);
+    EXPECT_EQ(folder_.read(sampling + std::string("/gradient.csv")),
+              "parameter,value,gradient,standard_error,kurtosis\nheight,0.2,0,0,0\npower,8,0,0,0\n");
+    const std::string folder = std::string("run_") + sampling;
+    EXPECT_EQ(run(with(run_command(folder))).status, 0);
+    const std::string summary = folder_.read(folder + "/summary.yaml");
+    for (const char* line : {"status: iterations_reached\n", "loss_final: 0\n", "height: 0.2\n", "power: 8\n"})
+      EXPECT_NE(summary.find(line), std::string::npos) << line << summary;
+    EXPECT_EQ(folder_.read(folder + "/log.csv").find("nan"), std::string::npos);
+  }
+}
+
 TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
   ASSERT_EQ(run(run_command("a")).status, 0);
   for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml",
