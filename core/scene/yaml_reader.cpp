@@ -164,8 +164,8 @@ std::vector<Step> split_path(const std::string& path, const std::string& text) {
   return steps;
 }
 
-/// Puts an override's value into the tree and adds its path to `overridden`. Sections on the way that the file leaves out
-/// are made, and added too.
+/// Puts an override's value into the tree and adds its path to `overridden`. Sections on the way that the
+/// file leaves out are made, and added too.
 void apply_override(YAML::Node node, const std::string& text, std::vector<std::string>& overridden) {
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos) throw InputError("--set " + text + ": must be KEY.PATH=VALUE");

@@ -192,7 +192,8 @@ TEST_F(Program, GatesThatNoPathReaches) {
     };
     const std::string out = folder_.file(sampling);
     EXPECT_EQ(run(with({"render", file, "-o", out, "--no-plots"})).status, 0);
-    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")), "gate,mean,standard_error\n0,0,0\n1,0,0\n");
+    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")),
+              "gate,mean,standard_error\n0,0,0\n1,0,0\n");
     const Result derive = run(with({"derive", file, "-o", out, "--no-plots", "--quiet"}));
     EXPECT_EQ(derive.status, 0);
     EXPECT_EQ(derive.errors, "");
@@ -206,7 +207,8 @@ TEST_F(Program, GatesThatNoPathReaches) {
     const std::string folder = std::string("run_") + sampling;
     EXPECT_EQ(run(with(run_command(folder))).status, 0);
     const std::string summary = folder_.read(folder + "/summary.yaml");
-    for (const char* line : {"status: iterations_reached\n", "loss_final: 0\n", "height: 0.2\n", "power: 8\n"})
+    for (const char* line :
+         {"status: iterations_reached\n", "loss_final: 0\n", "height: 0.2\n", "power: 8\n"})
       EXPECT_NE(summary.find(line), std::string::npos) << line << summary;
     EXPECT_EQ(folder_.read(folder + "/log.csv").find("nan"), std::string::npos);
   }

@@ -115,7 +115,8 @@ TEST_P(BadGeometry, EdgeOnFacesGiveFiniteResults) {
   };
   // Exactly, as all heights of the plane are the same number.
   double top = -INFINITY;
-  for (int i = 0; i < block.vertex_count; ++i) top = std::max(top, scene_.positions[block.first_vertex + i].y);
+  for (int i = 0; i < block.vertex_count; ++i)
+    top = std::max(top, scene_.positions[block.first_vertex + i].y);
   check("the plane of the block's top", {camera.x, top, camera.z});
   check("the plane of the light", {camera.x, scene_.positions[light.first_vertex].y, camera.z});
   for (const int t : {0, 3, 6}) {
@@ -136,7 +137,8 @@ TEST_P(BadGeometry, SceneWithoutLampIsDark) {
   EXPECT_EQ(run_everything(scene_, GateSet(GateShape::steady(), {0}), GetParam(), moving).non_zero, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(, BadGeometry, ::testing::Values(Sampling::standard, Sampling::ellipsoidal, Sampling::automatic),
+INSTANTIATE_TEST_SUITE_P(, BadGeometry,
+                         ::testing::Values(Sampling::standard, Sampling::ellipsoidal, Sampling::automatic),
                          [](const auto& test) {
                            return std::string(test.param == Sampling::standard      ? "Standard"
                                               : test.param == Sampling::ellipsoidal ? "Ellipsoidal"

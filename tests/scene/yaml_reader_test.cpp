@@ -190,7 +190,9 @@ TEST_F(YamlReader, Overrides) {
   EXPECT_EQ(error([&] { open(text, {"list[2].x=1"}); }),
             "--set list[2].x: there is no entry 2 (the list has 2)");
   // Sections that the file leaves out are made; lists are not.
-  EXPECT_EQ(open(text, {"c.d.e=7", "c.d.f=8"}).map().require("c").map().require("d").map().require("e").number(), 7);
+  EXPECT_EQ(
+      open(text, {"c.d.e=7", "c.d.f=8"}).map().require("c").map().require("d").map().require("e").number(),
+      7);
   EXPECT_EQ(error([&] { open(text, {"c.d=7"}).map().require("c").number(); }).substr(0, 8), "--set c:");
   EXPECT_EQ(error([&] { open(text, {"nobody[0]=1"}); }), "--set nobody[0]: there is no key 'nobody'");
   EXPECT_EQ(error([&] { open(text, {"a.b.c=1"}); }), "--set a.b.c: 'c' is looked for in '1', not in a map");
