@@ -104,7 +104,7 @@ TEST_P(BadGeometry, EdgeOnFacesGiveFiniteResults) {
   const GateSet gates(GateShape::truncated_gaussian(0.2, 0.4), {4.9, 5.6});
   const Shape& block = scene_.shapes[scene_.find_shape("block")];
   const Shape& light = scene_.shapes[scene_.find_shape("light")];
-  const Vec3 camera = scene_.camera.position;
+  const Vec3 camera = scene_.camera.position, look_at = scene_.camera.look_at;
   int places = 0, lit = 0;
   const auto check = [&](const char* what, const Vec3& position) {
     scene_.camera.position = position;
@@ -119,6 +119,19 @@ TEST_P(BadGeometry, EdgeOnFacesGiveFiniteResults) {
     top = std::max(top, scene_.positions[block.first_vertex + i].y);
   check("the plane of the block's top", {camera.x, top, camera.z});
   check("the plane of the light", {camera.x, scene_.positions[light.first_vertex].y, camera.z});
+  // An upright edge, from straight above: its direction and the ray's are the same numbers.
+  int upright = 0;
+  for (int i = 0; i < block.vertex_count; ++i)
+    for (int j = 0; j < block.vertex_count; ++j) {
+      const Vec3 low = scene_.positions[block.first_vertex + i],
+                 high = scene_.positions[block.first_vertex + j];
+      if (!(low.x == high.x && low.z == high.z && low.y < high.y)) continue;
+      scene_.camera.look_at = high + Vec3{0.05, 0, 0};
+      check("an upright edge from above", {high.x, high.y + 0.25, high.z});
+      ++upright;
+    }
+  EXPECT_EQ(upright, 4);
+  scene_.camera.look_at = look_at;
   for (const int t : {0, 3, 6}) {
     const auto& v = scene_.triangles[block.first_triangle + t].vertex;
     const Vec3 p = scene_.positions[v[0]], q = scene_.positions[v[1]], r = scene_.positions[v[2]];
