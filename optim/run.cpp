@@ -101,6 +101,8 @@ class Run {
                norm(now.gradient)};
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image);
+        if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
+          options_.warning("no light reaches the gates, neither at the target nor at the initial values");
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
