@@ -15,6 +15,7 @@ import matplotlib.pyplot as plt
 TITLES = {"image": "gated image", "interior": "interior derivative"}
 SCENES = {"cube": "glossy cube", "box": "diffuse box with shadows"}
 STYLES = {"standard": "C3o-", "ellipsoidal, uncoupled": "C1s-", "ellipsoidal, coupled pairs": "C0D-"}
+AUTOMATIC = {"automatic": "k.--"}
 
 
 def draw_growth(rows):
@@ -40,15 +41,15 @@ def draw_growth(rows):
 
 def draw_cost(rows):
     figure, axes = plt.subplots(len(SCENES), len(TITLES), figsize=(11, 8), sharex=True, constrained_layout=True)
-    figure.suptitle("What precision costs as gates get narrower (mean over the image; derivative by a vertical motion)")
+    figure.suptitle("What precision costs as gates get narrower (mean over pixels; derivative by a vertical motion)")
     for line, (scene, scene_title) in zip(axes, SCENES.items()):
         for axis, (quantity, title) in zip(line, TITLES.items()):
-            for method, style in STYLES.items():
+            for method, style in (STYLES | AUTOMATIC).items():
                 points = [(100 * float(r["relative_width"]), float(r["variance_seconds"])) for r in rows
                           if (r["scene"], r["quantity"], r["method"]) == (scene, quantity, method)]
                 # Without a derivative there is nothing to couple: one line for both ellipsoidal variants.
                 if points and not (quantity == "image" and method == "ellipsoidal, uncoupled"):
-                    label = "ellipsoidal" if quantity == "image" and method != "standard" else method
+                    label = "ellipsoidal" if quantity == "image" and "pairs" in method else method
                     axis.loglog(*zip(*points), style, markersize=5, label=label)
             axis.set_title(f"{scene_title}: {title}")
             axis.set_ylabel("variance x CPU seconds")
@@ -64,7 +65,7 @@ def main():
         sys.exit("usage: plot_gate_width.py CSV PNG")
     with open(sys.argv[1], newline="") as file:
         rows = list(csv.DictReader(file))
-    figure = draw_growth(rows) if "variance" in rows[0] else draw_cost(rows)
+    figure = draw_cost(rows) if "quantity" in rows[0] else draw_growth(rows)
     figure.savefig(sys.argv[2], dpi=90)
 
 

@@ -5,13 +5,21 @@
 namespace isochron {
 namespace {
 
-/// Outside of these widths, relative to the path length, one technique is far better in every scene measured.
-constexpr double kAlwaysConnect = 0.002, kNeverConnect = 0.5;
+/// Outside of these widths, relative to the path length, one technique is far better in every scene measured,
+/// and what standard sampling hardly ever hits looks too quiet in a trial.
+struct Doubtful {
+  double from, to;
+};
+constexpr Doubtful kImage{0.002, 0.1}, kInterior{0.008, 0.2};
+
 constexpr double kShares[] = {0, 0.3, 1};
-constexpr int kBatches = 12, kSamples = 4, kPixels = 256;
+constexpr int kSamples[] = {16, 8, 4};  ///< per pixel and batch, of each share: for about the same work
+constexpr int kBatches = 12, kPixels = 400;
 /// The combination must look this much better than either technique alone: trials are noisy, and what it can
 /// lose where it is not the best is more than what it can win.
-constexpr double kClearlyBetter = 0.7;
+constexpr double kClearlyBetter = 0.75;
+/// Small images have large pixels, which flatter connections from the camera (measured on the cube).
+constexpr double kLargePixels = 0.8;
 
 /// The camera's image in fewer pixels.
 Scene reduced(const Scene& scene) {
@@ -46,10 +54,10 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
 
 /// Sum over pixels and gates of the variance between batches of images, times the work behind them.
 template <class Estimate>
-double variance_and_work(const Renderer& renderer, Estimate&& estimate) {
+double variance_and_work(const Renderer& renderer, int samples, Estimate&& estimate) {
   std::vector<double> mean, squares;
   for (int b = 0; b < kBatches; ++b) {
-    const GatedImage image = estimate(SampleRange{b * kSamples, (b + 1) * kSamples});
+    const GatedImage image = estimate(SampleRange{b * samples, (b + 1) * samples});
     mean.resize(image.data.size());
     squares.resize(image.data.size());
     for (std::size_t i = 0; i < image.data.size(); ++i) {
@@ -60,7 +68,7 @@ double variance_and_work(const Renderer& renderer, Estimate&& estimate) {
   }
   double sum = 0;
   for (double s : squares) sum += s;
-  return sum * static_cast<double>(renderer.work());
+  return sum * renderer.work();
 }
 
 }  // namespace
@@ -68,29 +76,33 @@ double variance_and_work(const Renderer& renderer, Estimate&& estimate) {
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
                         const TangentBasis* basis, const Stream& stream) {
   const double width = gates.relative_width();
-  if (options.sampling == Sampling::standard || width > kNeverConnect) return {0, 0};
-  if (options.sampling == Sampling::ellipsoidal || width < kAlwaysConnect) return {1, 1};
+  if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
+  if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   const Scene small = reduced(scene);
-  const TangentBasis one = combined(basis ? *basis : TangentBasis{}, stream);
-  const auto choose = [&](const TangentBasis* moving, auto&& estimate) {
+  const auto choose = [&](const Doubtful& widths, const TangentBasis* moving, auto&& estimate) -> double {
+    if (width < widths.from) return 1;
+    if (width > widths.to) return 0;
     double cost[3];
     for (int i = 0; i < 3; ++i) {
       EstimatorOptions trial = options;
       trial.mix = SamplingMix{kShares[i], kShares[i]};
       const Renderer renderer(small, gates, trial, moving);
-      cost[i] = variance_and_work(renderer, [&](SampleRange range) { return estimate(renderer, range); });
+      cost[i] = variance_and_work(renderer, kSamples[i],
+                                  [&](SampleRange range) { return estimate(renderer, range); });
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
-    const int alone = cost[0] <= cost[2] ? 0 : 2;
+    const int alone = kLargePixels * cost[0] <= cost[2] ? 0 : 2;
     return kShares[cost[1] < kClearlyBetter * cost[alone] ? 1 : alone];
   };
   SamplingMix best;
-  best.image = choose(nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
-  if (basis && basis->columns > 0)
-    best.interior = choose(&one, [&](const Renderer& r, SampleRange range) {
-      return r.derive(Term::interior, stream, range)[0];
-    });
+  best.image =
+      choose(kImage, nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
+  if (!basis || basis->columns == 0) return best;
+  const TangentBasis one = combined(*basis, stream);
+  best.interior = choose(kInterior, &one, [&](const Renderer& r, SampleRange range) {
+    return r.derive(Term::interior, stream, range)[0];
+  });
   return best;
 }
 

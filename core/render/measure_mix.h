@@ -4,9 +4,9 @@
 
 namespace isochron {
 
-/// The mix of techniques with the least variance x work, found by rendering small images (at most 256 pixels,
-/// 32 samples each), and, where `basis` has columns, the interior term of the derivative along a random
-/// combination of them. Depends on the arguments alone. Gates much wider or narrower than where the
+/// The mix of techniques with the least variance x work, found by rendering small images (at most 400 pixels,
+/// 48 to 192 samples each), and, where `basis` has columns, the interior term of the derivative along a
+/// random combination of them. Depends on the arguments alone. Gates much wider or narrower than where the
 /// techniques cross need no trial; other sampling than automatic none either.
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
                         const TangentBasis* basis, const Stream& stream);

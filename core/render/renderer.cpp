@@ -237,7 +237,7 @@ Renderer::~Renderer() = default;
 
 const SamplingMix& Renderer::mix() const { return impl_->mix; }
 long long Renderer::rays() const { return impl_->rays; }
-long long Renderer::work() const { return impl_->rays + impl_->arcs; }
+double Renderer::work() const { return isochron::work(impl_->rays, impl_->arcs); }
 
 GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   GatedImage image = impl_->blank();

@@ -33,8 +33,7 @@ struct Worker {
         sink(std::move(target)),
         path(estimator.max_bounces) {}
 
-  /// Rays and arcs, which cost about the same.
-  double work() const { return static_cast<double>(rays + arcs); }
+  double work() const { return isochron::work(rays, arcs); }
 
   bool visible(const SurfacePoint& x, const SurfacePoint& y) {
     ++rays;

@@ -1,14 +1,15 @@
 // Cost of one unit of precision against gate width: isochron_gate_width cost CSV [BATCHES]. For the cube of
 // experiments/cube.yaml (direct light dominates) and the reference box (diffuse, with shadow edges), gaussian gates
-// from 10 % to 0.1 % of the path: variance of the mean image or of its derivative by a vertical motion, times the CPU
-// seconds spent. Lower is better; standard against ellipsoidal sampling,
-// coupled and uncoupled.
+// from the whole path length to 1e-4 of it: variance of a pixel of the image, or of its derivative by a vertical motion,
+// averaged over pixels, times the CPU seconds spent. Lower is better; standard against ellipsoidal sampling, coupled and
+// uncoupled, and what automatic sampling makes of them (its trial, once per scene and gates, not counted).
 //
 // Growth of the derivative's variance: isochron_gate_width growth CSV [BATCHES]. For a floor under a lamp, with and
 // without a shadow on it, widths from 1 to 1e-5 of the path; variance per camera path.
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/render/measure_mix.h"
 #include "tests/benchmark/measure/cpu_time.h"
 #include "tests/render/support.h"
 #include "tests/render/width_growth.h"
@@ -33,38 +34,64 @@ struct Method {
   bool antithetic;
 };
 
+/// Variance of a pixel's mean over all batches, averaged over pixels, and the average pixel.
+struct PixelEstimate {
+  double mean = 0, variance = 0;
+};
+
+template <class Image>
+PixelEstimate pixel_estimate(int samples, int batches, Image&& image) {
+  std::vector<testing::Batches> pixels;
+  for (int b = 0; b < batches; ++b) {
+    const GatedImage batch = image(SampleRange{b * samples, (b + 1) * samples});
+    pixels.resize(batch.data.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i].add(batch.data[i]);
+  }
+  PixelEstimate result;
+  for (const testing::Batches& pixel : pixels) {
+    const Estimate e = pixel.estimate();
+    result.mean += e.mean / pixels.size();
+    result.variance += e.standard_error * e.standard_error / pixels.size();
+  }
+  return result;
+}
+
 void measure(const Setting& setting, int batches, std::FILE* csv) {
   const Scene scene = load_scene(setting.file);
   const TangentBasis basis = testing::make_basis(scene, {testing::translate(scene, setting.moving, {0, 1, 0})});
-  for (const double width : {0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001}) {
+  for (const double width : {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 3e-4, 1e-4}) {
     const GateSet gates(GateShape::gaussian(width * setting.center), {setting.center});
-    for (const Method& method : {Method{"standard", Sampling::standard, true},
-                                 Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
-                                 Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true}}) {
+    for (const Method& method :
+         {Method{"standard", Sampling::standard, true}, Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
+          Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true},
+          Method{"automatic", Sampling::automatic, true}}) {
       EstimatorOptions options;
       options.max_bounces = setting.max_bounces;
       options.sampling = method.sampling;
       options.antithetic = method.antithetic;
+      const SamplingMix mix = measure_mix(scene, gates, options, &basis, {2, 0, 0});
+      options.mix = mix;
       const Renderer renderer(scene, gates, options, &basis);
-      const int samples = method.sampling == Sampling::standard ? setting.samples : (setting.samples + 3) / 4;
-      const auto report = [&](const char* quantity, auto&& estimate) {
+      const auto report = [&](const char* quantity, double share, auto&& image) {
+        const int samples = share < 1 ? setting.samples : (setting.samples + 3) / 4;
         const double start = cpu_seconds();
-        const Estimate e = estimate();
-        const double cost = e.standard_error * e.standard_error * (cpu_seconds() - start);
-        std::fprintf(csv, "%s,%g,\"%s\",%s,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity, e.mean,
-                     e.standard_error, cost);
-        std::printf("%-5s %6g  %-28s %-9s mean % .4e +- %.1e   variance x seconds %.2e\n", setting.name, width,
-                    method.name, quantity, e.mean, e.standard_error, cost);
+        const PixelEstimate e = pixel_estimate(samples, batches, image);
+        const double cost = e.variance * (cpu_seconds() - start);
+        std::fprintf(csv, "%s,%g,\"%s\",%s,%g,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity, share,
+                     e.mean, e.variance, cost);
+        std::printf("%-5s %6g  %-28s %-9s share %-4g mean % .4e   variance x seconds %.2e\n", setting.name, width,
+                    method.name, quantity, share, e.mean, cost);
+        std::fflush(stdout);
       };
-      report("image", [&] { return testing::image_means(renderer, 1, samples, batches, {1, 0, 0})[0]; });
-      report("interior",
-             [&] { return testing::term_means(renderer, Term::interior, 1, 1, samples, batches, {1, 0, 0})[0][0]; });
+      report("image", mix.image, [&](SampleRange range) { return renderer.render({1, 0, 0}, range); });
+      report("interior", mix.interior,
+             [&](SampleRange range) { return renderer.derive(Term::interior, {1, 0, 1}, range)[0]; });
     }
   }
 }
 
 void measure_cost(int batches, std::FILE* csv) {
-  std::fprintf(csv, "scene,relative_width,method,quantity,mean,standard_error,variance_seconds\n");
+  std::fprintf(csv, "scene,relative_width,method,quantity,ellipsoidal_share,mean,variance,variance_seconds\n");
   measure({"cube", PROJECT_ROOT "/scenes/cube/scene.yaml", "cube", 5.4, 4, 4}, batches, csv);
   measure({"box", PROJECT_ROOT "/tests/data/reference/scene.yaml", "block", 6.0, 3, 16}, batches, csv);
 }
