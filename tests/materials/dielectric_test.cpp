@@ -8,6 +8,7 @@
 
 #include "core/materials/material.h"
 #include "core/math/random.h"
+#include "tests/materials/chi_square.h"
 #include "tests/materials/walter.h"
 
 namespace isochron {
@@ -117,12 +118,7 @@ TEST(DielectricLobe, ReciprocalUpToTheSquaredIndex) {
   }
 }
 
-constexpr int kSide = 16, kHalf = kSide * kSide, kSamples = 60000;
-
-int bin(double u, double phi) {
-  const double v = phi / kTwoPi - std::floor(phi / kTwoPi);
-  return std::min(static_cast<int>(u * kSide), kSide - 1) * kSide + std::min(static_cast<int>(v * kSide), kSide - 1);
-}
+constexpr int kHalf = kSide * kSide;
 
 /// The half vector's slope over alpha, as 1 / sqrt(1 + slope^2), and its azimuth: reflections first, then refractions.
 int bin_of(const Vec3& i, const Vec3& o, double m, double alpha) {
@@ -130,29 +126,6 @@ int bin_of(const Vec3& i, const Vec3& o, double m, double alpha) {
   if (h.z < 0) h = -h;
   const double slope2 = (h.x * h.x + h.y * h.y) / (h.z * h.z * alpha * alpha);
   return (i.z > 0 ? 0 : kHalf) + bin(1 / std::sqrt(1 + slope2), std::atan2(h.y, h.x));
-}
-
-double chi_square_z(const std::vector<int>& counts, const std::vector<double>& probability) {
-  double chi2 = 0, pooled_expected = 0, pooled_count = 0;
-  int bins = 0;
-  const auto add = [&](double count, double expected) {
-    chi2 += (count - expected) * (count - expected) / expected;
-    ++bins;
-  };
-  for (std::size_t k = 0; k < counts.size(); ++k) {
-    const double expected = probability[k] * kSamples;
-    if (expected >= 10) {
-      add(counts[k], expected);
-    } else {
-      pooled_expected += expected;
-      pooled_count += counts[k];
-    }
-  }
-  if (pooled_expected >= 10) add(pooled_count, pooled_expected);
-  if (pooled_expected < 10) {
-    EXPECT_LT(pooled_count, 40);
-  }
-  return (chi2 - (bins - 1)) / std::sqrt(2.0 * (bins - 1));
 }
 
 // Every visible microfacet reflects or refracts. What stays on its side of the surface has the density of

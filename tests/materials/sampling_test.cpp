@@ -7,6 +7,7 @@
 
 #include "core/materials/material.h"
 #include "core/math/random.h"
+#include "tests/materials/chi_square.h"
 
 namespace isochron {
 namespace {
@@ -30,39 +31,6 @@ struct Frame {
 
 Vec3 tilted(double theta) {
   return {std::sin(theta) * std::cos(0.4), std::sin(theta) * std::sin(0.4), std::cos(theta)};
-}
-
-constexpr int kSide = 16, kSamples = 60000;
-
-int bin(double u, double phi) {
-  const double v = phi / kTwoPi - std::floor(phi / kTwoPi);
-  return std::min(static_cast<int>(u * kSide), kSide - 1) * kSide +
-         std::min(static_cast<int>(v * kSide), kSide - 1);
-}
-
-/// z of the chi-square of counts (the last bin holds the empty draws) against probabilities; thin bins are
-/// pooled.
-double chi_square_z(const std::vector<int>& counts, const std::vector<double>& probability) {
-  double chi2 = 0, pooled_expected = 0, pooled_count = 0;
-  int bins = 0;
-  const auto add = [&](double count, double expected) {
-    chi2 += (count - expected) * (count - expected) / expected;
-    ++bins;
-  };
-  for (std::size_t k = 0; k < counts.size(); ++k) {
-    const double expected = probability[k] * kSamples;
-    if (expected >= 10) {
-      add(counts[k], expected);
-    } else {
-      pooled_expected += expected;
-      pooled_count += counts[k];
-    }
-  }
-  if (pooled_expected >= 10) add(pooled_count, pooled_expected);
-  if (pooled_expected < 10) {
-    EXPECT_LT(pooled_count, 40);
-  }
-  return (chi2 - (bins - 1)) / std::sqrt(2.0 * (bins - 1));
 }
 
 // Bins in the half vector's slope, g = 1 / sqrt(1 + r^2) with r = tan(theta_h) / alpha, so that no lobe is
