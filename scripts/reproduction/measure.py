@@ -1,0 +1,122 @@
+"""Runs an experiment under measurement and keeps the numbers of every run."""
+
+import csv
+import os
+import pathlib
+import subprocess
+import time
+from dataclasses import asdict, dataclass, fields
+
+import yaml
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = os.environ.get("ISOCHRON_PROGRAM", ROOT / "build/isochron")
+
+
+class Failure(Exception):
+    """Why an experiment could not be run, in one line."""
+
+
+@dataclass
+class Run:
+    """One row of experiments/measured/reconstructions/NAME.csv."""
+
+    seed: int
+    status: str  # see the README
+    unknowns: int
+    iterations: int
+    error_percent: float  # distance of the parameters to their targets at the end, in % of that at the start
+    image_rmse_initial: float
+    image_rmse_final: float
+    seconds: float  # wall, of the whole run, the target's images included
+    cpu_seconds: float  # user and system, the same
+    iteration_seconds: float  # wall, of one iteration
+    iteration_cpu_seconds: float
+    peak_mib: float  # resident memory
+
+
+@dataclass
+class Usage:
+    """What processes took, one after the other."""
+
+    seconds: float = 0
+    cpu_seconds: float = 0
+    peak_mib: float = 0
+
+    def __add__(self, other):
+        return Usage(self.seconds + other.seconds, self.cpu_seconds + other.cpu_seconds, max(self.peak_mib, other.peak_mib))
+
+
+def program(*arguments):
+    """Runs PROGRAM and returns its Usage. A run that diverges fails, but leaves its summary: that is a result."""
+    words = [str(PROGRAM), *map(str, arguments), "--quiet", "--no-plots"]
+    start = time.monotonic()
+    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    complaint = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode != 0 and "the run diverged" not in complaint:
+        raise Failure(f"isochron {' '.join(words[1:])}: {complaint.strip() or f'status {process.returncode}'}")
+    return Usage(time.monotonic() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+
+
+def summary(folder):
+    return yaml.safe_load((folder / "summary.yaml").read_text(encoding="utf-8"))
+
+
+def values(folder):
+    """Unknown -> value, as the folder's summary has them."""
+    out = {}
+    for name, value in summary(folder)["parameters"].items():
+        out.update({f"{name}[{i}]": v for i, v in enumerate(value)} if isinstance(value, list) else {name: value})
+    return out
+
+
+def go_on(folder, iterations):
+    """Resumes a run up to so many iterations in all."""
+    file = folder / "experiment.yaml"
+    experiment = yaml.safe_load(file.read_text(encoding="utf-8"))
+    experiment["optimizer"]["iterations"] = iterations
+    file.write_text(yaml.safe_dump(experiment, sort_keys=False), encoding="utf-8")
+    return program("resume", folder)
+
+
+def run(name, seed, folder, iterations=None, samples=None):
+    """Runs an experiment in three stages, each going on from the one before: the target's images, half of the
+    iterations, the other half; the result is that of a run in one piece, bit for bit. `iterations` and `samples` take the
+    place of the experiment's own. Returns the Run and the parameters halfway."""
+    file = ROOT / f"experiments/{name}.yaml"
+    iterations = iterations or yaml.safe_load(file.read_text(encoding="utf-8"))["optimizer"]["iterations"]
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    fewer = ("--samples", samples, "--set", f"target.samples={4 * samples}") if samples else ()
+    before = program("run", file, "-o", folder, "--force", "--seed", seed, "--set", "optimizer.iterations=0", *fewer)
+    optimisation = go_on(folder, iterations // 2)
+    halfway = values(folder)
+    optimisation += go_on(folder, iterations)
+    whole, end = before + optimisation, summary(folder)
+    done = max(end["iterations"], 1)
+    result = Run(seed, end["status"], len(halfway), end["iterations"],
+                 100 * end["param_rmse_final"] / end["param_rmse_initial"], end["image_rmse_initial"],
+                 end["image_rmse_final"], whole.seconds, whole.cpu_seconds, optimisation.seconds / done,
+                 optimisation.cpu_seconds / done, whole.peak_mib)
+    return result, halfway
+
+
+def load(file):
+    """The runs of a CSV; none where there is no such file."""
+    if not file.exists():
+        return []
+    with open(file, encoding="ascii", newline="") as lines:
+        return [Run(**{f.name: f.type(row[f.name]) for f in fields(Run)}) for row in csv.DictReader(lines)]
+
+
+def store(file, runs):
+    """Writes the CSV atomically. Times are rounded to what a noisy machine can tell."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    temporary = file.with_name(file.name + ".tmp")
+    with open(temporary, "w", encoding="ascii", newline="") as out:
+        table = csv.writer(out, lineterminator="\n")
+        table.writerow([f.name for f in fields(Run)])
+        for run_ in runs:
+            table.writerow([f"{x:.5g}" if isinstance(x, float) else x for x in asdict(run_).values()])
+    os.replace(temporary, file)

@@ -1,0 +1,57 @@
+"""experiments/RESULTS.md: a table of the measured runs beside the paper's Table 2, and the pictures."""
+
+import os
+
+from .catalogue import PAPER_CORES, RECONSTRUCTIONS
+from .measure import load
+
+HEADER = f"""\
+# Reconstructions
+
+Written by `scripts/reproduce`, which repeats the runs below and draws the pictures. The paper's figures are of scenes that
+it describes in words alone; ours are built after them (`scripts/scenes`). Its times are those of its Table 2 and captions,
+on {PAPER_CORES} vCPU; ours were measured on two cores, and core-seconds are CPU time. Errors are the distance of the parameters
+to their targets at the end, in % of that at the start, a run per seed; times are medians over the seeds.
+"""
+
+TABLE = """
+| | figure | unknowns | iterations, paper | s / iteration, paper | core-s / iteration, paper | ratio | error, % | run, s | limit, s | MiB |
+|---|---|---|---|---|---|---|---|---|---|---|
+"""
+
+PICTURE = """
+From the left: images through four gates (path length at the centre) at the start, halfway, at the end and at the target;
+derivatives by one unknown, red above zero; RMSE. A gate has one exposure in all states. Pictures are of the first seed,
+rendered anew with more pixels and samples than the optimisation takes.
+"""
+
+
+def _median(values):
+    values = sorted(values)
+    middle = len(values) // 2
+    return values[middle] if len(values) % 2 else 0.5 * (values[middle - 1] + values[middle])
+
+
+def _row(name, entry, runs):
+    middle = lambda field: _median([getattr(r, field) for r in runs])
+    cores, paper = middle("iteration_cpu_seconds"), entry.paper_core_seconds
+    errors = ", ".join(f"{r.error_percent:.2g}" + ("" if r.status == "iterations_reached" else f" ({r.status})") for r in runs)
+    cells = [f"`{name}`", entry.figure, runs[0].unknowns, f"{runs[0].iterations}, {entry.paper_iterations}",
+             f"{middle('iteration_seconds'):.2g}, {entry.paper_seconds:.3g}", f"{cores:.2g}, {paper:.3g}",
+             f"1/{paper / cores:.0f}", errors, f"{middle('seconds'):.0f}", f"{entry.most_seconds:.0f}" if entry.most_seconds else "",
+             f"{max(r.peak_mib for r in runs):.0f}"]
+    return "| " + " | ".join(map(str, cells)) + " |\n"
+
+
+def write(experiments):
+    """From what experiments/measured/reconstructions and experiments/figures hold."""
+    runs = {name: load(experiments / f"measured/reconstructions/{name}.csv") for name in RECONSTRUCTIONS}
+    text = HEADER
+    for title, counterparts in (("", False), ("\n## Counterparts\n\nOne setting is changed, and they should fail.\n", True)):
+        rows = [_row(n, e, runs[n]) for n, e in RECONSTRUCTIONS.items() if runs[n] and bool(e.counterpart_of) == counterparts]
+        text += title + TABLE + "".join(rows) if rows else ""
+    drawn = [n for n in RECONSTRUCTIONS if (experiments / f"figures/{n}.png").exists()]
+    text += "\n## Pictures\n" + PICTURE + "".join(f"\n`{n}`\n\n![{n}](figures/{n}.png)\n" for n in drawn) if drawn else ""
+    temporary = experiments / "RESULTS.md.tmp"
+    temporary.write_text(text, encoding="utf-8")
+    os.replace(temporary, experiments / "RESULTS.md")
