@@ -7,13 +7,14 @@ namespace {
 
 class Adam : public Optimizer {
  public:
-  Adam(double learning_rate, const Preconditioner& preconditioner)
-      : learning_rate_(learning_rate), preconditioner_(preconditioner) {}
+  Adam(double learning_rate, const Preconditioner& preconditioner, const RateDecay& decay)
+      : learning_rate_(learning_rate), preconditioner_(preconditioner), decay_(decay) {}
 
   std::vector<double> step(const Objective& objective, const Evaluation& now,
-                           const std::vector<double>& theta, std::uint32_t, double rate) override {
+                           const std::vector<double>& theta, std::uint32_t iteration, double rate) override {
     std::vector<double> next = theta;
-    adam_step({.learning_rate = learning_rate_ * rate}, now.gradient, objective.lower(), objective.upper(),
+    const double factor = rate * decay_.factor(static_cast<int>(iteration));
+    adam_step({.learning_rate = learning_rate_ * factor}, now.gradient, objective.lower(), objective.upper(),
               state_, next, preconditioner_);
     return next;
   }
@@ -28,13 +29,15 @@ class Adam : public Optimizer {
  private:
   double learning_rate_;
   const Preconditioner& preconditioner_;
+  RateDecay decay_;
   AdamState state_;
 };
 
 }  // namespace
 
-std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner& preconditioner) {
-  return std::make_unique<Adam>(learning_rate, preconditioner);
+std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner& preconditioner,
+                                     const RateDecay& decay) {
+  return std::make_unique<Adam>(learning_rate, preconditioner, decay);
 }
 
 }  // namespace isochron

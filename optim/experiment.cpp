@@ -257,6 +257,15 @@ OptimizerSpec read_optimizer(const YamlValue& value) {
     optimizer.stop_window = static_cast<int>(stop.require("window").integer(2, 100000));
     stop.reject_unknown();
   }
+  if (optimizer.method == OptimizerMethod::adam) {
+    if (const auto decay_value = map.find("decay")) {
+      YamlMap decay = decay_value->map();
+      optimizer.decay.half_life = decay.require("half_life").number(NumberRange::positive());
+      if (const auto start = decay.find("start"))
+        optimizer.decay.start = static_cast<int>(start->integer(0, kMostIterations));
+      decay.reject_unknown();
+    }
+  }
   if (optimizer.method == OptimizerMethod::lbfgs)
     if (const auto inner = map.find("inner_iterations"))
       optimizer.inner_iterations = static_cast<int>(inner->integer(1, 1000));

@@ -7,11 +7,13 @@
 //   estimator: sampling auto, antithetic true, guiding true
 //   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter)
 //   loss: kind squared                (huber, cauchy: scale 1)
-//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; lbfgs: inner_iterations 5
+//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);
+//     lbfgs: inner_iterations 5
 //   target: samples 4096, seed 7, max_bounces as above, noise none     seed 1
 //   resolution: the camera's
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -121,6 +123,15 @@ struct LossSpec {
 enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
 const char* name(OptimizerMethod method);
 
+/// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
+struct RateDecay {
+  int start = 0;
+  double half_life = 0;  ///< 0: steps do not shrink
+  double factor(int iteration) const {
+    return half_life > 0 && iteration > start ? std::exp2((start - iteration) / half_life) : 1;
+  }
+};
+
 struct OptimizerSpec {
   OptimizerMethod method = OptimizerMethod::adam;
   /// adam: units of the parameter per iteration. lbfgs: length of the first trial step, same unit.
@@ -129,6 +140,7 @@ struct OptimizerSpec {
   int iterations = 100;
   double tolerance = 0;  ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
   int stop_window = 0;   ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
+  RateDecay decay;           ///< adam
   int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
 };
 

@@ -125,6 +125,8 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   fmt::format_to(out, "optimizer:\n  method: {}\n  learning_rate: {}\n  iterations: {}\n  tolerance: {}\n",
                  name(optimizer.method), optimizer.learning_rate, optimizer.iterations, optimizer.tolerance);
   if (optimizer.stop_window > 0) fmt::format_to(out, "  stop: {{window: {}}}\n", optimizer.stop_window);
+  if (optimizer.decay.half_life > 0)
+    fmt::format_to(out, "  decay: {{start: {}, half_life: {}}}\n", optimizer.decay.start, optimizer.decay.half_life);
   if (optimizer.method == OptimizerMethod::lbfgs)
     fmt::format_to(out, "  inner_iterations: {}\n", optimizer.inner_iterations);
   fmt::format_to(out, "seed: {}\n", e.seed);

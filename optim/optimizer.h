@@ -35,7 +35,8 @@ class Optimizer {
 };
 
 /// Adam (adam.h). The preconditioner must outlive it.
-std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner& preconditioner);
+std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner& preconditioner,
+                                     const RateDecay& decay = {});
 
 /// L-BFGS of Ceres. One iteration makes up to `inner_iterations` steps, each with a line search (strong Wolfe
 /// conditions), all on the random numbers of that iteration; the pairs that approximate the curvature are

@@ -92,6 +92,10 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "10:63: optimizer.inner_iterations: is not a known key"},
       {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, inner_iterations: 0",
        "10:46: optimizer.inner_iterations: 0 is out of range"},
+      {"iterations: 6", "decay: {start: 5}", "10:55: optimizer.decay.half_life: is missing"},
+      {"iterations: 6", "decay: {half_life: 0}", "10:67: optimizer.decay.half_life: 0 is out of range (a number above 0)"},
+      {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, decay: {half_life: 5}",
+       "10:28: optimizer.decay: is not a known key"},
       {"iterations: 6", "stop: {window: 1}", "10:63: optimizer.stop.window: 1 is out of range"},
       {"seed: 7}", "seed: 7, noise: {photons: -1}}", "8:49: target.noise.photons: -1 is out of range"},
       {"seed: 3", "loss: {kind: absolute}",
@@ -265,6 +269,11 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.parameters[2].selection.max, (Vec3{0, 1, 0.1}));
     EXPECT_EQ(back.parameters[3].selection.indices, (std::vector<int>{2, 0}));
     EXPECT_EQ(back.parameters[4].material, "metal");
+    const std::string decaying = replaced(text, "method: lbfgs, inner_iterations: 3", "decay: {start: 20, half_life: 12.5}");
+    const Experiment adam = load_experiment(folder.write("adam.yaml", decaying));
+    const Experiment again = load_experiment(folder.write("runs/deep/adam.yaml", resolved_yaml(adam, out)));
+    EXPECT_EQ(again.optimizer.decay.start, 20);
+    EXPECT_EQ(again.optimizer.decay.half_life, 12.5);
   }
 }
 

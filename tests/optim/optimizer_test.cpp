@@ -10,6 +10,8 @@
 #include "optim/checkpoint.h"
 #include "optim/log.h"
 #include "optim/loss.h"
+#include "optim/optimizer.h"
+#include "tests/optim/synthetic_objective.h"
 #include "tests/optim/temporary_folder.h"
 
 namespace isochron {
@@ -31,6 +33,23 @@ TEST(Adam, FollowsTheHandComputedSequence) {
   adam_step(options, {1.0}, {-kInfinity}, {kInfinity}, state, theta);
   EXPECT_NEAR(theta[0], before - 0.1 * (0.244 / 0.271) / std::sqrt(0.020964016 / 0.002997001), 1e-14);
   EXPECT_EQ(state.steps, 3);
+}
+
+TEST(Adam, StepsHalveAsTheDecayAsks) {
+  // Under a constant gradient every step of Adam is its rate.
+  ExponentialFit unused;
+  Evaluation now;
+  now.gradient = {3.0, -3.0};
+  const Preconditioner none;
+  const auto adam = make_adam(0.5, none, {.start = 2, .half_life = 1});
+  std::vector<double> theta = {0, 0};
+  const double expected[] = {0.5, 0.5, 0.5, 0.25, 0.125, 0.0625};
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    const std::vector<double> before = theta;
+    theta = adam->step(unused, now, theta, i, 1);
+    EXPECT_NEAR(before[0] - theta[0], expected[i], 1e-12) << i;
+    EXPECT_NEAR(theta[1] - before[1], expected[i], 1e-12) << i;
+  }
 }
 
 TEST(Adam, StaysWithinBoundsAndDoesNotDependOnTheLossesUnit) {

@@ -1,0 +1,85 @@
+#!/usr/bin/python3
+"""What photon noise in the target does to reconstructions: error at the end against the number of photons.
+
+    scripts/photon_noise.py measure CSV [NAME...]   some minutes; rows of other experiments stay
+    scripts/photon_noise.py plot CSV PNG
+
+For every experiment, count and draw of the noise: a run shortened as `SHORT` says, and its error at the end in % of the
+initial one. Photons are counted per pixel and colour, on average over the brightest gate; 0 stands for no noise.
+"""
+
+import csv
+import pathlib
+import sys
+import tempfile
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from reproduction.measure import ROOT, program, summary
+
+PHOTONS = (100, 1000, 10_000, 100_000, 1_000_000, 0)
+DRAWS = 3
+SHORT = {
+    "corridor": ("optimizer={method: adam, learning_rate: 0.012, iterations: 100, decay: {start: 50, half_life: 15}}",
+                 "samples={primal: 4096, interior: 2048, visibility: 256, path_length: 0}", "target.samples=131072"),
+}
+COLUMNS = ("experiment", "photons", "draw", "error_percent")
+
+
+def measure(file, names):
+    rows = []
+    if file.exists():
+        with open(file, encoding="ascii", newline="") as lines:
+            rows = [tuple(r[c] for c in COLUMNS) for r in csv.DictReader(lines) if r["experiment"] not in names]
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary) / "run"
+        for name in names:
+            for photons in PHOTONS:
+                for draw in range(1, DRAWS + 1):
+                    # The target's seed draws the photons; the optimisation has other random numbers each time, too.
+                    settings = [*SHORT[name], f"target.seed={100 + draw}"] + [f"target.noise.photons={photons}"] * (photons > 0)
+                    words = [word for setting in settings for word in ("--set", setting)]
+                    program("run", ROOT / f"experiments/{name}.yaml", "-o", folder, "--force", "--seed", draw, *words)
+                    end = summary(folder)
+                    error = 100 * end["param_rmse_final"] / end["param_rmse_initial"]
+                    rows.append((name, photons, draw, f"{error:.4g}"))
+                    print(*rows[-1], flush=True)
+    with open(file, "w", encoding="ascii", newline="") as out:
+        csv.writer(out, lineterminator="\n").writerows([COLUMNS, *sorted(rows, key=lambda r: r[0])])
+
+
+def plot(file, picture):
+    with open(file, encoding="ascii", newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+    for color, name in zip(("C0", "C3"), dict.fromkeys(r["experiment"] for r in rows)):
+        points = [(int(r["photons"]), float(r["error_percent"])) for r in rows if r["experiment"] == name]
+        counts = sorted({p for p, _ in points if p})
+        middle = [sorted(e for p, e in points if p == count)[DRAWS // 2] for count in counts]
+        axes.loglog(*zip(*(q for q in points if q[0])), ".", color=color, alpha=0.5)
+        axes.loglog(counts, middle, "-", color=color, label=f"{name}, median")
+        clean = sorted(e for p, e in points if not p)[DRAWS // 2]
+        axes.axhline(clean, color=color, ls=":", lw=1, label=f"{name}, no noise")
+    axes.set_xlabel("photons per pixel and colour in the brightest gate")
+    axes.set_ylabel("error at the end, % of the initial one")
+    axes.grid(True, which="both", lw=0.4, alpha=0.4)
+    axes.legend(fontsize=8)
+    figure.savefig(picture, dpi=90)
+
+
+def main(arguments):
+    if len(arguments) >= 2 and arguments[0] == "measure" and set(arguments[2:]) <= set(SHORT):
+        measure(pathlib.Path(arguments[1]), arguments[2:] or list(SHORT))
+    elif len(arguments) == 3 and arguments[0] == "plot":
+        plot(arguments[1], arguments[2])
+    else:
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
