@@ -362,6 +362,7 @@ class EllipsoidalConnections {
     } else if (!target.pair) {
       worker_.emit(worker_.path, pixel, value, target.tau[0], pass_.use);
     } else if constexpr (Sink::kDifferential) {
+      note_path(worker_.sink, worker_.path);
       differentiate_path(scene_, worker_.path.vertex.data(), worker_.path.size(), true, worker_.differential);
       if (worker_.differential.empty()) return;
       worker_.sink.bind(worker_.differential);

@@ -87,8 +87,10 @@ class PrimaryBoundary {
       const double before = length(x1->p - eye.p) * scene_.index_between(eye, *x1);
       Rng walk_rng = shared;
       for (const GatheredLight& light :
-           light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng))
+           light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng)) {
+        note_boundary(worker_.sink, light.bounces, *edge);
         worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, kValueOnly);
+      }
     }
     note_guide(worker_.sink, table, x);
   }

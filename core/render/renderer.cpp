@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "core/render/ellipsoidal.h"
+#include "core/render/ledger.h"
 #include "core/render/primary_boundary.h"
 #include "core/render/secondary_boundary.h"
 
@@ -235,6 +236,7 @@ Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOpti
     : impl_(std::make_unique<Impl>(scene, gates, options, basis)) {}
 Renderer::~Renderer() = default;
 
+bool Renderer::has(Term term) const { return impl_->has(term); }
 const SamplingMix& Renderer::mix() const { return impl_->mix; }
 long long Renderer::rays() const { return impl_->rays; }
 double Renderer::work() const { return isochron::work(impl_->rays, impl_->arcs); }
@@ -304,6 +306,74 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   std::vector<double> sum(dofs.size(), 0.0);
   merge(gradients, sum);
   for (std::size_t i = 0; i < dofs.size(); ++i) dof_gradient[dofs[i]] += sum[i];
+}
+
+ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) const {
+  const Impl& impl = *impl_;
+  ImageLedger sum;
+  const GatedImage shape = impl.blank();
+  sum.image = GatedImage(shape.width, shape.height, shape.gates * (impl.options.max_bounces + 1), shape.channels);
+  sum.by_shape.assign(impl.scene.scene.shapes.size(), 0.0);
+  if (impl.scene.emitters.empty()) return sum;
+  const ImageLedger blank = sum;
+  const int strands = strand_count(sum.image.data.size());
+  std::vector<std::vector<double>> films(strands), shapes(strands);
+  parallel(strands, [&](int strand) {
+    ImageLedger own = blank;
+    Worker worker(impl.scene, impl.gates, impl.options, impl.every_gate, ImageLedgerSink(impl.scene, impl.gates, own));
+    GatePass pass;
+    pass.value = true;
+    impl.run_paths(worker, impl.mix.image, pass, strand, strands, stream, range);
+    films[strand] = std::move(own.image.data);
+    shapes[strand] = std::move(own.by_shape);
+  });
+  merge(films, sum.image.data);
+  merge(shapes, sum.by_shape);
+  return sum;
+}
+
+GradientLedger Renderer::gradient_ledger(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
+                                         SampleRange range) const {
+  const Impl& impl = *impl_;
+  if (!impl.basis) throw std::logic_error("gradient_ledger: the renderer was made without a tangent basis");
+  const std::size_t entries = adjoints[0].data.size(), count = adjoints.size();
+  GradientLedger sum;
+  sum.adjoints = static_cast<int>(count);
+  sum.columns = impl.basis->columns;
+  const std::size_t columns = sum.columns;
+  sum.by_bounces.assign((impl.options.max_bounces + 1) * columns * count, 0.0);
+  sum.by_gate.assign(impl.gates.size() * columns, 0.0);
+  sum.by_shape.assign(impl.scene.scene.shapes.size() * columns, 0.0);
+  if (!impl.has(term) || columns == 0) return sum;
+  if (term == Term::visibility) impl.learn();
+  // Gates are picked by what they count for in any of the adjoints.
+  std::vector<double> interleaved(entries * count);
+  GatedImage largest = adjoints[0];
+  for (std::size_t i = 0; i < entries; ++i) {
+    double squares = 0;
+    for (std::size_t j = 0; j < count; ++j) {
+      const double a = interleaved[i * count + j] = adjoints[j].data[i];
+      squares += a * a;
+    }
+    largest.data[i] = std::sqrt(squares);
+  }
+  const GatePick pick(impl.gates, largest);
+  const GradientLedger blank = sum;
+  const int strands = strand_count(blank.by_bounces.size() + blank.by_gate.size() + blank.by_shape.size());
+  std::vector<std::vector<double>> bounces(strands), gates(strands), shapes(strands);
+  parallel(strands, [&](int strand) {
+    GradientLedger own = blank;
+    Worker worker(impl.scene, impl.gates, impl.options, pick,
+                  GradientLedgerSink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own));
+    impl.run_term(term, worker, strand, strands, stream, range);
+    bounces[strand] = std::move(own.by_bounces);
+    gates[strand] = std::move(own.by_gate);
+    shapes[strand] = std::move(own.by_shape);
+  });
+  merge(bounces, sum.by_bounces);
+  merge(gates, sum.by_gate);
+  merge(shapes, sum.by_shape);
+  return sum;
 }
 
 }  // namespace isochron

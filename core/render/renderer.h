@@ -2,6 +2,7 @@
 #pragma once
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/gates/gate.h"
@@ -49,6 +50,25 @@ struct SampleRange {
   int count() const { return end - begin; }
 };
 
+/// Gated images sorted by where their light comes from.
+struct ImageLedger {
+  GatedImage image;              ///< [pixel][bounces * gates + gate][channel], bounces from 0 to max_bounces
+  std::vector<double> by_shape;  ///< light on paths that meet a shape (emitters included), summed over the image
+};
+
+/// Sums of adjoint * dI sorted by where they come from, for several adjoints at once.
+struct GradientLedger {
+  int adjoints = 0, columns = 0;
+  std::vector<double> by_bounces;  ///< [bounces][column][adjoint], bounces from 0 to max_bounces
+  std::vector<double> by_gate;     ///< [gate][column], of the first adjoint
+  /// [shape][column], of the first adjoint: of paths that meet a shape (emitters included; one path may meet several);
+  /// of the visibility term: by the shape that the edge is part of.
+  std::vector<double> by_shape;
+  std::size_t index(int bounces, int column) const {
+    return (static_cast<std::size_t>(bounces) * columns + column) * adjoints;
+  }
+};
+
 /// A scene made ready for rendering at one value of the parameters. Immutable; safe to share between threads.
 class Renderer {
  public:
@@ -68,6 +88,15 @@ class Renderer {
   /// same for any number of columns.
   void add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
                     std::vector<double>& dof_gradient) const;
+
+  /// Whether the term can be other than zero: something that it depends on moves, and gates have what it needs.
+  bool has(Term term) const;
+
+  /// As `render`, sorted.
+  ImageLedger render_ledger(const Stream& stream, SampleRange range) const;
+  /// As `add_gradient` for every adjoint (at least one, images of one shape), over the columns of the basis, sorted.
+  GradientLedger gradient_ledger(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
+                                 SampleRange range) const;
 
   /// What the options resolved to.
   const SamplingMix& mix() const;

@@ -271,6 +271,7 @@ class SecondaryBoundary {
       const LocalDifferential& differential = c.bounces == 1 ? pixel_flow_ : material_flow_;
       if (differential.empty()) continue;
       worker_.sink.bind(differential);
+      note_boundary(worker_.sink, c.bounces, *g.y.edge);
       // The balance heuristic cancels this technique's own rate.
       worker_.sink.add(pixel, c.value * radiance * (1 / (1 / c.camera_over_edge + 1 + rate)), tau, kValueOnly);
       note_guide(worker_.sink, table, g.y.x());
@@ -355,6 +356,7 @@ class SecondaryBoundary {
         if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
         const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
         const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
+        note_boundary(worker_.sink, c.bounces + e.bounces, *g.y.edge);
         worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i] + e.length, kValueOnly);
       }
     }

@@ -36,14 +36,18 @@ class PrimalSink {
   GatedImage& film_;
 };
 
-class TangentSink {
+/// How fast ln F and the length change per unit of each column that a local differential touches.
+class ColumnRates {
  public:
-  static constexpr bool kDifferential = true;
-  /// One film per column.
-  TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<GatedImage> films)
-      : gates_(gates), layout_(layout), basis_(basis), films_(films), rates_(basis.columns) {}
+  struct Rates {
+    double log_f[3] = {0, 0, 0};
+    double length = 0;
+    bool touched = false;
+  };
 
-  /// The differential that the following contributions share.
+  ColumnRates(const DofLayout& layout, const TangentBasis& basis)
+      : layout_(layout), basis_(basis), rates_(basis.columns) {}
+
   void bind(const LocalDifferential& differential) {
     for (int column : touched_) rates_[column] = {};
     touched_.clear();
@@ -61,27 +65,10 @@ class TangentSink {
       });
   }
 
-  void add(int pixel, const Rgb& value, double length, GateWeights use) {
-    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-      for (int column : touched_) {
-        const Rates& rates = rates_[column];
-        splat(column, pixel, g, value, w * use.value, slope * use.slope * rates.length, rates);
-      }
-    });
-  }
-
-  /// value * dl for one gate: a member of a coupled pair.
-  void add_length_rate(int pixel, int gate, const Rgb& value) {
-    for (int column : touched_) splat(column, pixel, gate, value, 0, rates_[column].length, rates_[column]);
-  }
+  const std::vector<int>& touched() const { return touched_; }
+  const Rates& operator[](int column) const { return rates_[column]; }
 
  private:
-  struct Rates {
-    double log_f[3] = {0, 0, 0};
-    double length = 0;
-    bool touched = false;
-  };
-
   template <class F>
   void for_each_column(int dof, F&& f) {
     for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i) {
@@ -94,18 +81,44 @@ class TangentSink {
     }
   }
 
-  void splat(int column, int pixel, int g, const Rgb& value, double w, double length_part, const Rates& rates) {
+  const DofLayout layout_;
+  const TangentBasis& basis_;
+  std::vector<Rates> rates_;
+  std::vector<int> touched_;
+};
+
+class TangentSink {
+ public:
+  static constexpr bool kDifferential = true;
+  /// One film per column.
+  TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<GatedImage> films)
+      : gates_(gates), films_(films), rates_(layout, basis) {}
+
+  /// The differential that the following contributions share.
+  void bind(const LocalDifferential& differential) { rates_.bind(differential); }
+
+  void add(int pixel, const Rgb& value, double length, GateWeights use) {
+    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+      for (int column : rates_.touched())
+        splat(column, pixel, g, value, w * use.value, slope * use.slope * rates_[column].length);
+    });
+  }
+
+  /// value * dl for one gate: a member of a coupled pair.
+  void add_length_rate(int pixel, int gate, const Rgb& value) {
+    for (int column : rates_.touched()) splat(column, pixel, gate, value, 0, rates_[column].length);
+  }
+
+ private:
+  void splat(int column, int pixel, int g, const Rgb& value, double w, double length_part) {
     GatedImage& film = films_[column];
     double* out = &film.data[film.index(pixel, g)];
-    for (int c = 0; c < film.channels; ++c) out[c] += value[c] * (w * rates.log_f[c] + length_part);
+    for (int c = 0; c < film.channels; ++c) out[c] += value[c] * (w * rates_[column].log_f[c] + length_part);
   }
 
   const GateSet& gates_;
-  const DofLayout layout_;
-  const TangentBasis& basis_;
   std::span<GatedImage> films_;
-  std::vector<Rates> rates_;
-  std::vector<int> touched_;
+  ColumnRates rates_;
 };
 
 class AdjointSink {

@@ -1,6 +1,7 @@
 // What one strand of work carries from sample to sample, and how complete paths reach a sink.
 #pragma once
 #include "core/math/random.h"
+#include "core/render/ledger.h"
 #include "core/render/renderer.h"
 #include "core/render/sinks.h"
 #include "core/render/techniques.h"
@@ -75,6 +76,7 @@ struct Worker {
 
   /// Hands the complete path p (last vertex on an emitter) to the sink.
   void emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use) {
+    note_path(sink, p);
     if constexpr (Sink::kDifferential) {
       differentiate_path(scene, p.vertex.data(), p.size(), false, differential);
       if (differential.empty()) return;

@@ -1,0 +1,121 @@
+// Sinks that keep account of where light and its derivatives come from: by number of bounces, gate and shape. Exact: one
+// pass sorts the paths, so that what is left out by fewer bounces is known without the noise of a difference.
+#pragma once
+#include <span>
+#include <vector>
+
+#include "core/render/boundary_edges.h"
+#include "core/render/renderer.h"
+#include "core/render/sinks.h"
+
+namespace isochron {
+
+/// Tells a ledger which complete path (last vertex on an emitter) the next contributions belong to; other sinks do not
+/// ask.
+template <class Sink>
+void note_path(Sink& sink, const Path& path) {
+  if constexpr (requires { sink.note_path(path); }) sink.note_path(path);
+}
+/// The same for a boundary segment at an edge, on paths of so many bounces.
+template <class Sink>
+void note_boundary(Sink& sink, int bounces, const BoundaryEdge& edge) {
+  if constexpr (requires { sink.note_boundary(bounces, edge); }) sink.note_boundary(bounces, edge);
+}
+
+/// Bounces and shapes of the path at hand.
+class PathOrigin {
+ public:
+  explicit PathOrigin(const PreparedScene& scene) : scene_(scene) {}
+  void note_path(const Path& path) {
+    bounces = path.size() - 2;
+    shapes.clear();
+    for (int i = 1; i < path.size(); ++i) add_shape(path.vertex[i].triangle);
+  }
+  void note_boundary(int n, const BoundaryEdge& edge) {
+    bounces = n;
+    shapes.clear();
+    add_shape(edge.face[0]);
+  }
+  int bounces = 0;
+  std::vector<int> shapes;  ///< each once
+
+ private:
+  void add_shape(int triangle) {
+    const int shape = scene_.scene.triangles[triangle].shape;
+    if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
+  }
+  const PreparedScene& scene_;
+};
+
+class ImageLedgerSink {
+ public:
+  static constexpr bool kDifferential = false;
+  ImageLedgerSink(const PreparedScene& scene, const GateSet& gates, ImageLedger& ledger)
+      : origin_(scene), gates_(gates), ledger_(ledger) {}
+
+  void note_path(const Path& path) { origin_.note_path(path); }
+  void add(int pixel, const Rgb& value, double length) {
+    GatedImage& image = ledger_.image;
+    gates_.for_each_value(length, [&](int g, double w) {
+      double* out = &image.data[image.index(pixel, origin_.bounces * gates_.size() + g)];
+      double sum = 0;
+      for (int c = 0; c < image.channels; ++c) {
+        out[c] += w * value[c];
+        sum += w * value[c];
+      }
+      for (int shape : origin_.shapes) ledger_.by_shape[shape] += sum;
+    });
+  }
+
+ private:
+  PathOrigin origin_;
+  const GateSet& gates_;
+  ImageLedger& ledger_;
+};
+
+class GradientLedgerSink {
+ public:
+  static constexpr bool kDifferential = true;
+  /// `adjoints`: [pixel][gate][channel][adjoint].
+  GradientLedgerSink(const PreparedScene& scene, const GateSet& gates, const TangentBasis& basis, int channels,
+                     std::span<const double> adjoints, GradientLedger& ledger)
+      : origin_(scene), gates_(gates), rates_(scene.layout, basis), channels_(channels), adjoints_(adjoints),
+        ledger_(ledger) {}
+
+  void note_path(const Path& path) { origin_.note_path(path); }
+  void note_boundary(int bounces, const BoundaryEdge& edge) { origin_.note_boundary(bounces, edge); }
+  void bind(const LocalDifferential& differential) { rates_.bind(differential); }
+
+  void add(int pixel, const Rgb& value, double length, GateWeights use) {
+    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+      put(pixel, g, value, w * use.value, slope * use.slope);
+    });
+  }
+  void add_length_rate(int pixel, int gate, const Rgb& value) { put(pixel, gate, value, 0, 1); }
+
+ private:
+  void put(int pixel, int gate, const Rgb& value, double w, double slope) {
+    const int count = ledger_.adjoints;
+    const double* adjoint =
+        &adjoints_[(static_cast<std::size_t>(pixel) * gates_.size() + gate) * channels_ * count];
+    for (int c = 0; c < channels_; ++c, adjoint += count)
+      for (int column : rates_.touched()) {
+        const double derivative = value[c] * (w * rates_[column].log_f[c] + slope * rates_[column].length);
+        double* sums = &ledger_.by_bounces[ledger_.index(origin_.bounces, column)];
+        for (int j = 0; j < count; ++j) sums[j] += adjoint[j] * derivative;
+        const double first = adjoint[0] * derivative;
+        ledger_.by_gate[static_cast<std::size_t>(gate) * ledger_.columns + column] += first;
+        for (int shape : origin_.shapes)
+          ledger_.by_shape[static_cast<std::size_t>(shape) * ledger_.columns + column] += first;
+      }
+  }
+
+  PathOrigin origin_;
+  const GateSet& gates_;
+  ColumnRates rates_;
+  const int channels_;
+  std::span<const double> adjoints_;
+  GradientLedger& ledger_;
+};
+
+}  // namespace isochron
