@@ -12,5 +12,6 @@ void add_render(CLI::App& app, Action& action);
 void add_derive(CLI::App& app, Action& action);
 void add_gradient(CLI::App& app, Action& action);
 void add_check(CLI::App& app, Action& action);
+void add_inspect(CLI::App& app, Action& action);
 
 }  // namespace isochron

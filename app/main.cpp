@@ -36,6 +36,7 @@ int main(int argc, char** argv) {
   isochron::add_derive(app, action);
   isochron::add_gradient(app, action);
   isochron::add_check(app, action);
+  isochron::add_inspect(app, action);
   try {
     app.parse(argc, argv);
     return action();

@@ -1,5 +1,5 @@
-// How much of the model a loss gradient needs: fewer bounces, fewer terms, decided from independent estimates of the
-// gradient with and without them.
+// How much of the model a loss gradient needs: fewer bounces, fewer terms, decided from independent estimates
+// of the gradient with and without them.
 #pragma once
 #include <array>
 #include <span>
@@ -16,8 +16,8 @@ struct Reduction {
   std::array<bool, 3> terms{true, true, true};
 };
 
-/// Independent estimates of the gradient of one loss for every limit of bounces, term by term. With a limit both the
-/// images in the residual and their derivatives stop there, while the target does not.
+/// Independent estimates of the gradient of one loss for every limit of bounces, term by term. With a limit
+/// both the images in the residual and their derivatives stop there, while the target does not.
 class GradientReplicates {
  public:
   GradientReplicates(int max_bounces, int columns) : max_bounces_(max_bounces), columns_(columns) {}
@@ -55,8 +55,9 @@ struct ReductionChoice {
   std::vector<std::string> undecided;  ///< what was kept for want of statistics, one line each
 };
 
-/// The smallest model whose bias, two standard errors added, is at most `tolerance` at every point, and so is that of
-/// every model between it and the full one: first fewer bounces, one by one, then fewer terms, the smallest first.
+/// The smallest model whose bias, two standard errors added, is at most `tolerance` at every point, and so is
+/// that of every model between it and the full one: first fewer bounces, one by one, then fewer terms, the
+/// smallest first.
 ReductionChoice choose_reduction(std::span<const GradientReplicates> points, double tolerance);
 
 }  // namespace isochron

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace isochron {
 namespace {
@@ -14,8 +13,8 @@ double total_cost(const PerPass& cost, const PerPass& n) {
 }
 
 /// Given the image's samples, the others follow in closed form from the time that is left.
-PerPass split_the_rest(const GradientVariance& v, const PerPass& cost, const std::array<bool, 3>& kept, double image,
-                       double left) {
+PerPass split_the_rest(const GradientVariance& v, const PerPass& cost, const std::array<bool, 3>& kept,
+                       double image, double left) {
   PerPass n{image, 0, 0, 0};
   PerPass root{};
   double sum = 0;
@@ -74,8 +73,8 @@ VarianceComponents variance_components(const std::vector<std::vector<double>>& t
 
 PerPass best_split(const GradientVariance& variance, const PerPass& cost, const std::array<bool, 3>& kept,
                    double time) {
-  // In the logarithms of the numbers the variance is convex and so is the time: one minimum, also over the image's
-  // samples alone once the others are the best for them. Golden section.
+  // In the logarithms of the numbers the variance is convex and so is the time: one minimum, also over the
+  // image's samples alone once the others are the best for them. Golden section.
   const auto with_image = [&](double log_share) {
     const double share = std::exp(log_share);
     return split_the_rest(variance, cost, kept, share * time / cost[0], (1 - share) * time);
@@ -102,20 +101,24 @@ std::array<int, kPasses> cheapest_split(const GradientVariance& variance, const 
   }
   const PerPass best = best_split(variance, cost, kept, high * unit);
 
-  constexpr double kRoundingRoom = 1.05;
-  const auto whole = [&](int pass, int up) -> double {
-    if (pass > 0 && !kept[pass - 1]) return 0;
-    return std::max(1.0, std::floor(best[pass]) + up);
-  };
-  PerPass chosen{whole(0, 1), whole(1, 1), whole(2, 1), whole(3, 1)};
-  double least = std::numeric_limits<double>::infinity();
-  for (int rounding = 0; rounding < 1 << kPasses; ++rounding) {
-    PerPass n;
-    for (int pass = 0; pass < kPasses; ++pass) n[pass] = whole(pass, rounding >> pass & 1);
-    const double time = total_cost(cost, n);
-    if (variance(n) > kRoundingRoom * wanted || !(time < least)) continue;
-    least = time;
-    chosen = n;
+  // Rounded up it is good enough; then one sample less here, or here for one more there, as long as that
+  // saves time.
+  PerPass chosen{};
+  for (int i = 0; i < kPasses; ++i)
+    if (i == 0 || kept[i - 1]) chosen[i] = std::max(1.0, std::ceil(best[i]));
+  for (bool improved = true; improved;) {
+    improved = false;
+    const PerPass from = chosen;
+    for (int less = 0; less < kPasses; ++less)
+      for (int more = 0; more < kPasses; ++more) {
+        PerPass n = from;
+        if (!(n[less] > 1) || !(n[more] > 0)) continue;
+        --n[less];
+        if (more != less) ++n[more];
+        if (variance(n) > wanted || !(total_cost(cost, n) < total_cost(cost, chosen))) continue;
+        chosen = n;
+        improved = true;
+      }
   }
   std::array<int, kPasses> counts;
   for (int pass = 0; pass < kPasses; ++pass) counts[pass] = static_cast<int>(std::min(chosen[pass], 1e9));

@@ -1,5 +1,6 @@
-// Sinks that keep account of where light and its derivatives come from: by number of bounces, gate and shape. Exact: one
-// pass sorts the paths, so that what is left out by fewer bounces is known without the noise of a difference.
+// Sinks that keep account of where light and its derivatives come from: by number of bounces, gate and shape.
+// Exact: one pass sorts the paths, so that what is left out by fewer bounces is known without the noise of a
+// difference.
 #pragma once
 #include <span>
 #include <vector>
@@ -10,8 +11,8 @@
 
 namespace isochron {
 
-/// Tells a ledger which complete path (last vertex on an emitter) the next contributions belong to; other sinks do not
-/// ask.
+/// Tells a ledger which complete path (last vertex on an emitter) the next contributions belong to; other
+/// sinks do not ask.
 template <class Sink>
 void note_path(Sink& sink, const Path& path) {
   if constexpr (requires { sink.note_path(path); }) sink.note_path(path);
@@ -77,9 +78,13 @@ class GradientLedgerSink {
  public:
   static constexpr bool kDifferential = true;
   /// `adjoints`: [pixel][gate][channel][adjoint].
-  GradientLedgerSink(const PreparedScene& scene, const GateSet& gates, const TangentBasis& basis, int channels,
-                     std::span<const double> adjoints, GradientLedger& ledger)
-      : origin_(scene), gates_(gates), rates_(scene.layout, basis), channels_(channels), adjoints_(adjoints),
+  GradientLedgerSink(const PreparedScene& scene, const GateSet& gates, const TangentBasis& basis,
+                     int channels, std::span<const double> adjoints, GradientLedger& ledger)
+      : origin_(scene),
+        gates_(gates),
+        rates_(scene.layout, basis),
+        channels_(channels),
+        adjoints_(adjoints),
         ledger_(ledger) {}
 
   void note_path(const Path& path) { origin_.note_path(path); }

@@ -1,5 +1,6 @@
-// Images and gradients sorted by bounces, gates and shapes: their sums are those of the unsorted passes, from the same
-// random numbers, and what they hold up to some number of bounces is what a renderer that stops there finds.
+// Images and gradients sorted by bounces, gates and shapes: their sums are those of the unsorted passes, from
+// the same random numbers, and what they hold up to some number of bounces is what a renderer that stops
+// there finds.
 #include <gtest/gtest.h>
 
 #include "tests/render/support.h"
@@ -18,13 +19,16 @@ struct Case {
   const char* name;
   Sampling sampling;
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
 
 class Ledger : public ::testing::TestWithParam<Case> {
  protected:
   Ledger() : scene_(load_scene(TEST_DATA "/reference/scene.yaml")) {
     scene_.camera.width = scene_.camera.height = 6;
-    basis_ = make_basis(scene_, {rotate_y(scene_, "block", {-0.2, -0.4, 0.15}), translate(scene_, "light", {0, 0, 1})});
+    basis_ = make_basis(
+        scene_, {rotate_y(scene_, "block", {-0.2, -0.4, 0.15}), translate(scene_, "light", {0, 0, 1})});
   }
   EstimatorOptions options(int max_bounces) const {
     EstimatorOptions options;
@@ -38,7 +42,9 @@ class Ledger : public ::testing::TestWithParam<Case> {
   GateSet gates_{GateShape::truncated_gaussian(0.1, 0.15), {5.0, 6.0, 7.0}};
 };
 
-void expect_equal(double a, double b, double scale) { EXPECT_NEAR(a, b, 1e-9 * std::abs(scale)); }
+void expect_equal(double a, double b, double scale) {
+  EXPECT_NEAR(a, b, 1e-9 * std::abs(scale));
+}
 
 TEST_P(Ledger, SumsToTheUnsortedPass) {
   const int bounces = 3;
@@ -84,8 +90,8 @@ TEST_P(Ledger, SumsToTheUnsortedPass) {
 }
 
 TEST_P(Ledger, HoldsWhatFewerBouncesFind) {
-  // z-tests at 4 standard errors: 1 image and 3 terms x 2 columns at 2 limits, false alarms 14 x 6e-5 = 0.1 %; the
-  // seeds are fixed.
+  // z-tests at 4 standard errors: 1 image and 3 terms x 2 columns at 2 limits, false alarms 14 x 6e-5 = 0.1
+  // %; the seeds are fixed.
   const Renderer all(scene_, gates_, options(3), &basis_);
   const GatedImage adjoints[2] = {adjoint_for(scene_, gates_, 0.2), adjoint_for(scene_, gates_, 1)};
   constexpr int kBatches = 24, kSamples = 24;
@@ -132,7 +138,8 @@ TEST_P(Ledger, HoldsWhatFewerBouncesFind) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Samplings, Ledger,
-                         ::testing::Values(Case{"standard", Sampling::standard}, Case{"ellipsoidal", Sampling::ellipsoidal}),
+                         ::testing::Values(Case{"standard", Sampling::standard},
+                                           Case{"ellipsoidal", Sampling::ellipsoidal}),
                          ::testing::PrintToStringParamName());
 
 }  // namespace
