@@ -42,7 +42,7 @@ struct Inspection {
 /// The most that the gradient of the advised model may be off, relative to its norm.
 inline constexpr double kBiasTolerance = 0.01;
 
-/// Inspects an experiment with the analytic method from `start` on, for about so many seconds of wall time.
+/// Inspects an experiment with the analytic method from `start` on, for about so many CPU seconds.
 /// Throws InputError where it has no parameters or another method.
 Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds,
                    const Poll& poll);
