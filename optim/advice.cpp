@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 #include "core/math/error.h"
 #include "optim/heavy_tail.h"
@@ -119,6 +120,10 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   for (const InspectedPoint& point : points)
     result.points.push_back(inspect_point(
         problem, point, (1 - kShareOfCosts) * seconds / static_cast<double>(points.size()), poll));
+
+  const auto finds_any = [](const PointInspection& p) { return p.found[0] || p.found[1] || p.found[2]; };
+  if (std::none_of(result.points.begin(), result.points.end(), finds_any))
+    throw std::runtime_error("no path that the gates see has a derivative: there is nothing to advise");
 
   Advice& advice = result.advice;
   std::vector<GradientReplicates> replicates;

@@ -63,15 +63,17 @@ std::vector<double> GradientReplicates::gradient(int replicate, const Reduction&
 
 RelativeBias relative_bias(const GradientReplicates& replicates, const Reduction& kept) {
   std::vector<std::vector<double>> gradients, differences;
-  bool differs = false;
+  bool differs = false, any = false;
   for (int r = 0; r < replicates.size(); ++r) {
     gradients.push_back(replicates.gradient(r, replicates.full()));
     differences.push_back(replicates.gradient(r, kept));
     for (int c = 0; c < replicates.columns(); ++c) {
       differences[r][c] -= gradients[r][c];
       if (differences[r][c] != 0) differs = true;
+      if (gradients[r][c] != 0) any = true;
     }
   }
+  if (!any) return {.upper = std::numeric_limits<double>::infinity()};
   if (!differs) return {};
   const MeanNorm d = mean_norm(differences), g = mean_norm(gradients);
   RelativeBias bias;

@@ -46,7 +46,8 @@ struct RelativeBias {
   double lower = 0, upper = 0;
 };
 
-/// At least two replicates. Exactly zero where no replicate differs.
+/// At least two replicates. Exactly zero where no replicate differs, unless all gradients are zero: then
+/// nothing is known.
 RelativeBias relative_bias(const GradientReplicates& replicates, const Reduction& kept);
 
 struct ReductionChoice {

@@ -120,6 +120,8 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
       {"derive", file, "-o", out, "--parameter", "width"},
       {"derive", file, "-o", out, "--set", "samples.visibility=1"},
       {"gradient", file, "-o", out, "--samples", "1"},
+      {"inspect", file, "-o", out, "--seconds", "0"},
+      {"inspect", file, "-o", out, "--apply", "--samples", "4"},
       {"resume", out},
   };
   for (const auto& command : commands) {
@@ -131,7 +133,7 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
 }
 
 TEST_F(Program, HelpShowsExamples) {
-  for (const char* command : {"run", "resume", "render", "derive", "gradient", "check"}) {
+  for (const char* command : {"run", "resume", "render", "derive", "gradient", "check", "inspect"}) {
     EXPECT_EQ(run({command, "--help"}).status, 0);
     EXPECT_NE(folder_.read("stdout").find(std::string("  isochron ") + command), std::string::npos);
   }
@@ -180,6 +182,25 @@ TEST_F(Program, CheckAgreesWithFiniteDifferences) {
   EXPECT_EQ(folder_.read("out/check.csv").find("height"), std::string::npos);
 }
 
+TEST_F(Program, InspectAppliesItsAdvice) {
+  // What is asked for is found to be too much; comments stay.
+  const std::string before = replaced(tiny_experiment(), "max_bounces: 2\n", "max_bounces: 9   # far too many\n");
+  const std::string file = folder_.write("tiny.yaml", before), out = folder_.file("out");
+  const Result result = run({"inspect", file, "-o", out, "--seconds", "1", "--apply"});
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const std::string fragment = folder_.read("out/inspect.yaml"), table = folder_.read("out/inspect.csv");
+  EXPECT_EQ(fragment.rfind("max_bounces: ", 0), 0u) << fragment;
+  EXPECT_NE(folder_.read("stdout").find(fragment), std::string::npos);
+  EXPECT_EQ(table.rfind("point,quantity,term,bounces,gate,shape,share,standard_error\nstart,light,,0,0,,", 0), 0u);
+  const std::string after = folder_.read("tiny.yaml");
+  EXPECT_NE(after.find("   # far too many\n"), std::string::npos) << after;
+  const int bounces = after[after.find("max_bounces: ") + 13] - '0';
+  EXPECT_LT(bounces, 9);  // the block and the floor reflect light to and fro, but not nine times
+  EXPECT_GE(bounces, 1);
+  EXPECT_NE(after.find("max_bounces: 9}"), std::string::npos) << after;  // the target's light is as it was
+  EXPECT_EQ(run({"render", file, "-o", out, "--no-plots"}).status, 0);
+}
+
 TEST_F(Program, GatesThatNoPathReaches) {
   // Zeros everywhere, and a run that has nothing to go by stays where it is and ends as it should.
   const std::string file = folder_.file("tiny.yaml");
@@ -204,6 +225,9 @@ TEST_F(Program, GatesThatNoPathReaches) {
     EXPECT_EQ(run(with({"gradient", file, "-o", out})).status, 0);
     EXPECT_EQ(folder_.read(sampling + std::string("/gradient.csv")),
               "parameter,value,gradient,standard_error,kurtosis\nheight,0.2,0,0,0\npower,8,0,0,0\n");
+    const Result inspection = run(with({"inspect", file, "-o", out, "--seconds", "0.5"}));
+    EXPECT_EQ(inspection.status, 1);
+    EXPECT_NE(inspection.errors.find("nothing to advise"), std::string::npos) << inspection.errors;
     const std::string folder = std::string("run_") + sampling;
     const Result fitted = run(with(run_command(folder)));
     EXPECT_EQ(fitted.status, 0);

@@ -55,6 +55,14 @@ TEST(Reduction, WhatIsZeroIsZeroWhateverTheNoise) {
   EXPECT_EQ(choice.undecided.size(), 1u);  // zero bounces
 }
 
+TEST(Reduction, NothingFoundSaysNothing) {
+  const GradientReplicates g = make({{0, 0, 0}, {0, 0, 0}});
+  EXPECT_EQ(relative_bias(g, {0, {true, true, true}}).upper, std::numeric_limits<double>::infinity());
+  const ReductionChoice choice = choose_reduction(std::span(&g, 1), 0.01);
+  EXPECT_EQ(choice.kept.max_bounces, 1);
+  EXPECT_EQ(choice.kept.terms, (std::array<bool, 3>{true, true, true}));
+}
+
 TEST(Reduction, StopsWhereTheBiasIsTooLargeAtAnyPoint) {
   const GradientReplicates far = make({{0, 0, 0}, {1, 0.5, 0}, {0.006, 0, 0}, {0.003, 0, 0}});
   const GradientReplicates near = make({{0, 0, 0}, {1, 0.5, 0}, {0.02, 0, 0}, {0.003, 0, 0}});
