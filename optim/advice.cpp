@@ -54,10 +54,12 @@ PerPass real(const std::array<int, kPasses>& samples) {
 }
 
 std::vector<GradientCost> measure_all(const Problem& problem, const std::vector<PointInspection>& points,
-                                      const std::array<bool, 3>& kept, double seconds, const Poll& poll) {
+                                      const std::array<bool, 3>& kept,
+                                      const std::vector<std::array<int, kPasses>>& samples,
+                                      const Poll& poll) {
   std::vector<GradientCost> costs;
-  for (const PointInspection& p : points)
-    costs.push_back(measure_cost(problem, p.point.theta, p.target, kept, seconds / points.size(), poll));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    costs.push_back(measure_cost(problem, points[i].point.theta, points[i].target, kept, samples[i], poll));
   return costs;
 }
 
@@ -95,7 +97,9 @@ void choose_samples(Advice& advice, double pixels) {
                                : present;
     trial.seconds = seconds_of(trial.costs, trial.samples, pixels);
     const double unchanged = seconds_of(trial.costs, present, pixels);
-    if (trial.seconds > kWorthNewSamples * unchanged && variance(real(present)) <= kSameVariance * wanted) {
+    const bool good_enough = variance(real(present)) <= kSameVariance * wanted;
+    if (trial.kurtosis > kHeavyTailKurtosis ||
+        (trial.seconds > kWorthNewSamples * unchanged && good_enough)) {
       trial.samples = present;
       trial.seconds = unchanged;
     }
@@ -139,15 +143,19 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   const bool as_before = advice.reduction.kept.max_bounces == advice.before.max_bounces &&
                          advice.reduction.kept.terms == present;
   const bool other_sampling = experiment.estimator.sampling != Sampling::automatic;
-  const double each = kShareOfCosts * seconds / (2 - as_before + other_sampling);
-  advice.costs_before = measure_all(problem, result.points, present, each, poll);
+  const double each =
+      kShareOfCosts * seconds / (2 - as_before + other_sampling) / static_cast<double>(points.size());
+  std::vector<std::array<int, kPasses>> samples;
+  for (const PointInspection& p : result.points)
+    samples.push_back(affordable_samples(problem, p.point.theta, p.target, present, each, poll));
+  advice.costs_before = measure_all(problem, result.points, present, samples, poll);
   Setting reduced = advice.before;
   reduced.max_bounces = advice.reduction.kept.max_bounces;
   const auto trial = [&](Sampling sampling) {
     reduced.sampling = sampling;
     const Problem own(advised(experiment, reduced));
     return SamplingTrial{
-        sampling, {}, 0, 0, measure_all(own, result.points, advice.reduction.kept.terms, each, poll)};
+        sampling, {}, 0, 0, measure_all(own, result.points, advice.reduction.kept.terms, samples, poll)};
   };
   if (as_before)
     advice.trials.push_back({advice.before.sampling, {}, 0, 0, advice.costs_before});

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "optim/gradient_cost.h"
 #include "optim/inspection.h"
 
 namespace isochron {

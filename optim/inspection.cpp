@@ -9,32 +9,8 @@
 namespace isochron {
 namespace {
 
-/// Random numbers of inspections, apart from those of any iteration.
-constexpr std::uint32_t kInspection = 1u << 30;
 constexpr int kReplicates = 24;
 constexpr int kMostSamples = 1 << 20;  ///< per pixel and replicate
-
-/// Of this process, all threads.
-double cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Per unknown, see PointInspection::gradient.
-std::vector<double> units(const Parameters& parameters) {
-  std::vector<double> result(parameters.size(), 1.0);
-  for (const Parameters::Block& block : parameters.blocks()) {
-    double squares = 0;
-    for (int i = block.begin; i < block.begin + block.count; ++i) {
-      const double way = parameters.target()[i] - parameters.initial()[i];
-      squares += way * way / block.count;
-    }
-    if (squares > 0)  // not so where a value is NaN, that is, unknown
-      std::fill_n(result.begin() + block.begin, block.count, std::sqrt(squares));
-  }
-  return result;
-}
 
 /// How often `pass(samples)`, timed, may run in so many seconds: samples of one run.
 template <class Pass>
@@ -121,6 +97,31 @@ class ShareCollector {
 
 }  // namespace
 
+double cpu_seconds() {
+  timespec now;
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+std::vector<double> comparable_units(const Parameters& parameters) {
+  std::vector<double> result(parameters.size(), 1.0);
+  for (const Parameters::Block& block : parameters.blocks()) {
+    double squares = 0;
+    for (int i = block.begin; i < block.begin + block.count; ++i) {
+      const double way = parameters.target()[i] - parameters.initial()[i];
+      squares += way * way / block.count;
+    }
+    if (squares > 0)  // not so where a value is NaN, that is, unknown
+      std::fill_n(result.begin() + block.begin, block.count, std::sqrt(squares));
+  }
+  return result;
+}
+
+Stream inspection_stream(const Problem& problem, Pass pass, int index) {
+  constexpr std::uint32_t kInspection = 1u << 30;
+  return problem.stream(pass, kInspection + static_cast<std::uint32_t>(index));
+}
+
 std::vector<InspectedPoint> points_to_inspect(const Parameters& parameters,
                                               const std::vector<double>& start) {
   std::vector<InspectedPoint> points{{"start", start}};
@@ -145,7 +146,7 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
   const Experiment& experiment = problem.experiment();
   const Parameters& parameters = problem.parameters();
   const int gates = problem.gates().size(), columns = parameters.size(), most = full_bounces(experiment);
-  const std::vector<double> unit = units(parameters);
+  const std::vector<double> unit = comparable_units(parameters);
   const Scene scene = parameters.apply(point.theta);
   const TangentBasis basis = parameters.tangent(point.theta);
   EstimatorOptions options = problem.estimator(std::max(experiment.samples.visibility, 64));
@@ -171,9 +172,7 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
     parts += result.can_be[t];
   }
   const double seconds_per_part = seconds / kReplicates / parts;
-  const auto stream = [&](Pass pass, int replicate) {
-    return problem.stream(pass, kInspection + static_cast<std::uint32_t>(replicate));
-  };
+  const auto stream = [&](Pass pass, int replicate) { return inspection_stream(problem, pass, replicate); };
   const auto images = [&](int replicate, int samples) {
     if (rendered) target = target_renderer->render(stream(Pass::primal, replicate), {0, samples});
     return renderer.render_ledger(stream(Pass::primal, replicate), {0, samples});
@@ -232,119 +231,6 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
   }
   result.shares = shares.result(columns);
   result.target = mean_target.mean();
-  return result;
-}
-
-GradientCost measure_cost(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                          const std::array<bool, 3>& kept, double seconds, const Poll& poll) {
-  constexpr int kImages = 16, kBatches = kMostBatches, kTimings = 3;
-  const SampleSpec& spec = problem.experiment().samples;
-  const int columns = problem.parameters().size();
-  const std::vector<double> unit = units(problem.parameters());
-  const RobustLoss robust = problem.robust_loss(target);
-  const auto stream = [&](Pass pass, int i) {
-    return problem.stream(pass, kInspection + (1u << 20) + static_cast<std::uint32_t>(i));
-  };
-  const auto scaled = [&](int samples, double factor) {
-    return std::max(1, static_cast<int>(std::lround(factor * samples)));
-  };
-  const std::array<int, kPasses> full{spec.primal, spec.interior, spec.visibility, spec.path_length};
-  std::array<int, kPasses> n;
-  const auto set = [&](double factor) {
-    for (int i = 0; i < kPasses; ++i) n[i] = scaled(full[i], factor);
-  };
-  const double pixels = problem.scene().camera.width * problem.scene().camera.height;
-
-  // One evaluation as the optimiser has it, with everything that is made anew. CPU seconds: overhead, then
-  // the passes.
-  std::array<std::vector<double>, 1 + kPasses> times;
-  const auto evaluate = [&](int repeat) {
-    double last = cpu_seconds();
-    const auto lap = [&](int what) {
-      const double now = cpu_seconds();
-      times[what].push_back(now - last);
-      last = now;
-    };
-    const Scene scene = problem.parameters().apply(theta);
-    const TangentBasis basis = problem.parameters().tangent(theta);
-    const Renderer renderer(scene, problem.gates(), problem.estimator(n[2]), &basis);
-    lap(0);
-    const GatedImage image = renderer.render(stream(Pass::primal, repeat), {0, n[0]});
-    const GatedImage adjoint = loss_adjoint(image, target, robust);
-    lap(1);
-    std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
-    for (int t = 0; t < 3; ++t) {
-      if (kept[t])
-        renderer.add_gradient(kTerms[t], adjoint, stream(pass_of(kTerms[t]), repeat), {0, n[1 + t]},
-                              dof_gradient);
-      lap(2 + t);
-    }
-    poll();
-  };
-  set(0.125);
-  const double start = cpu_seconds();
-  evaluate(0);
-  // An evaluation with all samples would take 8 times as long; ledgers take about twice as long as plain
-  // passes.
-  const double whole = 8 * (cpu_seconds() - start);
-  set(std::min(1.0, seconds / (whole * (kTimings + 2 * kBatches))));
-  for (auto& t : times) t.clear();
-  for (int repeat = 0; repeat < kTimings; ++repeat) evaluate(repeat);
-  GradientCost result;
-  for (auto& t : times) std::sort(t.begin(), t.end());
-  result.overhead = times[0][kTimings / 2];
-  for (int i = 0; i < kPasses; ++i)
-    if (i == 0 || kept[i - 1]) result.seconds[i] = times[1 + i][kTimings / 2] / n[i] / pixels;
-
-  // Every image with every batch of every term.
-  const Scene scene = problem.parameters().apply(theta);
-  const TangentBasis basis = problem.parameters().tangent(theta);
-  const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility), &basis);
-  std::vector<GatedImage> adjoints;
-  for (int i = 0; i < kImages; ++i) {
-    adjoints.push_back(loss_adjoint(renderer.render(stream(Pass::primal, i), {0, n[0]}), target, robust));
-    poll();
-  }
-  // [column][image], means over batches, summed over terms; and how much of their variance is the batches'.
-  std::vector<std::vector<double>> image_rows(columns, std::vector<double>(kImages, 0.0));
-  double of_batches = 0;
-  for (int t = 0; t < 3; ++t) {
-    if (!kept[t]) continue;
-    std::vector<std::vector<std::vector<double>>> tables(
-        columns, std::vector<std::vector<double>>(kImages, std::vector<double>(kBatches, 0.0)));
-    BatchStatistics batches;
-    for (int b = 0; b < kBatches; ++b) {
-      const GradientLedger ledger =
-          renderer.gradient_ledger(kTerms[t], adjoints, stream(pass_of(kTerms[t]), b), {0, n[1 + t]});
-      std::vector<double> means(columns, 0.0);
-      for (std::size_t i = 0; i < ledger.by_bounces.size(); ++i) {
-        const std::size_t column = i / kImages % columns, image = i % kImages;
-        tables[column][image][b] += unit[column] * ledger.by_bounces[i];
-        means[column] += ledger.by_bounces[i] / kImages;
-      }
-      batches.add(means, 1);
-      poll();
-    }
-    for (double k : batches.result().kurtosis) result.kurtosis = std::max(result.kurtosis, k);
-    for (int c = 0; c < columns; ++c) {
-      const VarianceComponents v = variance_components(tables[c]);
-      result.variance.term[t] += v.columns * n[1 + t];
-      result.variance.cross[t] += v.cells * n[0] * n[1 + t];
-      of_batches += v.cells / kBatches;
-      for (int i = 0; i < kImages; ++i)
-        for (double x : tables[c][i]) image_rows[c][i] += x / kBatches;
-    }
-  }
-  double of_images = -of_batches;
-  for (const auto& row : image_rows) {
-    double mean = 0, squares = 0;
-    for (double x : row) mean += x / kImages;
-    for (double x : row) squares += (x - mean) * (x - mean);
-    of_images += squares / (kImages - 1);
-  }
-  // Below zero by noise alone.
-  result.variance.image = std::max(0.0, of_images * n[0]);
-  for (double& v : result.variance.term) v = std::max(0.0, v);
   return result;
 }
 

@@ -1,6 +1,5 @@
-// What an experiment's model consists of, measured: where light and the loss gradient come from, and what the
-// noise of the gradient costs. See reduction.h and sample_split.h for what follows from it, advice.h for the
-// whole.
+// Where the light and the loss gradient of an experiment's full model come from, measured. See advice.h for
+// what follows.
 #pragma once
 #include <array>
 #include <string>
@@ -52,18 +51,13 @@ struct PointInspection {
 PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds,
                               const Poll& poll);
 
-/// Variance and cost of the loss gradient of one setting at one point.
-struct GradientCost {
-  GradientVariance variance;
-  PerPass seconds{};    ///< CPU seconds per sample per pixel; 0 of a pass that is not run
-  double overhead = 0;  ///< CPU seconds per evaluation, whatever the samples
-  double kurtosis = 0;  ///< the largest of the batches' (see Statistics)
-};
+/// Per unknown: see PointInspection::gradient.
+std::vector<double> comparable_units(const Parameters& parameters);
 
-/// Of the problem's own setting, for the terms that `kept` says, against a target image; in the units of
-/// PointInspection::gradient. Its passes take the experiment's numbers of samples, or fewer to fit into the
-/// time.
-GradientCost measure_cost(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                          const std::array<bool, 3>& kept, double seconds, const Poll& poll);
+/// Random numbers of inspections, apart from those of any iteration.
+Stream inspection_stream(const Problem& problem, Pass pass, int index);
+
+/// CPU time of this process so far, all threads.
+double cpu_seconds();
 
 }  // namespace isochron

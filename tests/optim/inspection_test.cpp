@@ -96,7 +96,7 @@ TEST_F(InspectionTest, PredictsTheVarianceThatRepeatsHave) {
   const std::vector<double> theta = problem.parameters().initial();
   const GatedImage target = problem.make_target([] {});
   const std::array<bool, 3> kept{true, true, false};
-  const GradientCost cost = measure_cost(problem, theta, target, kept, 4, [] {});
+  const GradientCost cost = measure_cost(problem, theta, target, kept, {3, 12, 6, 1}, [] {});
   const double predicted = cost.variance({3, 12, 6, 0});
   constexpr int kRepeats = 200;
   std::vector<double> mean(2, 0.0), squares(2, 0.0);
