@@ -37,6 +37,7 @@ int main(int argc, char** argv) {
   isochron::add_gradient(app, action);
   isochron::add_check(app, action);
   isochron::add_inspect(app, action);
+  isochron::add_chart(app, action);
   try {
     app.parse(argc, argv);
     return action();

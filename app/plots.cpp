@@ -21,10 +21,7 @@ std::string last_line(std::string text) {
   return text.substr(text.rfind('\n') + 1);
 }
 
-}  // namespace
-
-bool draw_plots(const std::string& folder) {
-  const std::string script = ISOCHRON_SCRIPTS "/plot.py";
+bool run_script(const std::string& script, const std::string& folder) {
   // A folder named -x must not be taken for an option.
   const std::string argument = folder.front() == '-' ? "./" + folder : folder;
   int ends[2];
@@ -59,6 +56,16 @@ bool draw_plots(const std::string& folder) {
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
   spdlog::warn("plots: {} failed: {}", script, last_line(messages));
   return false;
+}
+
+}  // namespace
+
+bool draw_plots(const std::string& folder) {
+  return run_script(ISOCHRON_SCRIPTS "/plot.py", folder);
+}
+
+bool draw_charts(const std::string& folder) {
+  return run_script(ISOCHRON_SCRIPTS "/plot_chart.py", folder);
 }
 
 }  // namespace isochron

@@ -292,6 +292,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
           static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
     if (const auto antithetic = estimator.find("antithetic"))
       experiment.estimator.antithetic = antithetic->boolean();
+    if (const auto pick = estimator.find("pick"))
+      experiment.estimator.pick = static_cast<ArcPick>(pick->choice({"contribution", "uniform"}));
     if (const auto guiding = estimator.find("guiding")) experiment.guiding = guiding->boolean();
     estimator.reject_unknown();
   }

@@ -111,9 +111,10 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   if (e.target.photons > 0) fmt::format_to(out, "  noise: {{photons: {}}}\n", e.target.photons);
   fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
                  e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
-  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  guiding: {}\n",
+  constexpr const char* kPicks[] = {"contribution", "uniform"};
+  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  pick: {}\n  guiding: {}\n",
                  kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic,
-                 e.guiding);
+                 kPicks[static_cast<int>(e.estimator.pick)], e.guiding);
   const bool analytic = e.gradient.method == GradientMethod::analytic;
   fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
   // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.

@@ -61,6 +61,9 @@ class Problem {
   /// parameters: by a trial at their initial values.
   const EstimatorOptions& estimator() const;
 
+  /// Takes the place of the experiment's numbers of samples; what automatic sampling has settled on stays.
+  void set_samples(const SampleSpec& samples) { experiment_.samples = samples; }
+
   /// Throws InputError when the experiment has no parameters: nothing to differentiate.
   void require_parameters() const;
 

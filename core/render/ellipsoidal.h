@@ -6,7 +6,8 @@
 // Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
 // that ends outside is found by emitter arcs, whatever it went through before.
 // Every crossing arc is sampled once; only which of them gets its visibility tested is a random pick, so the density
-// of a technique is one over the arc's span.
+// of a technique is one over the arc's span. (The pick by contribution has to look at all arcs; the uniform one looks at
+// the picked arc alone.)
 #pragma once
 #include <span>
 
@@ -185,19 +186,15 @@ class EllipsoidalConnections {
 
     const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
     ArcPair chosen;
-    double total = 0, chosen_weight = 0;
-    for (const int t : worker_.candidates) {
+    const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
       const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
       const bool two_sided = scene_.material_of(t).two_sided;
-      if (!((side_x > 0 && side_y > 0) || (two_sided && side_x < 0 && side_y < 0))) continue;
-      ArcPair arcs;
+      if (!((side_x > 0 && side_y > 0) || (two_sided && side_x < 0 && side_y < 0))) return;
       for (int i = 0; i < 2; ++i)
         if (target.present[i] && ellipsoids[i].valid())
           surface_arc_point(ellipsoids[i], t, y, along, pixel, factor, arcs.side[i]);
-      choose(arcs, pick, total, chosen, chosen_weight);
-    }
-    if (!(total > 0)) return;
-    const double inverse_probability = total / chosen_weight;
+    });
+    if (inverse_probability == 0) return;
     for (int i = 0; i < 2; ++i) {
       const ArcPoint& q = chosen.side[i];
       if (q.value.is_black()) continue;
@@ -213,7 +210,7 @@ class EllipsoidalConnections {
 
   void connect_emitter(const Target& target, int pixel, const Rgb& throughput, Rng& rng) {
     const double along = rng.uniform();
-    double pick = rng.uniform();
+    const double pick = rng.uniform();
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
     const double before = path.length.back();
@@ -222,21 +219,16 @@ class EllipsoidalConnections {
     worker_.candidates.clear();
     scene_.emitter_triangles.query(x.p, x.p, low, high, worker_.candidates);
     worker_.arcs += 1 + worker_.candidates.size();
-    if (worker_.candidates.empty()) return;
 
     const Ellipsoid spheres[2] = {{x.p, x.p, 2 * (target.tau[0] - before)}, {x.p, x.p, 2 * (target.tau[1] - before)}};
     ArcPair chosen;
-    double total = 0, chosen_weight = 0;
-    for (const int t : worker_.candidates) {
-      if (!(dot(scene_.normal[t], x.p - scene_.corner(t, 0)) > 0) || ends_are_static(t)) continue;
-      ArcPair arcs;
+    const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
+      if (!(dot(scene_.normal[t], x.p - scene_.corner(t, 0)) > 0) || ends_are_static(t)) return;
       for (int i = 0; i < 2; ++i)
         if (target.present[i] && spheres[i].valid())
           emitter_arc_point(spheres[i], t, along, pixel, throughput, arcs.side[i]);
-      choose(arcs, pick, total, chosen, chosen_weight);
-    }
-    if (!(total > 0)) return;
-    const double inverse_probability = total / chosen_weight;
+    });
+    if (inverse_probability == 0) return;
     for (int i = 0; i < 2; ++i) {
       const ArcPoint& y = chosen.side[i];
       if (y.value.is_black()) continue;
@@ -247,19 +239,35 @@ class EllipsoidalConnections {
     }
   }
 
-  /// Weighted reservoir over arcs: keeps one in proportion to its unshadowed contribution, re-using one number.
-  static void choose(const ArcPair& arcs, double& pick, double& total, ArcPair& chosen, double& chosen_weight) {
-    const double weight = arcs.weight();
-    if (!(weight > 0)) return;
-    total += weight;
-    const double share = weight / total;
-    if (pick < share) {
-      chosen = arcs;
-      chosen_weight = weight;
-      pick /= share;
-    } else {
-      pick = (pick - share) / (1 - share);
+  /// Picks one of the candidates' arcs, which sample(triangle, arcs) fills in: uniformly, or in proportion to the
+  /// unshadowed contribution (a weighted reservoir that re-uses one number). Returns one over the probability, 0 where
+  /// nothing is carried.
+  template <class F>
+  double choose(double pick, ArcPair& chosen, F&& sample) const {
+    const std::vector<int>& candidates = worker_.candidates;
+    if (candidates.empty()) return 0;
+    if (worker_.options.pick == ArcPick::uniform) {
+      const int count = static_cast<int>(candidates.size());
+      sample(candidates[std::min(static_cast<int>(pick * count), count - 1)], chosen);
+      return chosen.weight() > 0 ? count : 0;
     }
+    double total = 0, chosen_weight = 0;
+    for (const int t : candidates) {
+      ArcPair arcs;
+      sample(t, arcs);
+      const double weight = arcs.weight();
+      if (!(weight > 0)) continue;
+      total += weight;
+      const double share = weight / total;
+      if (pick < share) {
+        chosen = arcs;
+        chosen_weight = weight;
+        pick /= share;
+      } else {
+        pick = (pick - share) / (1 - share);
+      }
+    }
+    return total > 0 ? total / chosen_weight : 0;
   }
 
   /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.

@@ -14,6 +14,10 @@ namespace isochron {
 
 enum class Sampling { automatic, standard, ellipsoidal };
 
+/// How ellipsoidal connections pick one of the arcs on an ellipsoid: in proportion to what each would carry if nothing
+/// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
+enum class ArcPick { contribution, uniform };
+
 /// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
 struct BoundaryTechniques {
   bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
@@ -33,6 +37,7 @@ struct EstimatorOptions {
   int max_bounces = 8;                      ///< scattering vertices on a path, >= 0
   Sampling sampling = Sampling::automatic;
   bool antithetic = true;                   ///< coupled pairs for the gate's derivative under ellipsoidal sampling
+  ArcPick pick = ArcPick::contribution;     ///< of ellipsoidal sampling
   std::optional<SamplingMix> mix = {};      ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
   /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.

@@ -122,6 +122,9 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
       {"gradient", file, "-o", out, "--samples", "1"},
       {"inspect", file, "-o", out, "--seconds", "0"},
       {"inspect", file, "-o", out, "--apply", "--samples", "4"},
+      {"chart", file, "-o", out, "--seconds", "0"},
+      {"chart", file, "-o", out, "--steps", "0.1,-1"},
+      {"chart", file, "-o", out, "--set", "parameters=[]"},
       {"resume", out},
   };
   for (const auto& command : commands) {
@@ -133,7 +136,8 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
 }
 
 TEST_F(Program, HelpShowsExamples) {
-  for (const char* command : {"run", "resume", "render", "derive", "gradient", "check", "inspect"}) {
+  for (const char* command : {"run", "resume", "render", "derive", "gradient", "check",
+                              "inspect", "chart"}) {
     EXPECT_EQ(run({command, "--help"}).status, 0);
     EXPECT_NE(folder_.read("stdout").find(std::string("  isochron ") + command), std::string::npos);
   }
@@ -199,6 +203,28 @@ TEST_F(Program, InspectAppliesItsAdvice) {
   EXPECT_GE(bounces, 1);
   EXPECT_NE(after.find("max_bounces: 9}"), std::string::npos) << after;  // the target's light is as it was
   EXPECT_EQ(run({"render", file, "-o", out, "--no-plots"}).status, 0);
+}
+
+TEST_F(Program, ChartComparesTheMethods) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  const Result result = run({"chart", file, "-o", out, "--seconds", "0.4", "--steps", "0.05", "--quiet"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(folder_.has("out/chart.png"));
+  const std::string chart = folder_.read("out/chart.csv"), table = folder_.read("out/chart_table.csv");
+  EXPECT_EQ(chart.rfind("method,factor,repeats,core_seconds,error,variance,variance_error,bias2,bias2_error,"
+                        "components,unknowns\nreference,,32,",
+                        0),
+            0u);
+  for (const char* method : {"standard", "ellipsoidal_uncoupled", "ellipsoidal_coupled", "auto",
+                             "finite_difference_0.05", "paper"}) {
+    EXPECT_NE(chart.find(std::string("\n") + method + ","), std::string::npos) << method;
+    EXPECT_NE(table.find(std::string("\n") + method + ","), std::string::npos) << method;
+  }
+  EXPECT_NE(folder_.read("stdout").find("max_bounces is 2: no method with 3 bounces"), std::string::npos);
+  // A parameter without any influence has no gradient to compare.
+  const Result dark = run({"chart", file, "-o", out, "--seconds", "0.1", "--set", "gates.centers=[90]"});
+  EXPECT_EQ(dark.status, 1);
+  EXPECT_NE(dark.errors.find("does not stand out of its noise"), std::string::npos) << dark.errors;
 }
 
 TEST_F(Program, GatesThatNoPathReaches) {

@@ -79,6 +79,37 @@ INSTANTIATE_TEST_SUITE_P(Gates, Combined,
                                                                               {0.2, 0.8, 1.4, 0.6, 0.1})}),
                          [](const auto& test) { return test.param.name; });
 
+/// Image and derivative by the light's motion with arcs picked uniformly, against those picked by contribution. (By the
+/// block's motion a uniform pick has rare large samples, which a short test cannot do with.)
+TEST(ArcPick, UniformHasTheSameMean) {
+  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = 16;
+  const TangentBasis basis = make_basis(scene, {translate(scene, "light", {0.4, 0, 0.3})});
+  const GateSet gates(GateShape::truncated_gaussian(0.2, 0.25), {5.0, 6.0});
+  EstimatorOptions options{.max_bounces = 3, .sampling = Sampling::ellipsoidal};
+  const Renderer by_contribution(scene, gates, options, &basis);
+  options.pick = ArcPick::uniform;
+  const Renderer uniform(scene, gates, options, &basis);
+  constexpr int kBatches = 32;
+  const auto expected = image_means(by_contribution, 2, 8, kBatches, {61, 0, 0});
+  const auto image = image_means(uniform, 2, 16, kBatches, {62, 0, 0});
+  for (int g = 0; g < 2; ++g) {
+    EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5)
+        << image[g].mean << ", by contribution " << expected[g].mean;
+    EXPECT_LT(image[g].standard_error, 0.04 * expected[g].mean);
+  }
+  for (const Term term : {Term::interior, Term::path_length}) {
+    const auto exact = term_means(by_contribution, term, 1, 2, 12, kBatches, {63, 0, 0})[0];
+    const auto derivative = term_means(uniform, term, 1, 2, 32, kBatches, {64, 0, 0})[0];
+    const double scale = std::hypot(exact[0].mean, exact[1].mean) / std::sqrt(2.0);
+    for (int g = 0; g < 2; ++g) {
+      EXPECT_LT(std::abs(z_score(derivative[g], exact[g])), 4.5)
+          << name(term) << " gate " << g << ": " << derivative[g].mean << ", by contribution " << exact[g].mean;
+      EXPECT_LT(derivative[g].standard_error, 0.15 * scale) << name(term) << " gate " << g;
+    }
+  }
+}
+
 GatedImage uneven_adjoint(int width, int height, int gates) {
   GatedImage adjoint(width, height, gates, 1);
   Rng rng(Stream{7, 0, 0}, 0, 0);

@@ -1,0 +1,85 @@
+// Ways to a gradient, to be compared on one experiment: settings of the same renderer.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "optim/problem.h"
+
+namespace isochron {
+
+/// CPU seconds of this process so far, all threads.
+double process_cpu_seconds();
+
+struct Method {
+  enum class Gradient {
+    adjoint,            ///< one pass for all unknowns and gates
+    finite_difference,  ///< two images per unknown
+    forward             ///< a derivative image per unknown and gate, each from passes of its own
+  };
+  std::string name;
+  std::function<void(Experiment&)> change;  ///< what makes it differ from the experiment
+  Gradient gradient = Gradient::adjoint;
+};
+
+/// `auto`: sampling as the renderer chooses, coupled pairs, arcs by contribution; analytic.
+Method automatic_method();
+
+/// standard, ellipsoidal_uncoupled, ellipsoidal_coupled, auto, finite_difference_STEP for each of the steps
+/// (images as auto), 3_bounces (else auto), and `paper`: ellipsoidal coupled, uniform pick of arcs, one gate
+/// and one unknown per pass. What makes no sense for the experiment is left out, with a line in `notes`:
+/// ellipsoidal sampling under steady gates, 3_bounces where there are no more.
+std::vector<Method> methods_for(const Experiment& experiment, const std::vector<double>& steps,
+                                std::vector<std::string>& notes);
+
+/// Three steps for finite differences: 4, 1 and 1/4 times the smallest check_step of the parameters, or
+/// gradient.step where the experiment gives one.
+std::vector<double> default_steps(const Problem& problem, const std::vector<double>& theta);
+
+/// At most `most` of n unknowns, evenly spread.
+std::vector<int> spread_components(int n, int most);
+
+/// One method made ready on an experiment.
+class MethodRun {
+ public:
+  /// Throws InputError.
+  MethodRun(Experiment experiment, const Method& method);
+
+  Problem& problem() { return problem_; }
+  /// The smallest factor at which every term that is not left out still has a sample.
+  double least_factor() const;
+  /// From now on every term takes `factor` times the experiment's samples, rounded, 1 at least.
+  void set_factor(double factor);
+  /// Unknowns whose derivative is computed; for methods whose cost grows with their number all but a few can
+  /// be left out. All unless said.
+  void set_components(std::vector<int> components) { components_ = std::move(components); }
+  const std::vector<int>& components() const { return components_; }
+
+  struct Estimate {
+    std::vector<double> gradient;  ///< of the chosen components
+    /// CPU time of a whole gradient: where components were left out, that of the derivatives scaled to all
+    /// unknowns.
+    double core_seconds = 0;
+  };
+  /// An estimate with the random numbers of one iteration.
+  Estimate gradient(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
+                    const Poll& poll) const;
+
+ private:
+  /// Derivative images by one unknown, of all gates.
+  GatedImage derivative(const std::vector<double>& theta, int component, std::uint32_t iteration,
+                        const Poll& poll) const;
+  /// `render(renderer, stream)` of every gate by itself, put together.
+  template <class F>
+  GatedImage gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration,
+                          const Poll& poll, F&& render) const;
+
+  Method::Gradient kind_;
+  Problem problem_;
+  SampleSpec samples_;
+  std::vector<int> components_;
+};
+
+}  // namespace isochron

@@ -1,0 +1,134 @@
+#!/usr/bin/python3
+"""Draws what `isochron chart` wrote into a folder: chart.png from chart.csv and chart_table.csv.
+
+usage: plot_chart.py DIR
+"""
+
+import csv
+import os
+import pathlib
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+# Colour says what kind of method it is, marker and dashes which one.
+STYLES = {
+    "standard": ("tab:red", "o"),
+    "ellipsoidal_uncoupled": ("tab:orange", "s"),
+    "ellipsoidal_coupled": ("tab:blue", "D"),
+    "auto": ("black", "*"),
+    "3_bounces": ("tab:purple", "P"),
+    "paper": ("tab:brown", "X"),
+}
+DIFFERENCES = [("#1b7837", "v"), ("#5aae61", "^"), ("#a6dba0", ">")]
+
+
+class PlotError(Exception):
+    """Something that keeps a picture from being drawn, in one line."""
+
+
+def read_rows(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    if not rows:
+        raise PlotError(f"{path}: no rows")
+    return rows
+
+
+def number(text):
+    return float(text) if text else np.nan
+
+
+def save(figure, path):
+    temporary = path.with_name(path.name + ".tmp")
+    figure.savefig(temporary, format="png", dpi=110)
+    plt.close(figure)
+    os.replace(temporary, path)
+
+
+def styles(methods):
+    """Method -> colour and marker; finite differences in the order of the file."""
+    differences = [m for m in methods if m.startswith("finite_difference")]
+    others = {m: DIFFERENCES[i % len(DIFFERENCES)] for i, m in enumerate(differences)}
+    return {m: STYLES.get(m) or others.get(m, ("grey", ".")) for m in methods}
+
+
+def plain(method):
+    """A method's name for people."""
+    return method.replace("finite_difference_", "finite differences, step ").replace("_", " ")
+
+
+
+
+def draw_chart(folder):
+    """Relative error over core-seconds of a gradient: measured points, and the fitted law with its bias beyond."""
+    rows, table = read_rows(folder / "chart.csv"), read_rows(folder / "chart_table.csv")
+    reference = float(rows[0]["error"])
+    methods = [row["method"] for row in table]
+    style = styles(methods)
+    points = {m: [(float(r["core_seconds"]), float(r["error"])) for r in rows if r["method"] == m] for m in methods}
+    all_times = [t for p in points.values() for t, _ in p]
+    all_errors = [e for p in points.values() for _, e in p if e > 0]
+    finite = [float(r["core_seconds"]) for r in table if np.isfinite(float(r["core_seconds"]))]
+    low_error = min(0.005, 0.7 * min(all_errors))
+    left, right = 0.6 * min(all_times), 4 * max(all_times + finite)
+    top = 2 * max(all_errors)
+
+    figure, axis = plt.subplots(figsize=(10, 6), layout="constrained")
+    times = np.geomspace(left, right, 200)
+    for level in np.arange(np.log10(low_error * np.sqrt(left)) - 1, np.log10(top * np.sqrt(right)) + 1, 0.5):
+        axis.plot(times, 10**level / np.sqrt(times), color="0.9", lw=0.7, zorder=0)
+    axis.axhline(0.01, color="0.3", lw=1, ls=":", zorder=1)
+    axis.text(right, 0.0102, "1 % ", ha="right", va="bottom", fontsize=8, color="0.3")
+    axis.axhspan(low_error, reference, color="0.5", alpha=0.08, zorder=0)
+    axis.text(right, reference * 0.97, f"error of the reference, {100 * reference:.2g} % ", ha="right", va="top",
+              fontsize=7, color="0.45")
+    for row in table:
+        method, (color, marker) = row["method"], style[row["method"]]
+        x, y = zip(*points[method])
+        seconds = float(row["core_seconds"])
+        biased = row["bias_significant"] == "true"
+        bias2 = float(row["bias2"]) if biased else 0.0
+        what = f"{seconds:.3g} s" if np.isfinite(seconds) else f"never, bias {100 * np.sqrt(bias2):.2g} %"
+        axis.plot(x, y, marker, color=color, ms=9 if marker == "*" else 6, label=f"{plain(method)}: {what}", zorder=3)
+        beyond = times[times >= x[max(0, len(x) - 3)]]
+        law = float(row["rate"]) / beyond + bias2
+        axis.plot(beyond, np.sqrt(law), color=color, lw=1.3, ls="-" if not biased else "--", zorder=2)
+        if biased:
+            axis.plot([x[0], right], [np.sqrt(bias2)] * 2, color=color, lw=0.8, ls=":", zorder=1)
+    axis.set(xscale="log", yscale="log", xlim=(left, right), ylim=(low_error, top))
+    axis.set_xlabel("core-seconds for one gradient")
+    axis.set_ylabel("error of the gradient, relative to its norm")
+    axis.set_title(f"{folder.resolve().name}: error against time (points measured, lines fitted; grey: slope -1/2)", fontsize=10)
+    axis.legend(title="core-seconds to 1 % error", fontsize=8, title_fontsize=8, loc="center left",
+                bbox_to_anchor=(1.01, 0.5), frameon=False)
+    save(figure, folder / "chart.png")
+
+
+def main(arguments):
+    if arguments in (["-h"], ["--help"]):
+        print(__doc__.strip())
+        return 0
+    if len(arguments) != 1 or arguments[0].startswith("-"):
+        print("usage: plot_chart.py DIR", file=sys.stderr)
+        return 2
+    folder = pathlib.Path(arguments[0])
+    drawings = {"chart.csv": draw_chart}
+    found = [name for name in drawings if (folder / name).exists()]
+    try:
+        if not found:
+            raise PlotError(f"{folder}: none of {', '.join(drawings)}")
+        for name in found:
+            drawings[name](folder)
+    except (PlotError, OSError, KeyError, ValueError, csv.Error) as error:
+        print(f"plot_chart.py: {folder}: {' '.join(str(error).split())}", file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
