@@ -84,9 +84,10 @@ def draw_chart(folder):
         axis.plot(times, 10**level / np.sqrt(times), color="0.9", lw=0.7, zorder=0)
     axis.axhline(0.01, color="0.3", lw=1, ls=":", zorder=1)
     axis.text(right, 0.0102, "1 % ", ha="right", va="bottom", fontsize=8, color="0.3")
-    axis.axhspan(low_error, reference, color="0.5", alpha=0.08, zorder=0)
-    axis.text(right, reference * 0.97, f"error of the reference, {100 * reference:.2g} % ", ha="right", va="top",
-              fontsize=7, color="0.45")
+    if reference > low_error:
+        axis.axhspan(low_error, reference, color="0.5", alpha=0.08, zorder=0)
+        axis.text(right, reference * 0.97, f"error of the reference, {100 * reference:.2g} % ", ha="right", va="top",
+                  fontsize=7, color="0.45")
     for row in table:
         method, (color, marker) = row["method"], style[row["method"]]
         x, y = zip(*points[method])
