@@ -9,6 +9,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "optim/files.h"
+#include "optim/solver_race.h"
 
 namespace isochron {
 namespace {
@@ -18,32 +19,55 @@ struct ChartCommand {
   double seconds = 60;
   double error_percent = 1;
   std::vector<double> steps;
+  bool solvers = false;
+  int seeds = 3;
 };
 
-int chart(const ChartCommand& command) {
-  begin_session(command.common);
-  const Experiment experiment = read_experiment(command.common);
-  const Problem problem(experiment);
-  problem.require_parameters();
+void note_progress(const std::string& what) {
+  spdlog::info("{}", what);
+}
+
+void chart_solvers(const ChartCommand& command, const Problem& problem, const std::string& folder) {
+  require_error(problem);
+  RaceOptions options;
+  options.core_seconds = command.seconds * thread_count(command.common);
+  options.error = command.error_percent / 100;
+  options.seeds = command.seeds;
+  options.poll = poll_interrupt;
+  options.progress = note_progress;
+  const Race race = race_solvers(problem.experiment(), problem.make_target(poll_interrupt), options);
+  write_file_atomically(folder + "/chart_solvers.csv", race_csv(race));
+  fmt::print("{}", race_table(race));
+  spdlog::info("wrote {}/chart_solvers.csv", folder);
+}
+
+void chart_gradient(const ChartCommand& command, const Problem& problem, const std::string& folder) {
   const std::vector<double> theta =
       problem.parameters().parse_point(command.common.at.empty() ? "initial" : command.common.at);
-  const std::string folder =
-      command.common.output.empty() ? "runs/" + experiment.name + "-chart" : command.common.output;
-  make_output_folder(folder);
-  catch_interrupts();
   ChartOptions options;
   options.core_seconds = command.seconds * thread_count(command.common);
   options.error = command.error_percent / 100;
   options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
   options.poll = poll_interrupt;
-  options.progress = [](const std::string& what) { spdlog::info("{}", what); };
+  options.progress = note_progress;
   options.progress("target");
   const GatedImage target = problem.make_target(poll_interrupt);
-  const Chart result = make_chart(experiment, theta, target, options);
-  write_file_atomically(folder + "/chart.csv", chart_csv(result));
-  write_file_atomically(folder + "/chart_table.csv", chart_table_csv(result));
-  fmt::print("{}", chart_table(result));
+  const Chart chart = make_chart(problem.experiment(), theta, target, options);
+  write_file_atomically(folder + "/chart.csv", chart_csv(chart));
+  write_file_atomically(folder + "/chart_table.csv", chart_table_csv(chart));
+  fmt::print("{}", chart_table(chart));
   spdlog::info("wrote {0}/chart.csv and {0}/chart_table.csv", folder);
+}
+
+int chart(const ChartCommand& command) {
+  begin_session(command.common);
+  const Problem problem(read_experiment(command.common));
+  problem.require_parameters();
+  const std::string folder =
+      command.common.output.empty() ? "runs/" + problem.experiment().name + "-chart" : command.common.output;
+  make_output_folder(folder);
+  catch_interrupts();
+  (command.solvers ? chart_solvers : chart_gradient)(command, problem, folder);
   return command.common.no_plots || draw_charts(folder) ? 0 : 1;
 }
 
@@ -56,7 +80,7 @@ void add_chart(CLI::App& app, Action& action) {
   add_experiment_options(*sub, command->common);
   sub->add_option(
          "--seconds", command->seconds,
-         "time for the whole chart on idle cores, about; a quarter goes to the reference, the target is not "
+         "time for all of it on idle cores, about; a quarter goes to the reference, the target is not "
          "counted")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
@@ -72,10 +96,19 @@ void add_chart(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->type_name("A,B,C");
+  sub->add_flag("--solvers", command->solvers,
+                "reconstructions instead: error of the parameters against time for every optimiser");
+  sub->add_option("--seeds", command->seeds, "with --solvers: runs of each optimiser")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->type_name("N");
   sub->footer(
-      "Writes chart.csv, chart_table.csv and chart.png into -o, default runs/NAME-chart.\n"
+      "Writes chart.csv, chart_table.csv and chart.png (--solvers: chart_solvers.csv and .png) into -o, "
+      "default\n"
+      "runs/NAME-chart.\n"
       "Examples:\n"
       "  isochron chart cube.yaml\n"
+      "  isochron chart cube.yaml --solvers --seeds 5\n"
       "  isochron chart cube.yaml --seconds 300 --at height=0.1 -o charts\n"
       "  isochron chart cube.yaml --set gates.sigma=0.1 --steps 0.1,0.01");
   sub->callback([&action, command] { action = [command] { return chart(*command); }; });

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
   isochron::add_check(app, action);
   isochron::add_inspect(app, action);
   isochron::add_chart(app, action);
+  isochron::add_stability(app, action);
   try {
     app.parse(argc, argv);
     return action();

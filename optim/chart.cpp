@@ -16,36 +16,6 @@ constexpr int kRungs = 4;
 constexpr int kFewestRepeats = 4, kRepeats = 10, kMostRepeats = 400;
 /// Unknowns that are looked at where the time grows with their number.
 constexpr int kMostComponents = 6;
-/// Iterations from here on only find out how long samples take.
-constexpr std::uint32_t kTrialIteration = 0x80000000u;
-
-/// Core-seconds of an estimate with the least number of samples, twice as many and so on, up to where
-/// `repeats` of the next would take more than `core_seconds`. The first factor is a power of two.
-struct Trial {
-  double first_factor = 1;
-  std::vector<double> core_seconds;
-  double factor(int step) const { return std::ldexp(first_factor, step); }
-  /// The last step of which `repeats` take so long at most; 0 where even the first takes longer.
-  int last_within(double seconds, int repeats) const {
-    int step = static_cast<int>(core_seconds.size()) - 1;
-    while (step > 0 && repeats * core_seconds[step] > seconds) --step;
-    return step;
-  }
-};
-
-Trial try_times(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,
-                double core_seconds, const Poll& poll) {
-  Trial trial{std::exp2(std::ceil(std::log2(run.least_factor()))), {}};
-  constexpr int kMostSteps = 24;
-  for (int step = 0; step < kMostSteps; ++step) {
-    run.set_factor(trial.factor(step));
-    trial.core_seconds.push_back(
-        run.gradient(theta, target, kTrialIteration + static_cast<std::uint32_t>(step), poll).core_seconds);
-    if (repeats * 2 * trial.core_seconds.back() > core_seconds) break;
-  }
-  return trial;
-}
-
 std::vector<double> select(const std::vector<double>& values, const std::vector<int>& components) {
   std::vector<double> selected;
   for (int component : components) selected.push_back(values[component]);
@@ -80,7 +50,7 @@ ChartMethod climb(const Experiment& experiment, const Method& method, const std:
   const int unknowns = run.problem().parameters().size();
   if (method.gradient != Method::Gradient::adjoint)
     run.set_components(spread_components(unknowns, kMostComponents));
-  const Trial trial = try_times(run, theta, target, kRepeats, core_seconds, poll);
+  const SampleTrial trial = try_samples(run, theta, target, kRepeats, core_seconds, poll);
   int rungs = kRungs;
   while (rungs > 1 && trial.last_within(core_seconds / rungs, kRepeats) < rungs - 1) --rungs;
   const double of_rung = core_seconds / rungs;
@@ -121,7 +91,7 @@ Reference make_reference(const Experiment& experiment, const std::vector<double>
   Experiment own = experiment;
   own.seed ^= kReferenceSeed;
   MethodRun run(own, automatic_method());
-  const Trial trial = try_times(run, theta, target, kReferenceRepeats, core_seconds, poll);
+  const SampleTrial trial = try_samples(run, theta, target, kReferenceRepeats, core_seconds, poll);
   // All of the time, in equal repeats.
   const int last = trial.last_within(core_seconds, kReferenceRepeats);
   run.set_factor(trial.factor(last) *

@@ -203,4 +203,28 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
   return result;
 }
 
+double SampleTrial::factor(int step) const {
+  return std::ldexp(first_factor, step);
+}
+
+int SampleTrial::last_within(double seconds, int repeats) const {
+  int step = static_cast<int>(core_seconds.size()) - 1;
+  while (step > 0 && repeats * core_seconds[step] > seconds) --step;
+  return step;
+}
+
+SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target,
+                        int repeats, double core_seconds, const Poll& poll) {
+  constexpr std::uint32_t kTrialIteration = 0x80000000u;
+  constexpr int kMostSteps = 24;
+  SampleTrial trial{std::exp2(std::ceil(std::log2(run.least_factor()))), {}};
+  for (int step = 0; step < kMostSteps; ++step) {
+    run.set_factor(trial.factor(step));
+    trial.core_seconds.push_back(
+        run.gradient(theta, target, kTrialIteration + static_cast<std::uint32_t>(step), poll).core_seconds);
+    if (repeats * 2 * trial.core_seconds.back() > core_seconds) break;
+  }
+  return trial;
+}
+
 }  // namespace isochron

@@ -82,4 +82,18 @@ class MethodRun {
   std::vector<int> components_;
 };
 
+/// Core-seconds of a gradient with the least number of samples, twice as many and so on.
+struct SampleTrial {
+  double first_factor = 1;  ///< a power of two
+  std::vector<double> core_seconds;
+  double factor(int step) const;
+  /// The last step of which `repeats` take so long at most; 0 where even the first takes longer.
+  int last_within(double seconds, int repeats) const;
+};
+
+/// Goes on up to where `repeats` of the next step would take more than `core_seconds`. Takes other random
+/// numbers than iterations below 2^31.
+SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target,
+                        int repeats, double core_seconds, const Poll& poll);
+
 }  // namespace isochron

@@ -201,6 +201,15 @@ Parameters::VertexField Parameters::vertex_field(const Block& block) const {
   throw std::logic_error("not a parameter of vertices: " + block.name);
 }
 
+double Parameters::distance_to_target(const std::vector<double>& theta) const {
+  double sum = 0;
+  for (std::size_t i = 0; i < theta.size(); ++i) {
+    const double error = theta[i] - target_[i];
+    sum += error * error;
+  }
+  return std::sqrt(sum / static_cast<double>(theta.size()));
+}
+
 bool Parameters::target_known() const {
   return std::none_of(target_.begin(), target_.end(), [](double value) { return std::isnan(value); });
 }

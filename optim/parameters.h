@@ -49,6 +49,8 @@ class Parameters {
   /// Target values. Components without one are NaN.
   const std::vector<double>& target() const { return target_; }
   bool target_known() const;
+  /// Root mean square of theta - target over the unknowns; NaN where a target value is unknown.
+  double distance_to_target(const std::vector<double>& theta) const;
   const std::vector<double>& lower() const { return lower_; }  ///< -infinity where there is none
   const std::vector<double>& upper() const { return upper_; }
 

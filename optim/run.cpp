@@ -33,15 +33,6 @@ double norm(const std::vector<double>& v) {
   return std::sqrt(sum);
 }
 
-double distance_to_target(const Parameters& parameters, const std::vector<double>& theta) {
-  double sum = 0;
-  for (std::size_t i = 0; i < theta.size(); ++i) {
-    const double error = theta[i] - parameters.target()[i];
-    sum += error * error;
-  }
-  return std::sqrt(sum / static_cast<double>(theta.size()));
-}
-
 class Run {
  public:
   Run(const Problem& problem, const RunOptions& options)
@@ -97,7 +88,7 @@ class Run {
                state_.seconds + seconds_since(iteration_start),
                now.loss,
                std::sqrt(now.mean_squared_error),
-               distance_to_target(parameters_, theta),
+               parameters_.distance_to_target(theta),
                norm(now.gradient)};
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image);

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""Draws what `isochron chart` wrote into a folder: chart.png from chart.csv and chart_table.csv.
+"""Draws what `isochron chart` and `isochron stability` wrote into a folder, as far as it is there: chart.png from
+chart.csv and chart_table.csv, chart_solvers.png and stability.png from files of the same name.
 
 usage: plot_chart.py DIR
 """
@@ -110,6 +111,68 @@ def draw_chart(folder):
     save(figure, folder / "chart.png")
 
 
+def draw_stability(folder):
+    """Two maps over width and method: estimates that point the right way, and the error that a reconstruction leaves."""
+    rows = read_rows(folder / "stability.csv")
+    widths = sorted({float(r["width"]) for r in rows}, reverse=True)
+    methods = list(dict.fromkeys(r["method"] for r in rows))
+    cells = {(float(r["width"]), r["method"]): r for r in rows}
+
+    def grid(column):
+        return np.array([[number(cells[w, m][column]) for m in methods] for w in widths])
+
+    size = (2 * (1.0 * len(methods) + 1.6), 0.55 * len(widths) + 2.3)
+    figure, axes = plt.subplots(1, 2, figsize=size, sharey=True, layout="constrained")
+    panels = [
+        ("positive", "gradient estimates that point the right way", "RdYlGn", matplotlib.colors.Normalize(0.5, 1)),
+        ("error_ratio", "error after a short reconstruction / before", "RdYlGn_r", matplotlib.colors.LogNorm(0.01, 1.5)),
+    ]
+    for axis, (column, title, cmap, norm) in zip(axes, panels):
+        values = grid(column)
+        colormap = matplotlib.colormaps[cmap].copy()
+        colormap.set_bad("0.85")
+        image = axis.imshow(np.ma.masked_invalid(values), cmap=colormap, norm=norm, aspect="auto")
+        for i, width in enumerate(widths):
+            for j, method in enumerate(methods):
+                value = values[i, j]
+                text = "-" if np.isnan(value) else f"{100 * value:.0f} %" if column == "positive" else f"{value:.2g}"
+                if reason := cells[width, method]["failure"]:
+                    text += f"\n{reason}"
+                shade = np.nan if np.isnan(value) else float(norm(value))
+                color = "white" if shade < 0.12 or shade > 0.9 else "black"  # the ends of the scale are dark
+                axis.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
+        axis.set_title(title, fontsize=10)
+        axis.set_xticks(range(len(methods)), [plain(m).replace(", ", ",\n").replace(" un", "\nun").replace(" co", "\nco")
+                                              for m in methods], fontsize=7, rotation=30, ha="right")
+        axis.set_yticks(range(len(widths)), [f"{w:.2g}" for w in widths], fontsize=8)
+        figure.colorbar(image, ax=axis, shrink=0.8, extend="both").ax.tick_params(labelsize=7)
+    axes[0].set_ylabel("gate width, standard deviation / path length")
+    figure.suptitle(f"{folder.resolve().name}: all methods at the same CPU time per gradient; words: why a cell fails",
+                    fontsize=10)
+    save(figure, folder / "stability.png")
+
+
+def draw_solvers(folder):
+    """Error of the parameters over core-seconds, a line per run."""
+    rows = read_rows(folder / "chart_solvers.csv")
+    colors = {"adam": "tab:blue", "lbfgs": "tab:orange", "levenberg_marquardt": "tab:green"}
+    figure, axis = plt.subplots(figsize=(8, 5), layout="constrained")
+    first = min(float(r["core_seconds"]) for r in rows if float(r["core_seconds"]) > 0)
+    for method, seed in dict.fromkeys((r["method"], r["seed"]) for r in rows):
+        run = [r for r in rows if (r["method"], r["seed"]) == (method, seed)]
+        # The start, at no time at all, stands at the left edge.
+        times = [max(float(r["core_seconds"]), 0.7 * first) for r in run]
+        label = plain(method) if seed == run[0]["seed"] == rows[0]["seed"] else None
+        axis.loglog(times, [100 * float(r["error"]) for r in run], color=colors.get(method, "grey"), lw=1.1, marker=".",
+                    ms=3, alpha=0.8, label=label)
+    axis.axhline(1, color="0.3", lw=1, ls=":")
+    axis.set(xlabel="core-seconds (the target is not counted)", ylabel="error of the parameters, % of the initial one")
+    axis.set_title(f"{folder.resolve().name}: reconstructions, a line per seed", fontsize=10)
+    axis.grid(True, which="both", lw=0.3, alpha=0.4)
+    axis.legend(fontsize=8)
+    save(figure, folder / "chart_solvers.png")
+
+
 def main(arguments):
     if arguments in (["-h"], ["--help"]):
         print(__doc__.strip())
@@ -118,7 +181,7 @@ def main(arguments):
         print("usage: plot_chart.py DIR", file=sys.stderr)
         return 2
     folder = pathlib.Path(arguments[0])
-    drawings = {"chart.csv": draw_chart}
+    drawings = {"chart.csv": draw_chart, "chart_solvers.csv": draw_solvers, "stability.csv": draw_stability}
     found = [name for name in drawings if (folder / name).exists()]
     try:
         if not found:

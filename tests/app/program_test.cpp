@@ -125,6 +125,10 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
       {"chart", file, "-o", out, "--seconds", "0"},
       {"chart", file, "-o", out, "--steps", "0.1,-1"},
       {"chart", file, "-o", out, "--set", "parameters=[]"},
+      {"chart", file, "-o", out, "--solvers", "--at", "target", "--set", "parameters[0].initial=0", "--set",
+       "parameters[1].initial=10"},
+      {"stability", file, "-o", out, "--widths", "0.1,0"},
+      {"stability", file, "-o", out, "--set", "gates={kind: steady}"},
       {"resume", out},
   };
   for (const auto& command : commands) {
@@ -137,7 +141,7 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
 
 TEST_F(Program, HelpShowsExamples) {
   for (const char* command : {"run", "resume", "render", "derive", "gradient", "check",
-                              "inspect", "chart"}) {
+                              "inspect", "chart", "stability"}) {
     EXPECT_EQ(run({command, "--help"}).status, 0);
     EXPECT_NE(folder_.read("stdout").find(std::string("  isochron ") + command), std::string::npos);
   }
@@ -225,6 +229,35 @@ TEST_F(Program, ChartComparesTheMethods) {
   const Result dark = run({"chart", file, "-o", out, "--seconds", "0.1", "--set", "gates.centers=[90]"});
   EXPECT_EQ(dark.status, 1);
   EXPECT_NE(dark.errors.find("does not stand out of its noise"), std::string::npos) << dark.errors;
+}
+
+TEST_F(Program, ChartOfTheOptimisers) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  const Result result = run({"chart", file, "-o", out, "--solvers", "--seeds", "2", "--seconds", "0.3", "--quiet"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(folder_.has("out/chart_solvers.png"));
+  const std::string csv = folder_.read("out/chart_solvers.csv");
+  EXPECT_EQ(csv.rfind("method,seed,iteration,core_seconds,error\nadam,3,0,0,1\nadam,3,1,", 0), 0u) << csv;
+  for (const char* row : {"\nadam,4,0,0,1\n", "\nlbfgs,4,1,", "\nlevenberg_marquardt,4,1,"})
+    EXPECT_NE(csv.find(row), std::string::npos) << row;
+}
+
+TEST_F(Program, StabilityMapsWidthsAndMethods) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  const Result result = run({"stability", file, "-o", out, "--seconds", "0.5", "--widths", "1e-3,0.05", "--iterations",
+                             "3", "--steps", "0.05", "--quiet"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(folder_.has("out/stability.png"));
+  const std::string csv = folder_.read("out/stability.csv");
+  EXPECT_EQ(csv.rfind("width,method,factor,core_seconds,positive,cosine,cosine_error,zero,variance,bias2,bias2_error,"
+                      "error_ratio,reference_error,failure\n0.05,standard,",
+                      0),
+            0u)
+      << csv;
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 * 5);
+  EXPECT_NE(csv.find("\n0.001,finite_difference_0.05,"), std::string::npos);
+  const Result steady = run({"stability", file, "-o", out, "--set", "gates={kind: steady}"});
+  EXPECT_NE(steady.errors.find("steady gates have no width"), std::string::npos) << steady.errors;
 }
 
 TEST_F(Program, GatesThatNoPathReaches) {

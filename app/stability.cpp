@@ -1,0 +1,96 @@
+#include "optim/stability.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/plots.h"
+#include "optim/files.h"
+
+namespace isochron {
+namespace {
+
+struct StabilityCommand {
+  CommonOptions common;
+  double seconds = 180;
+  int iterations = 50;
+  std::vector<double> widths, steps;
+};
+
+/// Half decades from 10 % to 10^-4.5 of the path length.
+std::vector<double> half_decades() {
+  std::vector<double> widths;
+  for (int i = 2; i <= 9; ++i) widths.push_back(std::pow(10, -0.5 * i));
+  return widths;
+}
+
+int stability(const StabilityCommand& command) {
+  begin_session(command.common);
+  Experiment experiment = read_experiment(command.common);
+  StabilityOptions options;
+  options.widths = command.widths.empty() ? half_decades() : command.widths;
+  std::sort(options.widths.begin(), options.widths.end(), std::greater<>());
+  with_relative_width(experiment.gates, options.widths.front());  // steady gates fail here
+  const Problem problem(experiment);
+  problem.require_parameters();
+  const std::vector<double> theta = problem.parameters().initial();
+  const std::string folder =
+      command.common.output.empty() ? "runs/" + experiment.name + "-stability" : command.common.output;
+  make_output_folder(folder);
+  catch_interrupts();
+  options.core_seconds = command.seconds * thread_count(command.common);
+  options.iterations = command.iterations;
+  options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
+  options.poll = poll_interrupt;
+  options.progress = [](const std::string& what) { spdlog::info("{}", what); };
+  const Stability map = map_stability(experiment, options);
+  write_file_atomically(folder + "/stability.csv", stability_csv(map));
+  fmt::print("{}", stability_table(map));
+  spdlog::info("wrote {}/stability.csv", folder);
+  return command.common.no_plots || draw_charts(folder) ? 0 : 1;
+}
+
+}  // namespace
+
+void add_stability(CLI::App& app, Action& action) {
+  auto command = std::make_shared<StabilityCommand>();
+  CLI::App* sub = app.add_subcommand(
+      "stability", "Map over gate width and method where gradients and reconstructions fail");
+  add_experiment_options(*sub, command->common);
+  sub->get_option("--at")->group("");
+  sub->add_option(
+         "--seconds", command->seconds,
+         "time for the whole map on idle cores, about; every gradient of a width takes the same time")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str()
+      ->type_name("N");
+  sub->add_option("--iterations", command->iterations, "of each short reconstruction, by Adam")
+      ->check(CLI::Range(1, 100000))
+      ->capture_default_str()
+      ->type_name("N");
+  sub->add_option(
+         "--widths", command->widths,
+         "standard deviations of the gates over the path length; default: 1e-1 to 1e-4.5 in half decades")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber)
+      ->type_name("A,B,C");
+  sub->add_option("--steps", command->steps, "steps of the finite differences, as in `chart`")
+      ->delimiter(',')
+      ->check(CLI::PositiveNumber)
+      ->type_name("A,B,C");
+  sub->footer(
+      "Writes stability.csv and stability.png into -o, default runs/NAME-stability.\n"
+      "Examples:\n"
+      "  isochron stability cube.yaml\n"
+      "  isochron stability cube.yaml --widths 1e-2,1e-3 --seconds 60 -o map\n"
+      "  isochron stability corridor.yaml --iterations 100 --seconds 600");
+  sub->callback([&action, command] { action = [command] { return stability(*command); }; });
+}
+
+}  // namespace isochron

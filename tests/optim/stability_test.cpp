@@ -1,0 +1,95 @@
+// Labels of the stability map, on synthetic estimators that fail for a known reason. Fixed seeds.
+#include "optim/stability.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "core/math/error.h"
+#include "core/math/random.h"
+
+namespace isochron {
+namespace {
+
+const double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// `count` vectors about `center`, normal noise of standard deviation `noise` in each component.
+Repeats noisy(int count, const std::vector<double>& center, double noise, std::uint32_t number) {
+  Rng rng(Stream{91, number, 0}, 0, 0);
+  Repeats repeats(count, center);
+  for (auto& repeat : repeats)
+    for (double& x : repeat)
+      x += noise * std::sqrt(-2 * std::log(rng.uniform())) * std::cos(2 * std::numbers::pi * rng.uniform());
+  return repeats;
+}
+
+Reference reference_of(const std::vector<double>& truth, double noise) {
+  Reference reference;
+  reference.repeats = noisy(32, truth, noise, 1);
+  const WeightedRepeats alone{&reference.repeats, 1};
+  reference.norm2 = squared_norm({&alone, 1});
+  return reference;
+}
+
+TEST(Stability, DirectionByHand) {
+  const Reference reference = reference_of({0, 4}, 0);
+  const Direction d = direction({{0, 8}, {-4, 0}, {0, 0}, {0, -4}}, reference);
+  EXPECT_DOUBLE_EQ(d.positive, 0.25);  // the second is at a right angle
+  EXPECT_DOUBLE_EQ(d.zero, 0.25);
+  EXPECT_NEAR(d.cosine.value, 0, 1e-15);
+  EXPECT_NEAR(d.cosine.standard_error, std::sqrt(0.5 / 3), 1e-15);
+}
+
+TEST(Stability, ReasonsOfFailure) {
+  const Reference reference = reference_of({3, 4}, 0.1);
+  ASSERT_TRUE(resolved(reference));
+  const auto reason = [&](const Repeats& estimates, double ratio) {
+    return failure(direction(estimates, reference), true, ratio);
+  };
+  const Repeats good = noisy(24, {3, 4}, 0.3, 2);
+  EXPECT_EQ(reason(good, 0.1), Failure::none);
+  EXPECT_EQ(reason(good, kUnknown), Failure::none);
+  EXPECT_EQ(reason(good, 0.9), Failure::descent);
+  EXPECT_EQ(reason(noisy(24, {3, 4}, 20, 3), 0.9), Failure::variance);
+  EXPECT_EQ(reason(noisy(24, {0, 0}, 20, 8), kUnknown), Failure::variance);
+  EXPECT_EQ(reason(noisy(24, {3, 4}, 3, 4), 0.5), Failure::variance);
+  EXPECT_EQ(reason(noisy(24, {-3, 4}, 0.3, 5), 0.1),
+            Failure::none);  // off by 74 degrees, but on the right side
+  EXPECT_EQ(reason(noisy(24, {-3, 4}, 0.3, 5), 0.6), Failure::bias);
+  EXPECT_EQ(reason(noisy(24, {-3, -4}, 0.3, 6), 1.5), Failure::bias);
+  EXPECT_EQ(reason(Repeats(24, {0, 0}), 1), Failure::no_signal);
+  EXPECT_EQ(failure(direction(good, reference), false, 1), Failure::no_signal);
+  // A bias of 4 % leaves no mark.
+  EXPECT_EQ(reason(noisy(24, {3.2, 4}, 0.1, 7), 0.9), Failure::descent);
+}
+
+TEST(Stability, ReferenceThatIsNoiseIsNotResolved) {
+  EXPECT_TRUE(resolved(reference_of({3, 4}, 1)));
+  EXPECT_FALSE(resolved(reference_of({0, 0}, 1)));
+  EXPECT_FALSE(resolved(reference_of({0, 0}, 0)));
+}
+
+TEST(Stability, GatesOfAnotherWidth) {
+  GateSpec gates;
+  gates.centers = {4, 6};
+  gates.kind = GateKind::truncated_gaussian;
+  gates.sigma = 0.3;
+  gates.half_width = 0.4;
+  const GateSpec narrow = with_relative_width(gates, 0.001);
+  EXPECT_NEAR(make_gates(narrow).relative_width(), 0.001, 1e-12);
+  EXPECT_NEAR(narrow.half_width / narrow.sigma, 0.4 / 0.3, 1e-12);
+  EXPECT_EQ(narrow.centers, gates.centers);
+  gates = {};
+  gates.kind = GateKind::tabulated;
+  gates.centers = {5};
+  gates.offsets = {-1, 0, 2};
+  gates.values = {0, 1, 0};
+  EXPECT_NEAR(make_gates(with_relative_width(gates, 0.02)).relative_width(), 0.02, 1e-12);
+  gates.kind = GateKind::steady;
+  EXPECT_THROW(with_relative_width(gates, 0.1), InputError);
+}
+
+}  // namespace
+}  // namespace isochron
