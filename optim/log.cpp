@@ -46,8 +46,9 @@ Log::Log(const std::string& file, const Parameters& parameters, int next)
 }
 
 void Log::append(const LogRow& row, const std::vector<double>& theta) {
-  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, row.loss, row.image_rmse,
-                                 std::isnan(row.param_rmse) ? "" : exact(row.param_rmse), row.gradient_norm);
+  const auto number = [](double value) { return std::isfinite(value) ? exact(value) : std::string(); };
+  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss), number(row.image_rmse),
+                                 number(row.param_rmse), number(row.gradient_norm));
   for (const Parameters::Block& block : parameters_.blocks()) {
     if (block.count > kMostColumns) {
       double sum = 0;

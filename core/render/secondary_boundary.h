@@ -190,7 +190,8 @@ class SecondaryBoundary {
       from_edge *= Scattering(x[j - 1].p, x[j], after).pdf_towards_camera(scene_.material_of(x[j].triangle)) *
                    solid_angle_to_area(x[j].p, x[j - 1]);
     }
-    return ratio / from_edge;
+    // Within round-off of the next vertex a path may seem impossible both ways.
+    return ratio > 0 ? ratio / from_edge : 0;
   }
 
   /// Walks on from D, away from the light, and collects a connection to the camera at every vertex.
