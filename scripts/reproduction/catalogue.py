@@ -25,7 +25,7 @@ class Reconstruction:
         return PAPER_CORES * self.paper_seconds
 
 
-_CORRIDOR = dict(paper_iterations=200, gates=(5, 9, 13, 17), unknown="x", samples=4096)
+_CORRIDOR = dict(paper_iterations=200, gates=(5, 9, 13, 17), unknown="x", resolution=(16, 16), samples=4096)
 _CUBE = dict(paper_iterations=100, gates=(0, 1, 2, 3), unknown="height", resolution=(64, 64), samples=128)
 _HEIGHT_FIELD = dict(paper_iterations=500, unknown="height[60]", resolution=(64, 64))
 
@@ -40,7 +40,7 @@ RECONSTRUCTIONS = {
                                    **_HEIGHT_FIELD),
     "height_field_steady": Reconstruction("14", paper_seconds=76.04, counterpart_of="height_field", gates=(0,),
                                           **_HEIGHT_FIELD),
-    "bunny": Reconstruction("15", 200, 17.1, most_seconds=480, gates=(5, 8, 11, 14), unknown="x", samples=4096),
+    "bunny": Reconstruction("15", 200, 17.1, most_seconds=480, gates=(5, 8, 11, 14), unknown="x", samples=2048),
     "sofa": Reconstruction("16", 1000, 58.2, most_percent=5, most_seconds=720, gates=(2, 6, 10, 14), unknown="shape[24]",
                            resolution=(56, 32), samples=2048),
     "tree": Reconstruction("17", 200, 15.5, most_seconds=180, gates=(2, 4, 8, 12), unknown="light_x", resolution=(64, 64),

@@ -195,14 +195,14 @@ TEST(Log, CutsWhatTheCheckpointDoesNotKnow) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   {
     Log log(folder.file("log.csv"), parameters, 0);
-    for (int i = 0; i < 3; ++i) log.append({i, 0.5, 0.25, 0.5, nan, 2}, theta);
+    for (int i = 0; i < 3; ++i) log.append({i, 0.5, 0.25, 0.5, nan, i == 1 ? nan : 2}, theta);
   }
   const std::string header = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,a,b,c,d\n";
-  const std::string rest = ",0.5,0.25,0.5,,2,1,2,3,0.1\n";
-  EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + rest + "2" + rest);
+  const std::string rest = ",0.5,0.25,0.5,,2,1,2,3,0.1\n", unknown = ",0.5,0.25,0.5,,,1,2,3,0.1\n";
+  EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + unknown + "2" + rest);
   folder.write("log.csv", folder.read("log.csv") + "1,0.5");  // torn by a kill
   { Log log(folder.file("log.csv"), parameters, 2); }
-  EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + rest);
+  EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + unknown);
 }
 
 }  // namespace
