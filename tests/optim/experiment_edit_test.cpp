@@ -19,14 +19,14 @@ TEST(ExperimentEdit, ReplacesValuesAndKeepsComments) {
       "  primal: 8       # the image\n"
       "\n"
       "  # of the derivative\n"
-      "  interior: 4\n"
+      "  interior: 4  # few\n"
       "# and\n"
       "seed: 3\n";
   const std::vector<Edit> edits{{{"max_bounces"}, "2"},
                                 {{"target", "max_bounces"}, "16"},
                                 {{"target", "seed"}, "11"},
                                 {{"samples", "primal"}, "123456"},
-                                {{"samples", "interior"}, "5"},
+                                {{"samples", "interior"}, "12345"},
                                 {{"samples", "visibility"}, "0"},
                                 {{"estimator", "sampling"}, "auto"}};
   EXPECT_EQ(edited(before, edits),
@@ -38,7 +38,7 @@ TEST(ExperimentEdit, ReplacesValuesAndKeepsComments) {
             "  primal: 123456  # the image\n"
             "\n"
             "  # of the derivative\n"
-            "  interior: 5\n"
+            "  interior: 12345 # few\n"
             "  visibility: 0\n"
             "# and\n"
             "seed: 3\n"
