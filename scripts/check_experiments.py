@@ -1,0 +1,77 @@
+#!/usr/bin/python3
+"""Derivatives of every shipped experiment against finite differences: runs `isochron check` on small images.
+
+usage: check_experiments.py CSV [FACTOR]
+
+Writes one line per experiment: `experiment,samples,pixels,rows,largest_z,rms_z,clearest,seconds`. Each of the check's rows
+is one gate and unknown; `clearest` is the largest derivative over its error: what a wrong sign or a factor of two would add
+to z. FACTOR multiplies the numbers of samples, 1 takes about two minutes on two cores.
+"""
+
+import csv
+import math
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+
+# Samples per pixel, and pixels across.
+EXPERIMENTS = {
+    "branches": (32768, 12),
+    "bunny": (8192, 8),
+    "corridor": (32768, 2),
+    "cube": (2048, 16),
+    "figure1": (8192, 16),
+    "height_field": (512, 8),
+    "height_field_steady": (512, 8),
+    "tree": (1024, 16),
+    "validation/figure8_boxcar": (4096, 12),
+    "validation/figure8_gaussian": (4096, 12),
+    "validation/figure8_truncated_gaussian": (4096, 12),
+    "validation/figure9": (2048, 16),
+}
+
+
+def check(program, name, samples, pixels):
+    """The check's rows, numbers by column. Fails where the program does."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [program, "check", ROOT / f"experiments/{name}.yaml", "--samples", str(samples),
+             "--set", f"resolution=[{pixels}, {pixels}]", "-o", folder, "--quiet"], capture_output=True, text=True)
+        if done.returncode > 1:
+            raise RuntimeError(done.stderr)
+        with open(pathlib.Path(folder) / "check.csv", encoding="ascii", newline="") as file:
+            return [{k: float(v) for k, v in row.items() if k != "parameter"} for row in csv.DictReader(file)]
+
+
+def largest_z(rows):
+    return max(abs(row["z"]) for row in rows)
+
+
+def clearest(rows):
+    return max(abs(row["total"]) / math.hypot(row["standard_error"], row["finite_difference_error"])
+               for row in rows if row["total"] != 0)
+
+
+def main():
+    if len(sys.argv) not in (2, 3):
+        sys.exit(__doc__)
+    factor = float(sys.argv[2]) if len(sys.argv) == 3 else 1
+    with open(sys.argv[1], "w", encoding="ascii", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["experiment", "samples", "pixels", "rows", "largest_z", "rms_z", "clearest", "seconds"])
+        for name, (samples, pixels) in EXPERIMENTS.items():
+            samples = max(2, round(factor * samples))
+            start = time.monotonic()
+            rows = check(ROOT / "build/isochron", name, samples, pixels)
+            rms = math.sqrt(sum(row["z"] ** 2 for row in rows) / len(rows))
+            table.writerow([name, samples, pixels * pixels, len(rows), f"{largest_z(rows):.2f}", f"{rms:.2f}",
+                            f"{clearest(rows):.1f}", f"{time.monotonic() - start:.1f}"])
+            file.flush()
+
+
+if __name__ == "__main__":
+    main()
