@@ -90,6 +90,7 @@ Reference make_reference(const Experiment& experiment, const std::vector<double>
                          const GatedImage& target, double core_seconds, const Poll& poll) {
   Experiment own = experiment;
   own.seed ^= kReferenceSeed;
+  own.estimator.max_bounces = std::max(own.estimator.max_bounces, own.target.max_bounces);
   MethodRun run(own, automatic_method());
   const SampleTrial trial = try_samples(run, theta, target, kReferenceRepeats, core_seconds, poll);
   // All of the time, in equal repeats.

@@ -36,7 +36,8 @@ struct Reference {
 bool resolved(const Reference& reference);
 bool fine_enough(const Reference& reference, double error);
 
-/// `auto` with random numbers of its own, in 32 parts that take `core_seconds` together (or one sample each).
+/// `auto` with random numbers of its own and as many bounces as the target has, in 32 parts that take `core_seconds`
+/// together (or one sample each).
 Reference make_reference(const Experiment& experiment, const std::vector<double>& theta,
                          const GatedImage& target, double core_seconds, const Poll& poll);
 
