@@ -138,7 +138,7 @@ def draw_stability(folder):
                 text = "-" if np.isnan(value) else f"{100 * value:.0f} %" if column == "positive" else f"{value:.2g}"
                 if reason := cells[width, method]["failure"]:
                     text += f"\n{reason}"
-                shade = np.nan if np.isnan(value) else float(norm(value))
+                shade = float(np.ma.filled(norm(value), np.nan))
                 color = "white" if shade < 0.12 or shade > 0.9 else "black"  # the ends of the scale are dark
                 axis.text(j, i, text, ha="center", va="center", fontsize=7, color=color)
         axis.set_title(title, fontsize=10)
