@@ -295,6 +295,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
     if (const auto pick = estimator.find("pick"))
       experiment.estimator.pick = static_cast<ArcPick>(pick->choice({"contribution", "uniform"}));
     if (const auto guiding = estimator.find("guiding")) experiment.guiding = guiding->boolean();
+    if (const auto radius = estimator.find("follow_radius"))
+      experiment.estimator.follow_radius = radius->number(NumberRange::non_negative());
     estimator.reject_unknown();
   }
   if (const auto value = map.find("gradient")) {

@@ -19,9 +19,6 @@ Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const
 }  // namespace
 
 BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
-  std::vector<double> primary_weight, secondary_weight;
-  std::vector<char> secondary_moves;
-  double moving_sum = 0, static_sum = 0;
   for (const Edge& e : scene.scene.edges) {
     BoundaryEdge b;
     for (int i = 0; i < 2; ++i) b.vertex[i] = e.vertex[i], b.face[i] = e.face[i];
@@ -38,27 +35,30 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
       if (b.wedge() < kCoplanarAngle) continue;
     }
     const bool moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
-    if (moves) {
-      const double squared = length_squared(b.point(0.5) - scene.camera.position) + b.length * b.length;
-      primary_.push_back(b);
-      primary_weight.push_back(b.length / squared);
-    }
+    if (moves || scene.camera_flow.possible())
+      primary_.add(b, b.length / (length_squared(b.point(0.5) - scene.camera.position) + b.length * b.length), moves);
     b.azimuths = wedge ? b.wedge() : kPi;
-    const double weight = b.length * b.azimuths;
-    (moves ? moving_sum : static_sum) += weight;
-    secondary_.push_back(b);
-    secondary_weight.push_back(weight);
-    secondary_moves.push_back(moves);
+    secondary_.add(b, b.length * b.azimuths, moves);
   }
-  if (moving_sum > 0 && static_sum > 0)
-    for (std::size_t i = 0; i < secondary_.size(); ++i)
-      secondary_weight[i] /= secondary_moves[i] ? moving_sum : static_sum;
-  primary_distribution_ = DiscreteDistribution(primary_weight);
-  secondary_distribution_ = DiscreteDistribution(secondary_weight);
+  primary_.finish();
+  secondary_.finish();
 }
 
-BoundaryEdges::Sample BoundaryEdges::sample(const std::vector<BoundaryEdge>& edges,
-                                            const DiscreteDistribution& distribution, double u) {
+void BoundaryEdges::Choice::add(const BoundaryEdge& edge, double weight, bool moves) {
+  edges.push_back(edge);
+  weights.push_back(weight);
+  moving.push_back(moves);
+}
+
+void BoundaryEdges::Choice::finish() {
+  double sum[2] = {0, 0};
+  for (std::size_t i = 0; i < edges.size(); ++i) sum[moving[i] ? 1 : 0] += weights[i];
+  if (sum[0] > 0 && sum[1] > 0)
+    for (std::size_t i = 0; i < edges.size(); ++i) weights[i] /= sum[moving[i] ? 1 : 0];
+  distribution = DiscreteDistribution(weights);
+}
+
+BoundaryEdges::Sample BoundaryEdges::Choice::sample(double u) const {
   Sample result;
   const int i = distribution.sample(u);
   result.edge = &edges[i];

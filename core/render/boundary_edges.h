@@ -34,22 +34,31 @@ class BoundaryEdges {
     /// The number that gives this point.
     double x() const { return begin + s * share; }
   };
-  /// Edges that the camera may see moving, by length over squared distance. `u` in (0, 1).
-  bool has_primary() const { return !primary_distribution_.empty(); }
-  Sample sample_primary(double u) const { return sample(primary_, primary_distribution_, u); }
+  /// Edges that the camera may see moving, by length over squared distance; the same of static ones where points beside
+  /// them may follow others, in equal shares. `u` in (0, 1).
+  bool has_primary() const { return !primary_.distribution.empty(); }
+  Sample sample_primary(double u) const { return primary_.sample(u); }
   /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
   /// where what lies behind or before them moves) get equal shares.
-  bool has_secondary() const { return !secondary_distribution_.empty(); }
-  Sample sample_secondary(double u) const { return sample(secondary_, secondary_distribution_, u); }
+  bool has_secondary() const { return !secondary_.distribution.empty(); }
+  Sample sample_secondary(double u) const { return secondary_.sample(u); }
 
   /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
   /// both (no boundary) or the plane holds a face.
   static int occluder_side(const BoundaryEdge& edge, const Vec3& n_b);
 
  private:
-  static Sample sample(const std::vector<BoundaryEdge>& edges, const DiscreteDistribution& distribution, double u);
-  std::vector<BoundaryEdge> primary_, secondary_;
-  DiscreteDistribution primary_distribution_, secondary_distribution_;
+  /// Edges to pick from by weight; where there are both, moving and static ones get equal shares.
+  struct Choice {
+    std::vector<BoundaryEdge> edges;
+    std::vector<double> weights;
+    std::vector<char> moving;
+    DiscreteDistribution distribution;
+    void add(const BoundaryEdge& edge, double weight, bool moves);
+    void finish();
+    Sample sample(double u) const;
+  };
+  Choice primary_, secondary_;
 };
 
 }  // namespace isochron

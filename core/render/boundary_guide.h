@@ -1,4 +1,4 @@
-// Guiding of the visibility term: where the edge points of each technique are drawn from, as histograms over primary
+// Guiding of the visibility term: where the boundary points of each technique are drawn from, as histograms over primary
 // sample space, and how often each technique is used. Learned once in a short pass of its own and then frozen, so
 // estimates stay unbiased.
 #pragma once
@@ -39,14 +39,14 @@ class Warp {
 /// What the learning pass notes about a technique: where contributions came from, and their squares.
 struct GuideRecord {
   int table;
-  double x;       ///< in (0, 1): the edge point's place in the unguided distribution
+  double x;       ///< in (0, 1): the boundary point's place in the unguided distribution
   double square;  ///< summed over pixels, gates and columns
 };
 
 class BoundaryGuide {
  public:
-  enum Technique { primary, from_edge, from_camera };
-  static constexpr int kTechniques = 3;
+  enum Technique { primary, pixel_border, from_edge, from_camera };
+  static constexpr int kTechniques = 4;
 
   /// Unguided: every technique once per sample.
   BoundaryGuide() : warps_(kTables) {}

@@ -36,6 +36,16 @@ class CameraModel {
     return static_cast<int>(v) * width + static_cast<int>(u);
   }
 
+  /// Width of a pixel per depth.
+  double pixel_size() const { return pixel_size_; }
+
+  /// Gradient, with respect to a point at d from the camera, of its image coordinate u (axis 0) or v (axis 1).
+  Vec3 image_gradient(const Vec3& d, int axis) const {
+    const Vec3 across = axis == 0 ? right_ : -up_;
+    const double depth = dot(d, forward);
+    return (across - forward * (dot(d, across) / depth)) / (depth * pixel_size_);
+  }
+
   /// du/domega: image area (pixels) per solid angle along the unit direction d.
   double image_area_per_solid_angle(const Vec3& d) const {
     const double c = dot(d, forward);

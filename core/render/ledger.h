@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "core/render/boundary_edges.h"
 #include "core/render/renderer.h"
 #include "core/render/sinks.h"
 
@@ -17,10 +16,10 @@ template <class Sink>
 void note_path(Sink& sink, const Path& path) {
   if constexpr (requires { sink.note_path(path); }) sink.note_path(path);
 }
-/// The same for a boundary segment at an edge, on paths of so many bounces.
+/// The same for a boundary segment at a triangle's edge, on paths of so many bounces.
 template <class Sink>
-void note_boundary(Sink& sink, int bounces, const BoundaryEdge& edge) {
-  if constexpr (requires { sink.note_boundary(bounces, edge); }) sink.note_boundary(bounces, edge);
+void note_boundary(Sink& sink, int bounces, int triangle) {
+  if constexpr (requires { sink.note_boundary(bounces, triangle); }) sink.note_boundary(bounces, triangle);
 }
 
 /// Bounces and shapes of the path at hand.
@@ -32,10 +31,10 @@ class PathOrigin {
     shapes.clear();
     for (int i = 1; i < path.size(); ++i) add_shape(path.vertex[i].triangle);
   }
-  void note_boundary(int n, const BoundaryEdge& edge) {
+  void note_boundary(int n, int triangle) {
     bounces = n;
     shapes.clear();
-    add_shape(edge.face[0]);
+    add_shape(triangle);
   }
   int bounces = 0;
   std::vector<int> shapes;  ///< each once
@@ -88,7 +87,7 @@ class GradientLedgerSink {
         ledger_(ledger) {}
 
   void note_path(const Path& path) { origin_.note_path(path); }
-  void note_boundary(int bounces, const BoundaryEdge& edge) { origin_.note_boundary(bounces, edge); }
+  void note_boundary(int bounces, int triangle) { origin_.note_boundary(bounces, triangle); }
   void bind(const LocalDifferential& differential) { rates_.bind(differential); }
 
   void add(int pixel, const Rgb& value, double length, GateWeights use) {

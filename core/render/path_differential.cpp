@@ -28,26 +28,42 @@ LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const S
   return lobe;
 }
 
-/// Carries position and normal gradients of vertex k to its triangle's vertices.
-void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, const Vec3* pixel_ray,
+/// Turns the gradients at x1 into those of its material point, for x1 slides along its pixel ray and follows x2, which
+/// takes its part of them.
+void let_flow(const CameraFlow::Follow& follow, const Vec3& ray, const Vec3& forward, const SurfacePoint& x1,
+              Accumulated& g1, Accumulated& g2) {
+  const double height = dot(x1.n, ray);
+  const auto in_plane = [&](const Vec3& g) { return g - x1.n * dot(g, x1.n); };
+  Vec3 position, length;  // what multiplies the flow in the plane of x1
+  double squeezed = 0;
+  if (follow.weight > 0) {
+    // As it leaves the pixel ray, what it sees per area counts: du/dA = (n . ray) / (forward . ray)^3, up to a factor.
+    // That the normal turns and the flow spreads adds up to the last line.
+    const Vec3 log_density = x1.n / height - forward * (3 / dot(forward, ray));
+    position = in_plane(g1.position * follow.weight + follow.gradient);
+    length = in_plane(g1.length * follow.weight);
+    squeezed = follow.weight * dot(x1.n, log_density);
+    g2.position += position + in_plane(log_density) * follow.weight;
+    g2.length += length;
+    g1.normal += ray * (follow.weight / height);
+  }
+  g1.position = x1.n * (dot(ray, g1.position - position) / height + squeezed);
+  g1.length = x1.n * (dot(ray, g1.length - length) / height);
+}
+
+/// Carries position and normal gradients of a vertex to its triangle's vertices.
+void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, bool material,
                  bool length_only, LocalDifferential& out) {
   if (!scene.moving.triangle[x.triangle]) return;
   const auto& vertex = scene.scene.triangles[x.triangle].vertex;
-  // The flow of x itself: with its material point, or sliding along the pixel's ray.
-  Vec3 log_f = g.position, length = g.length;
-  if (pixel_ray) {
-    const double inverse = 1 / dot(x.n, *pixel_ray);
-    log_f = x.n * (dot(*pixel_ray, g.position) * inverse);
-    length = x.n * (dot(*pixel_ray, g.length) * inverse);
-  }
   // Rotation of the face normal, and d ln A of material points (paper Eq. 11).
   Vec3 through_cross = g.normal - x.n * dot(g.normal, x.n);
-  if (!pixel_ray) through_cross += x.n;
+  if (material) through_cross += x.n;
   through_cross = through_cross / (2 * scene.area[x.triangle]);
   for (int i = 0; i < 3; ++i) {
     const int v = vertex[i];
     if (!scene.moving.vertex[v]) continue;
-    VertexGradient entry{v, log_f * x.b[i], length * x.b[i]};
+    VertexGradient entry{v, g.position * x.b[i], g.length * x.b[i]};
     if (!length_only) {
       const Vec3 opposite = scene.scene.positions[vertex[(i + 1) % 3]] - scene.scene.positions[vertex[(i + 2) % 3]];
       entry.log_f += cross(opposite, through_cross);
@@ -104,10 +120,10 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
         if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
   }
-  for (int k = 1; k < count; ++k) {
-    const Vec3 ray = k == 1 ? x[1].p - x[0].p : Vec3{};
-    to_triangle(scene, x[k], g[k], k == 1 ? &ray : nullptr, length_only, out);
-  }
+  CameraFlow::Follow follow;
+  if (count > 2) follow = scene.camera_flow.follow(x[1].p, x[2].p);
+  let_flow(follow, x[1].p - x[0].p, scene.camera.forward, x[1], g[1], g[count > 2 ? 2 : 0]);
+  for (int k = 1; k < count; ++k) to_triangle(scene, x[k], g[k], k > 1, length_only, out);
 }
 
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
@@ -115,11 +131,6 @@ void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const 
   const auto& vertex = scene.scene.triangles[x.triangle].vertex;
   for (int i = 0; i < 3; ++i)
     if (scene.moving.vertex[vertex[i]]) out.vertices.push_back({vertex[i], g * x.b[i], {}});
-}
-
-void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
-  const Vec3 ray = x.p - scene.camera.position;
-  add_material_flow(scene, x, x.n * (dot(ray, g) / dot(x.n, ray)), out);
 }
 
 }  // namespace isochron

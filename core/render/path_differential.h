@@ -34,15 +34,12 @@ struct LocalDifferential {
 };
 
 /// Differentiates the path vertex[0..count-1], vertex[0] the camera and vertex[count-1] on an emitter (or, where
-/// `length_only`, only its length). vertex[1] flows along its pixel ray, the others with their material points, whose
+/// `length_only`, only its length). vertex[1] flows as CameraFlow says, the others with their material points, whose
 /// area factors count in F. Static vertices are left out.
 void differentiate_path(const PreparedScene& scene, const SurfacePoint* vertex, int count, bool length_only,
                         LocalDifferential& out);
 
 /// Adds g . (velocity of the material point x) to `out`: entries on the triangle's three vertices.
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out);
-
-/// Adds g . (velocity of x kept on the camera's ray through it) to `out`.
-void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out);
 
 }  // namespace isochron

@@ -51,8 +51,13 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
   any = !basis->entries.empty();
 }
 
-PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis)
-    : scene(source), camera(source.camera), layout(source), moving(source, basis), caster(source) {
+PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, double follow_radius)
+    : scene(source),
+      camera(source.camera),
+      layout(source),
+      moving(source, basis),
+      camera_flow(source, camera, moving, follow_radius),
+      caster(source) {
   const std::size_t count = scene.triangles.size();
   normal.resize(count);
   area.resize(count);
@@ -98,16 +103,11 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis)
   emitter_distribution_ = DiscreteDistribution(power);
   for (std::size_t i = 0; i < emitters.size(); ++i)
     emitter_pdf_[emitters[i]] = emitter_distribution_.probability(static_cast<int>(i)) / area[emitters[i]];
-  const double inf = std::numeric_limits<double>::infinity();
   for (const Shape& shape : scene.shapes) {
     if (shape.emission.is_black()) continue;
-    Box box{{inf, inf, inf}, {-inf, -inf, -inf}};
-    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v)
-      for (int axis = 0; axis < 3; ++axis) {
-        box.low[axis] = std::min(box.low[axis], scene.positions[v][axis]);
-        box.high[axis] = std::max(box.high[axis], scene.positions[v][axis]);
-      }
-    emitter_boxes_.push_back(box);
+    Bounds bounds;
+    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) bounds.add(scene.positions[v]);
+    emitter_bounds_.push_back(bounds);
   }
 }
 
@@ -127,14 +127,7 @@ SurfacePoint PreparedScene::sample_emitter(double u0, double u1, double u2, doub
 
 double PreparedScene::distance_to_emitters(const Vec3& p) const {
   double nearest = std::numeric_limits<double>::infinity();
-  for (const Box& box : emitter_boxes_) {
-    double squared = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double outside = std::max({box.low[axis] - p[axis], p[axis] - box.high[axis], 0.0});
-      squared += outside * outside;
-    }
-    nearest = std::min(nearest, squared);
-  }
+  for (const Bounds& bounds : emitter_bounds_) nearest = std::min(nearest, bounds.distance_squared(p));
   return std::sqrt(nearest) * least_index_;
 }
 

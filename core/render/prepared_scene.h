@@ -4,7 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/geometry/bounds.h"
 #include "core/geometry/ellipsoid_bvh.h"
+#include "core/render/camera_flow.h"
 #include "core/render/camera_model.h"
 #include "core/render/ray_caster.h"
 #include "core/scene/scene.h"
@@ -61,12 +63,14 @@ struct MovingParts {
 
 class PreparedScene {
  public:
-  PreparedScene(const Scene& scene, const TangentBasis* basis);
+  /// `follow_radius`: see CameraFlow.
+  explicit PreparedScene(const Scene& scene, const TangentBasis* basis, double follow_radius = 0);
 
   const Scene& scene;
   CameraModel camera;
   DofLayout layout;
   MovingParts moving;
+  CameraFlow camera_flow;
   RayCaster caster;
   std::vector<Vec3> normal;         ///< per triangle, unit
   std::vector<double> area;         ///< per triangle
@@ -154,9 +158,6 @@ class PreparedScene {
   double distance_to_emitters(const Vec3& p) const;
 
  private:
-  struct Box {
-    Vec3 low, high;
-  };
   /// Whether x is on a dielectric's face whose back the direction d leaves from.
   bool is_behind(const SurfacePoint& x, const Vec3& d) const {
     return x.triangle >= 0 && is_dielectric(x.triangle) && dot(x.n, d) < 0;
@@ -170,7 +171,7 @@ class PreparedScene {
 
   std::vector<TriangleRecord> records_;
   std::vector<double> emitter_pdf_;
-  std::vector<Box> emitter_boxes_;  ///< one per emitting shape
+  std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;
   bool has_dielectric_ = false;
   double least_index_ = 1;

@@ -1,4 +1,6 @@
-// Primary visibility boundary: a camera ray grazes a moving edge (theory section 5, "Primary").
+// Primary visibility boundary: a camera ray grazes an edge (theory section 5, "Primary") or the border of a pixel. Light
+// crosses it where the edge moves, and where the points beside it follow others (see CameraFlow): per length,
+//     L (velocity of the boundary - flow of x1) . n_B / distance, with the sign of the side.
 #pragma once
 #include "core/render/boundary_edges.h"
 #include "core/render/boundary_guide.h"
@@ -41,7 +43,9 @@ class PrimaryBoundary {
         scene_(worker.scene),
         edges_(edges),
         guide_(guide),
-        light_side_(worker, narrow_gates && worker.options.boundary.light_arcs) {}
+        light_side_(worker, narrow_gates && worker.options.boundary.light_arcs) {
+    eye_.p = scene_.camera.position;
+  }
 
   /// One edge point; contributions are scaled by `scale` (one over the number of edge points).
   void sample(double scale, Rng& rng) {
@@ -62,6 +66,9 @@ class PrimaryBoundary {
     if (!(sine > 0)) return;
     const Vec3 n_b = normal / sine;
 
+    const bool moves = scene_.moving.vertex[edge->vertex[0]] || scene_.moving.vertex[edge->vertex[1]];
+    if (!moves && !scene_.camera_flow.possible_along(d)) return;
+
     // Off the faces, to the camera's side of each, so that the edge does not hide itself.
     Vec3 off = -d;
     for (int i = 0; i < edge->faces(); ++i)
@@ -77,30 +84,85 @@ class PrimaryBoundary {
     worker_.sink.bind(differential);
 
     const double factor = scale * sine * scene_.camera.image_area_per_solid_angle(d) / (r * r * point.pdf * warp.density(x));
-    SurfacePoint eye;
-    eye.p = scene_.camera.position;
     // The two sides share their random numbers: what they have in common cancels.
     const Rng shared = rng;
     for (const double sign : {-1.0, 1.0}) {
       const auto x1 = seen_beside(worker_, *edge, y, d, n_b * sign);
       if (!x1) continue;
-      const double before = length(x1->p - eye.p) * scene_.index_between(eye, *x1);
       Rng walk_rng = shared;
-      for (const GatheredLight& light :
-           light_side_.gather(eye, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng)) {
-        note_boundary(worker_.sink, light.bounces, *edge);
-        worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, kValueOnly);
+      if (moves) {
+        const double before = length(x1->p - eye_.p) * scene_.index_between(eye_, *x1);
+        for (const GatheredLight& light :
+             light_side_.gather(eye_, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng)) {
+          note_boundary(worker_.sink, light.bounces, edge->face[0]);
+          worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, kValueOnly);
+        }
       }
+      follow(*x1, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng, [&](const Rgb& value, double length) {
+        worker_.sink.add(pixel, value * (sign * factor), length, kValueOnly);
+      });
+      if (moves) worker_.sink.bind(differential);
     }
     note_guide(worker_.sink, table, x);
   }
 
+  /// One point on the border of a pixel, left or above; contributions are scaled by `scale` (one over the number of points).
+  void sample_pixel_border(double scale, Rng& rng) {
+    if (!scene_.camera_flow.possible()) return;
+    const CameraModel& camera = scene_.camera;
+    const int table = BoundaryGuide::table(BoundaryGuide::pixel_border);
+    const double x = guide_.warp(table).sample(rng.uniform());
+    // Pixels in rows, with one column and one row more than the image has, for the borders at its end.
+    const int borders = 2 * (camera.width + 1) * (camera.height + 1);
+    const double place = x * borders;
+    const int border = std::min(static_cast<int>(place), borders - 1), axis = border % 2;
+    const int column = border / 2 % (camera.width + 1), row = border / 2 / (camera.width + 1);
+    const double along = place - border;
+    const Vec3 d = camera.direction(column + (axis == 1 ? along : 0), row + (axis == 0 ? along : 0));
+    const bool in_columns = column < camera.width, in_rows = row < camera.height;
+    if (!(axis == 0 ? in_rows : in_columns) || !scene_.camera_flow.possible_along(d)) return;
+    const auto x1 = worker_.trace_camera(d);
+    if (!x1) return;
+    const int pixel = row * camera.width + column;
+    const bool has_after = in_columns && in_rows, has_before = (axis == 0 ? column : row) > 0;
+    const int before = pixel - (axis == 0 ? 1 : camera.width);
+    const double factor = scale * borders / guide_.warp(table).density(x);
+    follow(*x1, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng, [&](const Rgb& value, double length) {
+      if (has_after) worker_.sink.add(pixel, value * factor, length, kValueOnly);
+      if (has_before) worker_.sink.add(before, value * -factor, length, kValueOnly);
+    });
+    note_guide(worker_.sink, table, x);
+  }
+
  private:
+  /// Hands the light that x1 sends to the camera from points that it follows to add(value, length), the sink being
+  /// bound to g . (how x1 follows); ledgers put it down to the triangle `blamed`.
+  template <class Add>
+  void follow(const SurfacePoint& x1, int blamed, const Vec3& g, Rng& rng, Add&& add) {
+    if (!scene_.camera_flow.possible_at(x1.p) || worker_.options.max_bounces < 1) return;
+    Rgb throughput(1.0);
+    const auto next = step(worker_, x1, normalize(eye_.p - x1.p), throughput, rng);
+    if (!next) return;
+    following_.clear();
+    add_following_flow(scene_, x1, next->point, g, following_);
+    if (following_.empty()) return;
+    worker_.sink.bind(following_);
+    const double before = length(x1.p - eye_.p) * scene_.index_between(eye_, x1) +
+                          length(next->point.p - x1.p) * scene_.index_between(x1, next->point);
+    for (const GatheredLight& light :
+         light_side_.gather(x1, next->point, {&before, 1}, worker_.options.max_bounces - 1, rng)) {
+      note_boundary(worker_.sink, light.bounces + 1, blamed);
+      add(throughput * light.value, before + light.length);
+    }
+  }
+
   Worker<Sink>& worker_;
   const PreparedScene& scene_;
   const BoundaryEdges& edges_;
   const BoundaryGuide& guide_;
   LightSide<Sink> light_side_;
+  SurfacePoint eye_;
+  LocalDifferential following_;
 };
 
 }  // namespace isochron

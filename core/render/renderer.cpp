@@ -87,7 +87,7 @@ struct Renderer::Impl {
       : gates(gate_set),
         options(estimator),
         basis(tangent),
-        scene(source, tangent),
+        scene(source, tangent, estimator.follow_radius),
         edges(scene, estimator.boundary.wedge),
         every_gate(gate_set) {
     const double width = gates.relative_width();
@@ -182,6 +182,7 @@ struct Renderer::Impl {
           const int pixel = static_cast<int>(i * scene.camera.pixels() / samples) % scene.camera.pixels();
           Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
           run(BoundaryGuide::primary, [&] { primary.sample(splat_scale, rng); });
+          run(BoundaryGuide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
           run(BoundaryGuide::from_edge, [&] { secondary.sample_from_edge(splat_scale, rng); });
           run(BoundaryGuide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
         }
@@ -222,6 +223,9 @@ struct Renderer::Impl {
       };
       for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
         run(BoundaryGuide::primary, rng, [&](double share) { primary.sample(share * splat_scale, rng); });
+        if (scene.camera_flow.possible())
+          run(BoundaryGuide::pixel_border, rng,
+              [&](double share) { primary.sample_pixel_border(share * splat_scale, rng); });
         run(BoundaryGuide::from_edge, rng, [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
         run(BoundaryGuide::from_camera, rng,
             [&](double share) { secondary.sample_from_camera(pixel, share * scale, rng); });

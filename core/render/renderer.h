@@ -40,6 +40,8 @@ struct EstimatorOptions {
   ArcPick pick = ArcPick::contribution;     ///< of ellipsoidal sampling
   std::optional<SamplingMix> mix = {};      ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
+  /// Within how many widths of a pixel what the camera sees follows what moves beside it, see CameraFlow; 0: not at all.
+  double follow_radius = 4;
   /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.
   double guiding_samples = 0;
 };

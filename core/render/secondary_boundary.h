@@ -159,10 +159,10 @@ class SecondaryBoundary {
   }
 
   /// The speed of the edge relative to the line that grazes it, as a linear form in vertex velocities; once with D
-  /// kept on its pixel ray, once as a material point. False when nothing moves.
+  /// as x1, once as a material point. False when nothing moves.
   bool differentiate(const Segment& g) {
     const Vec3 b = g.n_b * g.side;
-    LocalDifferential& common = pixel_flow_;
+    LocalDifferential& common = camera_flow_;
     common.clear();
     const double share[2] = {1 - g.y.s, g.y.s};
     for (int i = 0; i < 2; ++i)
@@ -170,9 +170,10 @@ class SecondaryBoundary {
     const double whole = g.r_s + g.r_d;
     add_material_flow(scene_, g.light, b * (-g.r_d / whole), common);
     material_flow_ = common;
-    add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), pixel_flow_);
+    add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), camera_flow_);
+    add_following_flow(scene_, g.camera_end, g.light, b * (-g.r_s / whole), camera_flow_);
     add_material_flow(scene_, g.camera_end, b * (-g.r_s / whole), material_flow_);
-    return !pixel_flow_.empty() || !material_flow_.empty();
+    return !camera_flow_.empty() || !material_flow_.empty();
   }
 
   /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
@@ -269,10 +270,10 @@ class SecondaryBoundary {
       const double rate = length_over_random(g, c);
       const Rgb radiance = scene_.emitted(g.light, -g.w);
       if (!(rate > 0) || radiance.is_black()) continue;
-      const LocalDifferential& differential = c.bounces == 1 ? pixel_flow_ : material_flow_;
+      const LocalDifferential& differential = c.bounces == 1 ? camera_flow_ : material_flow_;
       if (differential.empty()) continue;
       worker_.sink.bind(differential);
-      note_boundary(worker_.sink, c.bounces, *g.y.edge);
+      note_boundary(worker_.sink, c.bounces, g.y.edge->face[0]);
       // The balance heuristic cancels this technique's own rate.
       worker_.sink.add(pixel, c.value * radiance * (1 / (1 / c.camera_over_edge + 1 + rate)), tau, kValueOnly);
       note_guide(worker_.sink, table, g.y.x());
@@ -348,7 +349,7 @@ class SecondaryBoundary {
     const LocalDifferential* bound = nullptr;
     for (std::size_t i = 0; i < connections_.size(); ++i) {
       const Connection& c = connections_[i];
-      const LocalDifferential* differential = c.bounces == 1 ? &pixel_flow_ : &material_flow_;
+      const LocalDifferential* differential = c.bounces == 1 ? &camera_flow_ : &material_flow_;
       if (differential->empty()) continue;
       if (differential != bound) worker_.sink.bind(*(bound = differential));
       const double ratio = c.camera_over_edge;
@@ -357,7 +358,7 @@ class SecondaryBoundary {
         if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
         const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
         const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
-        note_boundary(worker_.sink, c.bounces + e.bounces, *g.y.edge);
+        note_boundary(worker_.sink, c.bounces + e.bounces, g.y.edge->face[0]);
         worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i] + e.length, kValueOnly);
       }
     }
@@ -372,7 +373,7 @@ class SecondaryBoundary {
   const double camera_over_edge_rate_;  ///< how often segments are looked for from the camera, over that from an edge
   const double aimed_share_;  ///< of the directions from an edge
   LightSide<Sink> light_side_;
-  LocalDifferential pixel_flow_, material_flow_;
+  LocalDifferential camera_flow_, material_flow_;
   std::vector<SurfacePoint> walk_, camera_side_;
   std::vector<Connection> connections_;
   std::vector<double> before_;  ///< lengths from the camera to S, one per connection

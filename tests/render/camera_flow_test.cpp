@@ -1,0 +1,252 @@
+// What the camera sees follows what moves close to it (CameraFlow): which term holds what changes, the derivative of every
+// pixel does not.
+#include "core/render/camera_flow.h"
+
+#include <gtest/gtest.h>
+
+#include "core/math/random.h"
+#include "core/render/path_differential.h"
+#include "tests/render/scene_building.h"
+#include "tests/render/support.h"
+
+namespace isochron::testing {
+namespace {
+
+/// Point where the plane of three corners meets the ray from the camera through an image point.
+Vec3 seen(const CameraModel& camera, double u, double v, const Vec3* corner) {
+  const Vec3 m = cross(corner[1] - corner[0], corner[2] - corner[0]), d = camera.direction(u, v);
+  return camera.position + d * (dot(m, corner[0] - camera.position) / dot(m, d));
+}
+
+std::array<double, 2> image_point(const CameraModel& camera, const Vec3& p) {
+  const Vec3 d = p - camera.position;
+  // u and v are linear fractional: by their gradients at p and the value at the middle of the image.
+  const double depth = dot(d, camera.forward);
+  const Vec3 off = d / depth - camera.forward;
+  return {0.5 * camera.width + dot(camera.image_gradient(camera.forward, 0), off),
+          0.5 * camera.height + dot(camera.image_gradient(camera.forward, 1), off)};
+}
+
+/// ln of the differential of a path camera - x1 - x2 whose first vertex flows as the header of CameraFlow says, from the
+/// definition by central differences: contribution times Jacobian of the flow in the image.
+TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
+  Rng rng(Stream{5, 0, 0}, 0, 0);
+  const auto in = [&](double low, double high) { return low + (high - low) * rng.uniform(); };
+  int following = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    Scene scene;
+    scene.camera = {{in(-0.2, 0.2), in(-0.2, 0.2), 3}, {0, 0, 0}, {0, 1, 0}, 40, 16, 16};
+    // Two triangles about points close to each other that face each other and, the first one, the camera.
+    Mesh mesh[2];
+    for (int k = 0; k < 2; ++k)
+      for (int i = 0; i < 3; ++i) {
+        const double angle = kTwoPi * i / 3 + in(-0.3, 0.3), radius = in(0.4, 0.8);
+        const Vec3 flat{radius * std::cos(angle), radius * std::sin(angle), 0};
+        const Vec3 tilted = k == 0 ? flat + Vec3{0, 0, 0.4 * flat.x} : Vec3{flat.z, flat.x, flat.y} + Vec3{0.3, 0, 0.5};
+        mesh[k].positions.push_back(tilted + Vec3{in(-0.05, 0.05), in(-0.05, 0.05), in(-0.05, 0.05)});
+      }
+    mesh[0].faces = {{0, 1, 2}};
+    mesh[1].faces = {{0, 2, 1}};
+    add_shape(scene, "near", mesh[0], diffuse(Rgb(0.5)));
+    add_shape(scene, "far", mesh[1], diffuse(Rgb(0.5)), Rgb(1));
+    std::vector<Motion> motions;
+    for (const char* shape : {"near", "far"})
+      for (const Vec3& p : mesh[shape[0] == 'f'].positions)
+        for (int axis = 0; axis < 3; ++axis) {
+          Vec3 direction;
+          direction[axis] = 1;
+          motions.push_back(translate(scene, shape, direction, [=](const Vec3& q) { return p == q; }));
+        }
+    const TangentBasis basis = make_basis(scene, motions);
+    const double radius = 8;
+    const PreparedScene prepared(scene, &basis, radius);
+    const CameraModel& camera = prepared.camera;
+    ASSERT_TRUE(prepared.camera_flow.possible());
+
+    const double b1 = in(0.2, 0.4), b2 = in(0.2, 0.4), b[3] = {1 - b1 - b2, b1, b2};
+    const auto second = [&](const std::vector<Vec3>& p) { return p[3] * b[0] + p[4] * b[1] + p[5] * b[2]; };
+    const auto at_image = image_point(camera, prepared.scene.positions[0] * 0.4 + scene.positions[1] * 0.3 + scene.positions[2] * 0.3);
+    SurfacePoint x[3];
+    x[0].p = camera.position;
+    x[1] = prepared.point_on_triangle(0, camera.position, camera.direction(at_image[0], at_image[1]));
+    x[2] = prepared.point_in_plane(1, second(scene.positions));
+    const double distance = length(x[2].p - x[1].p), depth = dot(x[1].p - x[0].p, camera.forward);
+    const double expected_weight =
+        std::pow(std::max(0.0, 1 - std::pow(distance / (radius * camera.pixel_size() * depth), 2)), 2);
+    ASSERT_NEAR(prepared.camera_flow.follow(x[1].p, x[2].p).weight, expected_weight, 1e-12);
+    following += expected_weight > 0.05;
+
+    for (std::size_t dof = 0; dof < motions.size(); ++dof) {
+      const int moved = static_cast<int>(dof) / 3, axis = static_cast<int>(dof) % 3;
+      const auto positions = [&](double t) {
+        std::vector<Vec3> p = scene.positions;
+        p[moved][axis] += t;
+        return p;
+      };
+      constexpr double kStep = 1e-4;
+      const Vec3 rate_2 = (second(positions(kStep)) - second(positions(-kStep))) / (2 * kStep);
+      // Velocity of the image point: what x1 does beyond sliding along its ray.
+      const auto velocity = [&](double u, double v) {
+        const auto above = positions(kStep), below = positions(-kStep), here = positions(0);
+        const Vec3 p = seen(camera, u, v, here.data());
+        const Vec3 pixel_flow = (seen(camera, u, v, above.data()) - seen(camera, u, v, below.data())) / (2 * kStep);
+        const Vec3 n = normalize(cross(here[1] - here[0], here[2] - here[0]));
+        Vec3 across = rate_2 - pixel_flow;
+        across -= n * dot(n, across);
+        const double s = radius * camera.pixel_size() * dot(p - camera.position, camera.forward);
+        const double ratio = length_squared(p - second(here)) / (s * s);
+        across *= ratio < 1 ? (1 - ratio) * (1 - ratio) : 0;
+        const auto a = image_point(camera, p + across * kStep), c = image_point(camera, p - across * kStep);
+        return std::array<double, 2>{(a[0] - c[0]) / (2 * kStep), (a[1] - c[1]) / (2 * kStep)};
+      };
+      const auto v0 = velocity(at_image[0], at_image[1]);
+      constexpr double kImageStep = 1e-3;
+      const double divergence = (velocity(at_image[0] + kImageStep, at_image[1])[0] - velocity(at_image[0] - kImageStep, at_image[1])[0] +
+                                 velocity(at_image[0], at_image[1] + kImageStep)[1] - velocity(at_image[0], at_image[1] - kImageStep)[1]) /
+                                (2 * kImageStep);
+      const auto path = [&](double t) {
+        const auto p = positions(t);
+        const Vec3 x1 = seen(camera, at_image[0] + t * v0[0], at_image[1] + t * v0[1], p.data()), x2 = second(p), d = x2 - x1;
+        const Vec3 m1 = cross(p[1] - p[0], p[2] - p[0]), m2 = cross(p[5] - p[3], p[4] - p[3]);
+        return std::array<double, 2>{
+            std::log(std::abs(dot(normalize(m1), d) * dot(m2, d)) / std::pow(dot(d, d), 2)),
+            length(x1 - camera.position) + length(d)};
+      };
+      const auto above = path(kStep), below = path(-kStep);
+      const double log_f = (above[0] - below[0]) / (2 * kStep) + divergence, path_length = (above[1] - below[1]) / (2 * kStep);
+
+      LocalDifferential differential;
+      differentiate_path(prepared, x, 3, false, differential);
+      double ours = 0, our_length = 0;
+      for (const VertexGradient& g : differential.vertices)
+        if (g.vertex == moved) ours += g.log_f[axis], our_length += g.length[axis];
+      EXPECT_NEAR(ours, log_f, 1e-5 * (10 + std::abs(log_f))) << "trial " << trial << ", degree of freedom " << dof;
+      EXPECT_NEAR(our_length, path_length, 1e-6) << "trial " << trial << ", degree of freedom " << dof;
+    }
+  }
+  EXPECT_GT(following, 20) << "paths close enough to test anything";
+}
+
+struct Case {
+  const char* name;
+  bool glass;
+  GateShape shape;
+  Sampling sampling;
+  double radius, reference_radius;
+  int samples;  ///< per batch
+};
+void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+
+class CameraFlowOfEveryPixel : public ::testing::TestWithParam<Case> {};
+
+/// Two radii give the same derivative in every pixel. Mean of squared z-scores over 64 pixels, 2 gates and 3 motions (of
+/// which one third or so see something): with 32 batches its expectation is 31/29 = 1.07 and, the motions being correlated, its
+/// standard deviation at most 0.15: the limit of 1.7 means a false-alarm rate below 1e-4.
+TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
+  const Case& c = GetParam();
+  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = 8;
+  if (c.glass) {
+    Material& m = scene.materials[scene.find_material("block")];
+    m.type = MaterialType::rough_dielectric;
+    m.albedo = Rgb(1);
+    m.roughness = 0.3;
+    m.ior = 1.5;
+  }
+  const std::vector<Motion> motions = {translate(scene, "block", {0.3, 1, 0.2}), rotate_y(scene, "block", {-0.9, -0.4, -0.6}),
+                                       translate(scene, "panel", {-1, 0.2, 0.1})};
+  const TangentBasis basis = make_basis(scene, motions);
+  const GateSet gates(c.shape, {5.0, 6.0});
+  constexpr int kBatches = 32;
+  const auto estimate = [&](double radius) {
+    EstimatorOptions options;
+    options.max_bounces = 3;
+    options.sampling = c.sampling;
+    options.guiding_samples = 4;
+    options.follow_radius = radius;
+    const Renderer renderer(scene, gates, options, &basis);
+    std::vector<Batches> pixels(motions.size() * scene.camera.width * scene.camera.height * gates.size());
+    for (int b = 0; b < kBatches; ++b) {
+      std::vector<double> total(pixels.size(), 0.0);
+      for (const Term term : kTerms) {
+        const Stream stream{41, static_cast<std::uint32_t>(term), static_cast<std::uint32_t>(radius)};
+        const auto images = renderer.derive(term, stream, {b * c.samples, (b + 1) * c.samples});
+        std::size_t i = 0;
+        for (const GatedImage& image : images)
+          for (const double x : image.data) total[i++] += x;
+      }
+      for (std::size_t i = 0; i < total.size(); ++i) pixels[i].add(total[i]);
+    }
+    return pixels;
+  };
+  const auto one = estimate(c.radius), other = estimate(c.reference_radius);
+  double sum = 0, difference = 0, scale = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    const Estimate a = one[i].estimate(), b = other[i].estimate();
+    if (a.standard_error == 0 && b.standard_error == 0) continue;
+    sum += std::pow(z_score(a, b), 2);
+    difference += std::pow(std::hypot(a.standard_error, b.standard_error), 2);
+    scale += b.mean * b.mean;
+    ++count;
+  }
+  ASSERT_GT(count, 100);
+  EXPECT_LT(sum / count, 1.7) << count << " values";
+  RecordProperty("mean_square_z", std::to_string(sum / count));
+  RecordProperty("error_over_scale", std::to_string(std::sqrt(difference / scale)));
+  EXPECT_LT(std::sqrt(difference / scale), c.glass ? 0.8 : 0.3);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, CameraFlowOfEveryPixel,
+    ::testing::Values(Case{"everything_follows", false, GateShape::gaussian(0.3), Sampling::standard, 1000, 0, 48},
+                      Case{"a_few_pixels_boxcar_ellipsoidal", false, GateShape::boxcar(0.6), Sampling::ellipsoidal, 6, 0, 24},
+                      Case{"glass", true, GateShape::gaussian(0.3), Sampling::standard, 4, 16, 48}),
+    [](const auto& test) { return test.param.name; });
+
+/// A moving corner between two faces: with x1 on its pixel ray the interior term's variance is infinite, and measured over
+/// a hundred times larger.
+TEST(CameraFlow, CornersOfMovingObjectsAreQuiet) {
+  Scene scene;
+  scene.camera = {{0, 1, 3}, {0, 0, 0}, {0, 1, 0}, 40, 8, 8};
+  Mesh corner = quad({-1, 0, -1}, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1});
+  corner.positions.push_back({-1, 1, -1});
+  corner.positions.push_back({1, 1, -1});
+  corner.faces.push_back({0, 3, 5});
+  corner.faces.push_back({0, 5, 4});
+  add_shape(scene, "corner", corner, diffuse(Rgb(0.7)));
+  add_shape(scene, "lamp", quad({-0.3, 2, -0.3}, {0.3, 2, -0.3}, {0.3, 2, 0.3}, {-0.3, 2, 0.3}), diffuse(Rgb(0)), Rgb(10));
+  const TangentBasis basis = make_basis(scene, {translate(scene, "corner", {0.2, 1, 0.5})});
+  const GateSet gates(GateShape::steady(), {0.0});
+  double variance[2];
+  for (const int follows : {0, 1}) {
+    const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = Sampling::standard, .follow_radius = 4.0 * follows},
+                            &basis);
+    const Estimate mean = term_means(renderer, Term::interior, 1, 1, 64, 32, {3, 0, 0})[0][0];
+    variance[follows] = mean.standard_error * mean.standard_error;
+  }
+  EXPECT_GT(variance[0] / variance[1], 10);
+  RecordProperty("ratio", std::to_string(variance[0] / variance[1]));
+}
+
+TEST(CameraFlow, IsLeftOutWhereNothingMovesCloseToAnything) {
+  const auto possible = [](const std::function<void(Scene&)>& change) {
+    Scene scene;
+    scene.camera = {{0, 1, 6}, {0, 0, 0}, {0, 1, 0}, 40, 32, 32};
+    add_shape(scene, "block", box({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}), diffuse(Rgb(0.5)));
+    add_shape(scene, "floor", quad({-3, -2, 3}, {3, -2, 3}, {3, -2, -3}, {-3, -2, -3}), diffuse(Rgb(0.5)));
+    change(scene);
+    const TangentBasis basis = make_basis(scene, {translate(scene, "block", {1, 0, 0})});
+    return PreparedScene(scene, &basis, 4).camera_flow.possible();
+  };
+  EXPECT_FALSE(possible([](Scene&) {})) << "a convex block, far from all else";
+  EXPECT_TRUE(possible([](Scene& s) {
+    for (Vec3& p : s.positions)
+      if (p.y == -2) p.y = -0.6;
+  })) << "close to the floor";
+  EXPECT_TRUE(possible([](Scene& s) { s.materials[0].type = MaterialType::rough_dielectric; })) << "glass, from within";
+  EXPECT_TRUE(possible([](Scene& s) { s.positions[7] = {0.1, 0.1, 0.1}; })) << "a dent";
+}
+
+}  // namespace
+}  // namespace isochron::testing
