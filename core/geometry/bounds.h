@@ -33,7 +33,8 @@ struct Bounds {
         if (!(low[axis] <= origin[axis] && origin[axis] <= high[axis])) return false;
         continue;
       }
-      const double t0 = (low[axis] - origin[axis]) / direction[axis], t1 = (high[axis] - origin[axis]) / direction[axis];
+      const double t0 = (low[axis] - origin[axis]) / direction[axis],
+                   t1 = (high[axis] - origin[axis]) / direction[axis];
       begin = std::max(begin, std::min(t0, t1));
       end = std::min(end, std::max(t0, t1));
     }

@@ -7,7 +7,8 @@
 namespace isochron {
 namespace {
 
-/// Dihedral angles that differ from flat by less, as a sine, count as flat: meshes are read in single precision.
+/// Dihedral angles that differ from flat by less, as a sine, count as flat: meshes are read in single
+/// precision.
 constexpr double kFlat = 1e-6;
 
 Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
@@ -16,8 +17,8 @@ Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
   return bounds;
 }
 
-/// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat piece
-/// whose dark side is inside.
+/// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat
+/// piece whose dark side is inside.
 bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
   std::vector<int> parent(scene.positions.size());
   std::iota(parent.begin(), parent.end(), 0);
@@ -43,7 +44,8 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
   };
   bool open = false, flat = true;
   for (const Edge& edge : scene.edges) {
-    const bool moves[2] = {moving.triangle[edge.face[0]] != 0, edge.face[1] >= 0 && moving.triangle[edge.face[1]]};
+    const bool moves[2] = {moving.triangle[edge.face[0]] != 0,
+                           edge.face[1] >= 0 && moving.triangle[edge.face[1]]};
     if (!moves[0] && !moves[1]) continue;
     if (!moves[0] || !moves[1]) {
       open = true;
@@ -62,7 +64,8 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
 
 }  // namespace
 
-CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const MovingParts& moving, double radius)
+CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const MovingParts& moving,
+                       double radius)
     : position_(camera.position), forward_(camera.forward), radius_(radius * camera.pixel_size()) {
   if (!(radius > 0) || !moving.geometry) return;
   Bounds moved;
@@ -71,10 +74,12 @@ CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const Movi
       for (const int v : scene.triangles[t].vertex) moved.add(scene.positions[v]);
   // x1 is within s of the box, and its own depth enters s.
   constexpr double kLargest = 0.5;
-  const Vec3 farthest{camera.forward.x > 0 ? moved.high.x : moved.low.x, camera.forward.y > 0 ? moved.high.y : moved.low.y,
+  const Vec3 farthest{camera.forward.x > 0 ? moved.high.x : moved.low.x,
+                      camera.forward.y > 0 ? moved.high.y : moved.low.y,
                       camera.forward.z > 0 ? moved.high.z : moved.low.z};
   const double depth = std::max(0.0, dot(camera.forward, farthest - camera.position));
-  const double margin = radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
+  const double margin =
+      radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
   near_ = moved.grown(margin);
   possible_ = !sees_nothing_of_itself(scene, moving);
   for (std::size_t t = 0; t < scene.triangles.size() && !possible_; ++t)
@@ -91,13 +96,14 @@ CameraFlow::Follow CameraFlow::follow(const Vec3& x1, const Vec3& x2) const {
   return {(1 - ratio) * (1 - ratio), gradient * (-2 * (1 - ratio))};
 }
 
-void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g, LocalDifferential& out) {
+void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g,
+                    LocalDifferential& out) {
   const Vec3 ray = x1.p - scene.camera.position;
   add_material_flow(scene, x1, x1.n * (dot(ray, g) / dot(x1.n, ray)), out);
 }
 
-void add_following_flow(const PreparedScene& scene, const SurfacePoint& x1, const SurfacePoint& x2, const Vec3& g,
-                        LocalDifferential& out) {
+void add_following_flow(const PreparedScene& scene, const SurfacePoint& x1, const SurfacePoint& x2,
+                        const Vec3& g, LocalDifferential& out) {
   const double weight = scene.camera_flow.follow(x1.p, x2.p).weight;
   if (weight == 0) return;
   const Vec3 along = (g - x1.n * dot(g, x1.n)) * weight;

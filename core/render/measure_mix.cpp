@@ -13,13 +13,14 @@ struct Doubtful {
 constexpr Doubtful kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr double kShares[] = {0, 0.3, 1};
-constexpr int kSamples[] = {16, 8, 4};  ///< per pixel and batch, of each share: for about the same work
-constexpr int kBatches = 12, kPixels = 400;
+constexpr int kSamples[] = {16, 8,
+                            4};  ///< per pixel and batch at most, of each share: for about the same work
+constexpr int kMostBatches = 12, kFewestBatches = 4;
+constexpr int kPixels = 4096;  ///< at most: where pixels are larger, connections from the camera look better
+constexpr double kPaths = 80000;  ///< of standard sampling, about
 /// The combination must look this much better than either technique alone: trials are noisy, and what it can
 /// lose where it is not the best is more than what it can win.
 constexpr double kClearlyBetter = 0.75;
-/// Small images have large pixels, which flatter connections from the camera (measured on the cube).
-constexpr double kLargePixels = 0.8;
 
 /// The camera's image in fewer pixels.
 Scene reduced(const Scene& scene) {
@@ -54,9 +55,9 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
 
 /// Sum over pixels and gates of the variance between batches of images, times the work behind them.
 template <class Estimate>
-double variance_and_work(const Renderer& renderer, int samples, Estimate&& estimate) {
+double variance_and_work(const Renderer& renderer, int batches, int samples, Estimate&& estimate) {
   std::vector<double> mean, squares;
-  for (int b = 0; b < kBatches; ++b) {
+  for (int b = 0; b < batches; ++b) {
     const GatedImage image = estimate(SampleRange{b * samples, (b + 1) * samples});
     mean.resize(image.data.size());
     squares.resize(image.data.size());
@@ -79,6 +80,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   const Scene small = reduced(scene);
+  const double samples = kPaths / (small.camera.width * small.camera.height);
+  const int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
   const auto choose = [&](const Doubtful& widths, const TangentBasis* moving, auto&& estimate) -> double {
     if (width < widths.from) return 1;
     if (width > widths.to) return 0;
@@ -87,12 +90,14 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       EstimatorOptions trial = options;
       trial.mix = SamplingMix{kShares[i], kShares[i]};
       const Renderer renderer(small, gates, trial, moving);
-      cost[i] = variance_and_work(renderer, kSamples[i],
-                                  [&](SampleRange range) { return estimate(renderer, range); });
+      cost[i] = variance_and_work(
+          renderer, batches,
+          std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
+          [&](SampleRange range) { return estimate(renderer, range); });
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
-    const int alone = kLargePixels * cost[0] <= cost[2] ? 0 : 2;
+    const int alone = cost[0] <= cost[2] ? 0 : 2;
     return kShares[cost[1] < kClearlyBetter * cost[alone] ? 1 : alone];
   };
   SamplingMix best;

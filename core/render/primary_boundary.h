@@ -1,5 +1,6 @@
-// Primary visibility boundary: a camera ray grazes an edge (theory section 5, "Primary") or the border of a pixel. Light
-// crosses it where the edge moves, and where the points beside it follow others (see CameraFlow): per length,
+// Primary visibility boundary: a camera ray grazes an edge (theory section 5, "Primary") or the border of a
+// pixel. Light crosses it where the edge moves, and where the points beside it follow others (see
+// CameraFlow): per length,
 //     L (velocity of the boundary - flow of x1) . n_B / distance, with the sign of the side.
 #pragma once
 #include "core/render/boundary_edges.h"
@@ -8,11 +9,12 @@
 
 namespace isochron {
 
-/// The surface point that the camera sees just beside the edge point y, on the side of the unit vector `side` (in the
-/// image, across the edge): on the edge's face that is in front on that side, else on whatever lies beyond.
+/// The surface point that the camera sees just beside the edge point y, on the side of the unit vector `side`
+/// (in the image, across the edge): on the edge's face that is in front on that side, else on whatever lies
+/// beyond.
 template <class Sink>
-std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge& edge, const Vec3& y, const Vec3& d,
-                                        const Vec3& side) {
+std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge& edge, const Vec3& y,
+                                        const Vec3& d, const Vec3& side) {
   const PreparedScene& scene = worker.scene;
   int front = -1;
   double front_slope = 0;
@@ -21,10 +23,11 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
     const double across = dot(edge.inward[i], side);
     if (!(across > 0)) continue;
     const double slope = dot(edge.inward[i], d) / across;  // depth gained per distance beside the edge
-    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope, into_front = edge.inward[i];
+    if (front < 0 || slope < front_slope)
+      front = edge.face[i], front_slope = slope, into_front = edge.inward[i];
   }
-  // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the edge
-  // start within a surface, or behind one.
+  // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the
+  // edge start within a surface, or behind one.
   const double offset = scene.caster.offset();
   if (front >= 0) return scene.point_in_plane(front, y + into_front * offset);
   ++worker.rays;
@@ -38,7 +41,8 @@ template <class Sink>
 class PrimaryBoundary {
  public:
   /// `narrow_gates`: use the techniques that draw lengths from the gates.
-  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates)
+  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide,
+                  bool narrow_gates)
       : worker_(worker),
         scene_(worker.scene),
         edges_(edges),
@@ -80,10 +84,12 @@ class PrimaryBoundary {
     differential.clear();
     const double share[2] = {1 - point.s, point.s};
     for (int i = 0; i < 2; ++i)
-      if (scene_.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
+      if (scene_.moving.vertex[edge->vertex[i]])
+        differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
     worker_.sink.bind(differential);
 
-    const double factor = scale * sine * scene_.camera.image_area_per_solid_angle(d) / (r * r * point.pdf * warp.density(x));
+    const double factor =
+        scale * sine * scene_.camera.image_area_per_solid_angle(d) / (r * r * point.pdf * warp.density(x));
     // The two sides share their random numbers: what they have in common cancels.
     const Rng shared = rng;
     for (const double sign : {-1.0, 1.0}) {
@@ -98,15 +104,17 @@ class PrimaryBoundary {
           worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, kValueOnly);
         }
       }
-      follow(*x1, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng, [&](const Rgb& value, double length) {
-        worker_.sink.add(pixel, value * (sign * factor), length, kValueOnly);
-      });
+      follow(*x1, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng,
+             [&](const Rgb& value, double length) {
+               worker_.sink.add(pixel, value * (sign * factor), length, kValueOnly);
+             });
       if (moves) worker_.sink.bind(differential);
     }
     note_guide(worker_.sink, table, x);
   }
 
-  /// One point on the border of a pixel, left or above; contributions are scaled by `scale` (one over the number of points).
+  /// One point on the border of a pixel, left or above; contributions are scaled by `scale` (one over the
+  /// number of points).
   void sample_pixel_border(double scale, Rng& rng) {
     if (!scene_.camera_flow.possible()) return;
     const CameraModel& camera = scene_.camera;
@@ -127,16 +135,17 @@ class PrimaryBoundary {
     const bool has_after = in_columns && in_rows, has_before = (axis == 0 ? column : row) > 0;
     const int before = pixel - (axis == 0 ? 1 : camera.width);
     const double factor = scale * borders / guide_.warp(table).density(x);
-    follow(*x1, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng, [&](const Rgb& value, double length) {
-      if (has_after) worker_.sink.add(pixel, value * factor, length, kValueOnly);
-      if (has_before) worker_.sink.add(before, value * -factor, length, kValueOnly);
-    });
+    follow(*x1, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng,
+           [&](const Rgb& value, double length) {
+             if (has_after) worker_.sink.add(pixel, value * factor, length, kValueOnly);
+             if (has_before) worker_.sink.add(before, value * -factor, length, kValueOnly);
+           });
     note_guide(worker_.sink, table, x);
   }
 
  private:
-  /// Hands the light that x1 sends to the camera from points that it follows to add(value, length), the sink being
-  /// bound to g . (how x1 follows); ledgers put it down to the triangle `blamed`.
+  /// Hands the light that x1 sends to the camera from points that it follows to add(value, length), the sink
+  /// being bound to g . (how x1 follows); ledgers put it down to the triangle `blamed`.
   template <class Add>
   void follow(const SurfacePoint& x1, int blamed, const Vec3& g, Rng& rng, Add&& add) {
     if (!scene_.camera_flow.possible_at(x1.p) || worker_.options.max_bounces < 1) return;

@@ -1,5 +1,5 @@
-// What the camera sees follows what moves close to it (CameraFlow): which term holds what changes, the derivative of every
-// pixel does not.
+// What the camera sees follows what moves close to it (CameraFlow): which term holds what changes, the
+// derivative of every pixel does not.
 #include "core/render/camera_flow.h"
 
 #include <gtest/gtest.h>
@@ -28,8 +28,8 @@ std::array<double, 2> image_point(const CameraModel& camera, const Vec3& p) {
           0.5 * camera.height + dot(camera.image_gradient(camera.forward, 1), off)};
 }
 
-/// ln of the differential of a path camera - x1 - x2 whose first vertex flows as the header of CameraFlow says, from the
-/// definition by central differences: contribution times Jacobian of the flow in the image.
+/// ln of the differential of a path camera - x1 - x2 whose first vertex flows as the header of CameraFlow
+/// says, from the definition by central differences: contribution times Jacobian of the flow in the image.
 TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
   Rng rng(Stream{5, 0, 0}, 0, 0);
   const auto in = [&](double low, double high) { return low + (high - low) * rng.uniform(); };
@@ -43,7 +43,8 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       for (int i = 0; i < 3; ++i) {
         const double angle = kTwoPi * i / 3 + in(-0.3, 0.3), radius = in(0.4, 0.8);
         const Vec3 flat{radius * std::cos(angle), radius * std::sin(angle), 0};
-        const Vec3 tilted = k == 0 ? flat + Vec3{0, 0, 0.4 * flat.x} : Vec3{flat.z, flat.x, flat.y} + Vec3{0.3, 0, 0.5};
+        const Vec3 tilted =
+            k == 0 ? flat + Vec3{0, 0, 0.4 * flat.x} : Vec3{flat.z, flat.x, flat.y} + Vec3{0.3, 0, 0.5};
         mesh[k].positions.push_back(tilted + Vec3{in(-0.05, 0.05), in(-0.05, 0.05), in(-0.05, 0.05)});
       }
     mesh[0].faces = {{0, 1, 2}};
@@ -66,7 +67,8 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
 
     const double b1 = in(0.2, 0.4), b2 = in(0.2, 0.4), b[3] = {1 - b1 - b2, b1, b2};
     const auto second = [&](const std::vector<Vec3>& p) { return p[3] * b[0] + p[4] * b[1] + p[5] * b[2]; };
-    const auto at_image = image_point(camera, prepared.scene.positions[0] * 0.4 + scene.positions[1] * 0.3 + scene.positions[2] * 0.3);
+    const auto at_image = image_point(
+        camera, prepared.scene.positions[0] * 0.4 + scene.positions[1] * 0.3 + scene.positions[2] * 0.3);
     SurfacePoint x[3];
     x[0].p = camera.position;
     x[1] = prepared.point_on_triangle(0, camera.position, camera.direction(at_image[0], at_image[1]));
@@ -90,7 +92,8 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       const auto velocity = [&](double u, double v) {
         const auto above = positions(kStep), below = positions(-kStep), here = positions(0);
         const Vec3 p = seen(camera, u, v, here.data());
-        const Vec3 pixel_flow = (seen(camera, u, v, above.data()) - seen(camera, u, v, below.data())) / (2 * kStep);
+        const Vec3 pixel_flow =
+            (seen(camera, u, v, above.data()) - seen(camera, u, v, below.data())) / (2 * kStep);
         const Vec3 n = normalize(cross(here[1] - here[0], here[2] - here[0]));
         Vec3 across = rate_2 - pixel_flow;
         across -= n * dot(n, across);
@@ -102,26 +105,31 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       };
       const auto v0 = velocity(at_image[0], at_image[1]);
       constexpr double kImageStep = 1e-3;
-      const double divergence = (velocity(at_image[0] + kImageStep, at_image[1])[0] - velocity(at_image[0] - kImageStep, at_image[1])[0] +
-                                 velocity(at_image[0], at_image[1] + kImageStep)[1] - velocity(at_image[0], at_image[1] - kImageStep)[1]) /
+      const double divergence = (velocity(at_image[0] + kImageStep, at_image[1])[0] -
+                                 velocity(at_image[0] - kImageStep, at_image[1])[0] +
+                                 velocity(at_image[0], at_image[1] + kImageStep)[1] -
+                                 velocity(at_image[0], at_image[1] - kImageStep)[1]) /
                                 (2 * kImageStep);
       const auto path = [&](double t) {
         const auto p = positions(t);
-        const Vec3 x1 = seen(camera, at_image[0] + t * v0[0], at_image[1] + t * v0[1], p.data()), x2 = second(p), d = x2 - x1;
+        const Vec3 x1 = seen(camera, at_image[0] + t * v0[0], at_image[1] + t * v0[1], p.data()),
+                   x2 = second(p), d = x2 - x1;
         const Vec3 m1 = cross(p[1] - p[0], p[2] - p[0]), m2 = cross(p[5] - p[3], p[4] - p[3]);
         return std::array<double, 2>{
             std::log(std::abs(dot(normalize(m1), d) * dot(m2, d)) / std::pow(dot(d, d), 2)),
             length(x1 - camera.position) + length(d)};
       };
       const auto above = path(kStep), below = path(-kStep);
-      const double log_f = (above[0] - below[0]) / (2 * kStep) + divergence, path_length = (above[1] - below[1]) / (2 * kStep);
+      const double log_f = (above[0] - below[0]) / (2 * kStep) + divergence,
+                   path_length = (above[1] - below[1]) / (2 * kStep);
 
       LocalDifferential differential;
       differentiate_path(prepared, x, 3, false, differential);
       double ours = 0, our_length = 0;
       for (const VertexGradient& g : differential.vertices)
         if (g.vertex == moved) ours += g.log_f[axis], our_length += g.length[axis];
-      EXPECT_NEAR(ours, log_f, 1e-5 * (10 + std::abs(log_f))) << "trial " << trial << ", degree of freedom " << dof;
+      EXPECT_NEAR(ours, log_f, 1e-5 * (10 + std::abs(log_f)))
+          << "trial " << trial << ", degree of freedom " << dof;
       EXPECT_NEAR(our_length, path_length, 1e-6) << "trial " << trial << ", degree of freedom " << dof;
     }
   }
@@ -136,13 +144,16 @@ struct Case {
   double radius, reference_radius;
   int samples;  ///< per batch
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
 
 class CameraFlowOfEveryPixel : public ::testing::TestWithParam<Case> {};
 
-/// Two radii give the same derivative in every pixel. Mean of squared z-scores over 64 pixels, 2 gates and 3 motions (of
-/// which one third or so see something): with 32 batches its expectation is 31/29 = 1.07 and, the motions being correlated, its
-/// standard deviation at most 0.15: the limit of 1.7 means a false-alarm rate below 1e-4.
+/// Two radii give the same derivative in every pixel. Mean of squared z-scores over 64 pixels, 2 gates and 3
+/// motions (of which one third or so see something): with 32 batches its expectation is 31/29 = 1.07 and, the
+/// motions being correlated, its standard deviation at most 0.15: the limit of 1.7 means a false-alarm rate
+/// below 1e-4.
 TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
   const Case& c = GetParam();
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
@@ -154,7 +165,8 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
     m.roughness = 0.3;
     m.ior = 1.5;
   }
-  const std::vector<Motion> motions = {translate(scene, "block", {0.3, 1, 0.2}), rotate_y(scene, "block", {-0.9, -0.4, -0.6}),
+  const std::vector<Motion> motions = {translate(scene, "block", {0.3, 1, 0.2}),
+                                       rotate_y(scene, "block", {-0.9, -0.4, -0.6}),
                                        translate(scene, "panel", {-1, 0.2, 0.1})};
   const TangentBasis basis = make_basis(scene, motions);
   const GateSet gates(c.shape, {5.0, 6.0});
@@ -198,12 +210,14 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
   EXPECT_LT(std::sqrt(difference / scale), c.glass ? 0.8 : 0.3);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Scenes, CameraFlowOfEveryPixel,
-    ::testing::Values(Case{"everything_follows", false, GateShape::gaussian(0.3), Sampling::standard, 1000, 0, 48},
-                      Case{"a_few_pixels_boxcar_ellipsoidal", false, GateShape::boxcar(0.6), Sampling::ellipsoidal, 6, 0, 24},
-                      Case{"glass", true, GateShape::gaussian(0.3), Sampling::standard, 4, 16, 48}),
-    [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(Scenes, CameraFlowOfEveryPixel,
+                         ::testing::Values(Case{"everything_follows", false, GateShape::gaussian(0.3),
+                                                Sampling::standard, 1000, 0, 48},
+                                           Case{"a_few_pixels_boxcar_ellipsoidal", false,
+                                                GateShape::boxcar(0.6), Sampling::ellipsoidal, 6, 0, 24},
+                                           Case{"glass", true, GateShape::gaussian(0.3), Sampling::standard,
+                                                4, 16, 48}),
+                         [](const auto& test) { return test.param.name; });
 
 /// A moving corner of two faces, bright, under a lamp that looks away from the camera.
 Scene moving_corner() {
@@ -215,24 +229,29 @@ Scene moving_corner() {
   corner.faces.push_back({0, 3, 5});
   corner.faces.push_back({0, 5, 4});
   add_shape(scene, "corner", corner, diffuse(Rgb(0.7)));
-  add_shape(scene, "lamp", quad({-0.3, 2, -0.3}, {0.3, 2, -0.3}, {0.3, 2, 0.3}, {-0.3, 2, 0.3}), diffuse(Rgb(0)), Rgb(10));
+  add_shape(scene, "lamp", quad({-0.3, 2, -0.3}, {0.3, 2, -0.3}, {0.3, 2, 0.3}, {-0.3, 2, 0.3}),
+            diffuse(Rgb(0)), Rgb(10));
   return scene;
 }
 
-/// Against finite differences in every pixel: a static board in the corner hides parts of it from the camera and from each
-/// other. Most follows, so that what the camera sees beside the board's edges flows across them. Mean of squared
-/// z-scores over 64 pixels: 1.07 expected, standard deviation 0.19; limit 1.9, false-alarm rate below 1e-4.
+/// Against finite differences in every pixel: a static board in the corner hides parts of it from the camera
+/// and from each other. Most follows, so that what the camera sees beside the board's edges flows across
+/// them. Mean of squared z-scores over 64 pixels: 1.07 expected, standard deviation 0.19; limit 1.9,
+/// false-alarm rate below 1e-4.
 TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
   Scene scene = moving_corner();
-  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}), diffuse(Rgb(0.1), true));
+  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}),
+            diffuse(Rgb(0.1), true));
   const Motion motion = translate(scene, "corner", {0.5, 1, 1});
   const TangentBasis basis = make_basis(scene, {motion});
   const GateSet gates(GateShape::steady(), {0.0});
-  const EstimatorOptions options{.max_bounces = 2, .sampling = Sampling::standard, .follow_radius = 8, .guiding_samples = 4};
+  const EstimatorOptions options{
+      .max_bounces = 2, .sampling = Sampling::standard, .follow_radius = 8, .guiding_samples = 4};
   constexpr double kStep = 0.01;
   Scene moved[2] = {scene, scene};
   for (const int side : {0, 1}) motion.apply(moved[side], side ? kStep : -kStep);
-  const Renderer renderer(scene, gates, options, &basis), below(moved[0], gates, options), above(moved[1], gates, options);
+  const Renderer renderer(scene, gates, options, &basis), below(moved[0], gates, options),
+      above(moved[1], gates, options);
   constexpr int kBatches = 32, kSamples = 384, kReferenceSamples = 1024;
   std::vector<Batches> ours(64), reference(64);
   for (std::uint32_t b = 0; b < kBatches; ++b) {
@@ -241,7 +260,8 @@ TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
       const auto image = renderer.derive(term, {7, b, static_cast<std::uint32_t>(term)}, {0, kSamples})[0];
       for (int i = 0; i < 64; ++i) total[i] += image.data[i];
     }
-    const GatedImage plus = above.render({8, b, 0}, {0, kReferenceSamples}), minus = below.render({8, b, 0}, {0, kReferenceSamples});
+    const GatedImage plus = above.render({8, b, 0}, {0, kReferenceSamples}),
+                     minus = below.render({8, b, 0}, {0, kReferenceSamples});
     for (int i = 0; i < 64; ++i) {
       ours[i].add(total[i]);
       reference[i].add((plus.data[i] - minus.data[i]) / (2 * kStep));
@@ -282,7 +302,8 @@ struct VelocitySink {
 /// Where all move alike and x1 follows entirely, no edge moves relative to the light that grazes it.
 TEST(CameraFlow, ShadowsMoveWithEverything) {
   Scene scene = moving_corner();
-  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}), diffuse(Rgb(0.1), true));
+  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}),
+            diffuse(Rgb(0.1), true));
   std::vector<Motion> all;
   for (const char* shape : {"corner", "board", "lamp"}) all.push_back(translate(scene, shape, {0.3, 1, 0.5}));
   const TangentBasis basis = make_basis(scene, all);
@@ -316,8 +337,9 @@ TEST(CameraFlow, CornersOfMovingObjectsAreQuiet) {
   const GateSet gates(GateShape::steady(), {0.0});
   double variance[2];
   for (const int follows : {0, 1}) {
-    const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = Sampling::standard, .follow_radius = 4.0 * follows},
-                            &basis);
+    const Renderer renderer(
+        scene, gates, {.max_bounces = 3, .sampling = Sampling::standard, .follow_radius = 4.0 * follows},
+        &basis);
     const Estimate mean = term_means(renderer, Term::interior, 1, 1, 64, 32, {3, 0, 0})[0][0];
     variance[follows] = mean.standard_error * mean.standard_error;
   }
@@ -340,7 +362,8 @@ TEST(CameraFlow, IsLeftOutWhereNothingMovesCloseToAnything) {
     for (Vec3& p : s.positions)
       if (p.y == -2) p.y = -0.6;
   })) << "close to the floor";
-  EXPECT_TRUE(possible([](Scene& s) { s.materials[0].type = MaterialType::rough_dielectric; })) << "glass, from within";
+  EXPECT_TRUE(possible([](Scene& s) { s.materials[0].type = MaterialType::rough_dielectric; }))
+      << "glass, from within";
   EXPECT_TRUE(possible([](Scene& s) { s.positions[7] = {0.1, 0.1, 0.1}; })) << "a dent";
 }
 
