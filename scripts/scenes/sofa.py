@@ -49,7 +49,7 @@ def write(directory):
     rows, columns = len(SEAT), len(ARM)
     u, v = np.linspace(-0.5, 0.5, rows)[:, None], np.linspace(-0.5, 0.5, columns)
     heights = SEAT[:, None] * (1 - ARM) + ARMREST[:, None] * ARM
-    offsets = 0.06 + 0.16 * np.cos(np.pi * u) * np.cos(np.pi * v) + 0.08 * (u + v)
+    offsets = 0.05 + 0.12 * np.cos(np.pi * u) * np.cos(np.pi * v) + 0.07 * (u + v)
     vertices = CENTRE + (LENGTH * u * up_slope)[:, None] + (WIDTH * v)[:, None] * across + heights[..., None] * normal
     sofa = mesh.rounded((vertices.reshape(-1, 3), mesh.grid(rows, columns)))
     lamp = mesh.face_towards(mesh.square(LIGHT_EDGE), LIGHT_CENTRE, CENTRE)
