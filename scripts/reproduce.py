@@ -13,7 +13,7 @@ from reproduction.measure import ROOT, Failure, load, run, store
 def parse(arguments):
     parser = argparse.ArgumentParser(prog="scripts/reproduce", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"all unless given; {', '.join(RECONSTRUCTIONS)}")
-    parser.add_argument("--seeds", type=int, default=2, metavar="N", help="runs of each, with seeds 1 to N; default 2")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2], metavar="N", help="a run for each; default 1 2")
     parser.add_argument("--kind", choices=("shipped", "counterparts"), help="only those, where no name is given")
     parser.add_argument("--iterations", type=int, metavar="N", help="in place of the experiment's")
     parser.add_argument("--samples", type=int, metavar="N", help="per pixel, in place of the experiment's")
@@ -25,7 +25,9 @@ def parse(arguments):
     unknown = [n for n in options.names if n not in RECONSTRUCTIONS]
     if unknown:
         parser.error(f"there is no reconstruction {unknown[0]} (allowed: {', '.join(RECONSTRUCTIONS)})")
-    for key in ("seeds", "iterations", "samples"):
+    if min(options.seeds) < 0:
+        parser.error("--seeds: at least 0")
+    for key in ("iterations", "samples"):
         if (getattr(options, key) or 1) < 1:
             parser.error(f"--{key}: at least 1")
     if not options.names:
@@ -37,14 +39,14 @@ def parse(arguments):
 def reproduce(name, options):
     entry = RECONSTRUCTIONS[name]
     table = options.output / f"measured/reconstructions/{name}.csv"
-    for seed in range(1, options.seeds + 1):
+    for seed in options.seeds:
         folder = options.runs / f"{name}.{seed}"
         result, halfway = run(name, seed, folder, options.iterations, options.samples)
         others = [r for r in load(table) if r.seed != seed]
         store(table, sorted([*others, result], key=lambda r: r.seed))
         print(f"{name}, seed {seed}: {result.status}, {result.error_percent:.3g} % of the initial error, "
               f"{result.seconds:.0f} s, {result.cpu_seconds:.0f} CPU s, {result.peak_mib:.0f} MiB", flush=True)
-        if seed == 1:
+        if seed == load(table)[0].seed:
             strip.render(name, entry, folder, halfway, options.samples)
             (options.output / "figures").mkdir(parents=True, exist_ok=True)
             strip.draw(name, entry, folder, options.output / f"figures/{name}.png")

@@ -17,7 +17,7 @@ class Failure(Exception):
     """Why an experiment could not be run, in one line."""
 
 
-@dataclass
+@dataclass(frozen=True)
 class Run:
     """One row of experiments/measured/reconstructions/NAME.csv."""
 
@@ -35,7 +35,7 @@ class Run:
     peak_mib: float  # resident memory
 
 
-@dataclass
+@dataclass(frozen=True)
 class Usage:
     """What processes took, one after the other."""
 

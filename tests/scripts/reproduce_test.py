@@ -38,7 +38,7 @@ class ReproduceTest(unittest.TestCase):
         table = self.folder / "measured/reconstructions/tree.csv"
         other = measure.Run(1, "iterations_reached", 1, 200, 0.25, 1, 0.1, 40, 50, 0.2, 0.25, 60)
         measure.store(table, [other])
-        done = self.reproduce("branches", "--seeds", "2", "--iterations", "3", "--samples", "2")
+        done = self.reproduce("branches", "--seeds", "1", "2", "--iterations", "3", "--samples", "2")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         self.assertEqual(measure.load(table), [other])
         rows = measure.load(self.folder / "measured/reconstructions/branches.csv")
@@ -49,7 +49,7 @@ class ReproduceTest(unittest.TestCase):
         self.assertTrue((self.folder / "figures/branches.png").read_bytes().startswith(b"\x89PNG"))
         page = (self.folder / "RESULTS.md").read_text()
         self.assertIn("| `branches` | 12 | 1 | 3, 100 |", page)
-        self.assertIn("| `tree` | 17 | 1 | 200, 200 | 0.2, 15.5 | 0.25, 744 | 1/2976 | 0.25 | 40 | 180 | 60 |", page)
+        self.assertIn("| `tree` | 17 | 1 | 200, 200 | 0.2, 15.5 | 0.25, 744 | 1/2976 | 0.25 | 40 | 180 | 50 | 60 |", page)
         self.assertIn("](figures/branches.png)", page)
 
     def test_stages_are_one_run(self):
