@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <stdexcept>
 
 namespace isochron {
 namespace {
@@ -226,6 +227,8 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
         sorted.by_shape.push_back(unit[i % columns] * g.by_shape[i]);
       poll();
     }
+    if (!std::all_of(limits.begin(), limits.end(), [](double x) { return std::isfinite(x); }))
+      throw std::runtime_error(fmt::format("the gradient at {} is not finite", point.name));
     result.gradient.add(std::move(limits));
     shares.add_gradient(std::move(sorted));
   }
