@@ -16,6 +16,14 @@ constexpr int kRungs = 4;
 constexpr int kFewestRepeats = 4, kRepeats = 10, kMostRepeats = 400;
 /// Unknowns that are looked at where the time grows with their number.
 constexpr int kMostComponents = 6;
+
+/// Rungs of one height have the same random numbers in all methods, and others than those of another height:
+/// methods that come down to the same settings then have the same errors.
+std::uint32_t first_iteration(double factor) {
+  static_assert(kMostRepeats < 1 << 12);
+  return static_cast<std::uint32_t>(std::ilogb(factor) + 64) << 12;
+}
+
 std::vector<double> select(const std::vector<double>& values, const std::vector<int>& components) {
   std::vector<double> selected;
   for (int component : components) selected.push_back(values[component]);
@@ -58,11 +66,11 @@ ChartMethod climb(const Experiment& experiment, const Method& method, const std:
   ChartMethod result;
   result.name = method.name;
   result.components = static_cast<int>(run.components().size());
-  std::uint32_t iteration = 0;
   for (int step = top - rungs + 1; step <= top; ++step) {
     Rung rung;
     rung.factor = trial.factor(step);
     run.set_factor(rung.factor);
+    std::uint32_t iteration = first_iteration(rung.factor);
     double spent = 0;
     do {
       MethodRun::Estimate estimate = run.gradient(theta, target, iteration++, poll);

@@ -25,6 +25,7 @@ STYLES = {
     "3_bounces": ("tab:purple", "P"),
     "paper": ("tab:brown", "X"),
 }
+STEEP = -0.65  # slopes of fewer samples than the law of -1/2 needs
 DIFFERENCES = [("#1b7837", "v"), ("#5aae61", "^"), ("#a6dba0", ">")]
 
 
@@ -38,6 +39,11 @@ def read_rows(path):
     if not rows:
         raise PlotError(f"{path}: no rows")
     return rows
+
+
+def percent(relative):
+    """Two digits, but no powers of ten."""
+    return f"{100 * relative:.2g} %" if relative < 1 else f"{100 * relative:.0f} %"
 
 
 def number(text):
@@ -87,7 +93,7 @@ def draw_chart(folder):
     axis.text(right, 0.0102, "1 % ", ha="right", va="bottom", fontsize=8, color="0.3")
     if reference > low_error:
         axis.axhspan(low_error, reference, color="0.5", alpha=0.08, zorder=0)
-        axis.text(right, reference * 0.97, f"error of the reference, {100 * reference:.2g} % ", ha="right", va="top",
+        axis.text(right, reference * 0.97, f"error of the reference, {percent(reference)} ", ha="right", va="top",
                   fontsize=7, color="0.45")
     for row in table:
         method, (color, marker) = row["method"], style[row["method"]]
@@ -95,7 +101,8 @@ def draw_chart(folder):
         seconds = float(row["core_seconds"])
         biased = row["bias_significant"] == "true"
         bias2 = float(row["bias2"]) if biased else 0.0
-        what = f"{seconds:.3g} s" if np.isfinite(seconds) else f"never, bias {100 * np.sqrt(bias2):.2g} %"
+        bound = "at most " if number(row["slope"]) < STEEP else ""
+        what = f"{bound}{seconds:.3g} s" if np.isfinite(seconds) else f"never, bias {percent(np.sqrt(bias2))}"
         axis.plot(x, y, marker, color=color, ms=9 if marker == "*" else 6, label=f"{plain(method)}: {what}", zorder=3)
         beyond = times[times >= x[max(0, len(x) - 3)]]
         law = float(row["rate"]) / beyond + bias2
