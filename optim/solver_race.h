@@ -39,8 +39,8 @@ struct Race {
 /// Throws InputError where target values are unknown or those of the start: no error to follow.
 void require_error(const Problem& problem);
 
-/// adam, lbfgs and levenberg_marquardt with the experiment's other settings (learning_rate is a length to all
-/// that use it). A method that would not fit into memory is left out with a note. Of a problem that passed
+/// adam, lbfgs (with half of learning_rate as its first trial step) and levenberg_marquardt, all else as the
+/// experiment says. A method that would not fit into memory is left out with a note. Of a problem that passed
 /// require_error.
 Race race_solvers(const Experiment& experiment, const GatedImage& target, const RaceOptions& options);
 
