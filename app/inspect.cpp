@@ -107,16 +107,6 @@ void print_costs(const Inspection& inspection) {
   }
 }
 
-/// Whether the full model without its last bounce is off by more than the tolerance: then so may be the full
-/// model.
-bool last_bounce_counts(const Problem& problem, const Inspection& inspection) {
-  const int most = full_bounces(problem.experiment());
-  return most > 0 &&
-         std::any_of(inspection.points.begin(), inspection.points.end(), [&](const PointInspection& p) {
-           return relative_bias(p.gradient, {most - 1, {true, true, true}}).lower > kBiasTolerance;
-         });
-}
-
 void print_advice(const Problem& problem, const Inspection& inspection) {
   const Advice& advice = inspection.advice;
   const Reduction& kept = advice.reduction.kept;
@@ -130,8 +120,16 @@ void print_advice(const Problem& problem, const Inspection& inspection) {
     fmt::print(" {:.2f} +- {:.2f} % ({})", 100 * advice.reduction.bias[i].value,
                100 * advice.reduction.bias[i].standard_error, inspection.points[i].point.name);
   fmt::print("\n");
-  if (last_bounce_counts(problem, inspection))
-    fmt::print("The last bounce still counts: the full model itself may have too few\n");
+  double beyond = 0;
+  for (const PointInspection& p : inspection.points) beyond = std::max(beyond, expected_beyond(p.gradient));
+  if (std::isinf(beyond))
+    fmt::print(
+        "The last bounce brings no less than the one before: the full model itself may need far more\n");
+  else if (beyond > kBiasTolerance)
+    fmt::print(
+        "If further bounces shrink like the last, the full model itself is off by {:.1f} %: it may need "
+        "more\n",
+        100 * beyond);
   for (const std::string& what : advice.reduction.undecided)
     fmt::print("Too few samples to tell {}; kept, --seconds gives more\n", what);
   fmt::print(

@@ -14,8 +14,8 @@ namespace {
 
 /// Half of the time for where light and gradients come from, half for what they cost.
 constexpr double kShareOfCosts = 0.5;
-/// Measured variances and times are good to some ten percent: what saves less is left as it is, and so are samples
-/// whose variance seems larger by less.
+/// Measured variances and times are good to some ten percent: what saves less is left as it is, and so are
+/// samples whose variance seems larger by less.
 constexpr double kWorthNewSamples = 0.9, kWorthNewSampling = 0.8, kSameVariance = 1.25;
 
 std::array<int, kPasses> samples_of(const Experiment& experiment, const std::array<bool, 3>& kept) {

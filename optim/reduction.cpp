@@ -85,6 +85,17 @@ RelativeBias relative_bias(const GradientReplicates& replicates, const Reduction
   return bias;
 }
 
+double expected_beyond(const GradientReplicates& replicates) {
+  Reduction kept = replicates.full();
+  if (kept.max_bounces < 2) return 0;
+  --kept.max_bounces;
+  const double last = relative_bias(replicates, kept).value;
+  --kept.max_bounces;
+  const double before = relative_bias(replicates, kept).value - last;
+  if (!(last > 0)) return 0;
+  return last < before ? last * last / (before - last) : std::numeric_limits<double>::infinity();
+}
+
 ReductionChoice choose_reduction(std::span<const GradientReplicates> points, double tolerance) {
   ReductionChoice choice;
   choice.kept = points[0].full();

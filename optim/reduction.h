@@ -50,6 +50,11 @@ struct RelativeBias {
 /// nothing is known.
 RelativeBias relative_bias(const GradientReplicates& replicates, const Reduction& kept);
 
+/// What the full model itself lacks, relative to its gradient, if what further bounces bring shrinks like
+/// what the last two brought: a geometric series. Zero where there are fewer than two bounces, infinite where
+/// the last brought no less.
+double expected_beyond(const GradientReplicates& replicates);
+
 struct ReductionChoice {
   Reduction kept;
   std::vector<RelativeBias> bias;      ///< of what is kept, at every point

@@ -91,6 +91,16 @@ TEST(Reduction, ADipOnTheWayDoesNotHide) {
   EXPECT_EQ(choose_reduction(std::span(&g, 1), 0.01).kept.max_bounces, 3);
 }
 
+TEST(Reduction, ExpectsBouncesBeyondToShrinkOn) {
+  // 1 + 1/4 + 1/16 of a series whose rest is 1/48.
+  const GradientReplicates g = make({{0, 0, 0}, {1, 0, 0}, {0.25, 0, 0}, {0.0625, 0, 0}});
+  EXPECT_NEAR(expected_beyond(g), 1.0 / 48 / 1.3125, 1e-12);
+  EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {1, 0, 0}, {0, 0, 0}})), 0);
+  EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {1, 0, 0}})), 0);
+  EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {0.5, 0, 0}, {0.5, 0, 0}})),
+            std::numeric_limits<double>::infinity());
+}
+
 TEST(Reduction, KeepsWhatNoiseLeavesOpen) {
   // A third bounce of 0.5 %: with errors of 0.1 % it may go, with 0.5 % nobody knows, and a bounce of 5 %
   // stays by right.
