@@ -10,6 +10,7 @@ initial one. Photons are counted per pixel and colour, on average over the brigh
 
 import csv
 import pathlib
+import statistics
 import sys
 import tempfile
 
@@ -21,10 +22,12 @@ import matplotlib.pyplot as plt
 from reproduction.measure import ROOT, program, summary
 
 PHOTONS = (100, 1000, 10_000, 100_000, 1_000_000, 0)
-DRAWS = 3
+DRAWS = 2
 SHORT = {
-    "corridor": ("optimizer={method: adam, learning_rate: 0.012, iterations: 100, decay: {start: 50, half_life: 15}}",
-                 "samples={primal: 4096, interior: 2048, visibility: 256, path_length: 0}", "target.samples=131072"),
+    "corridor": ("optimizer={method: adam, learning_rate: 0.02, iterations: 60, decay: {start: 30, half_life: 8}}",
+                 "samples={primal: 3072, interior: 1536, visibility: 192, path_length: 0}", "target.samples=131072"),
+    "sofa": ("optimizer={method: adam, learning_rate: 0.05, iterations: 100, decay: {start: 60, half_life: 20}}",
+             "samples={primal: 1024, interior: 1024, visibility: 64, path_length: 128}", "target.samples=65536"),
 }
 COLUMNS = ("experiment", "photons", "draw", "error_percent")
 
@@ -47,8 +50,8 @@ def measure(file, names):
                     error = 100 * end["param_rmse_final"] / end["param_rmse_initial"]
                     rows.append((name, photons, draw, f"{error:.4g}"))
                     print(*rows[-1], flush=True)
-    with open(file, "w", encoding="ascii", newline="") as out:
-        csv.writer(out, lineterminator="\n").writerows([COLUMNS, *sorted(rows, key=lambda r: r[0])])
+                    with open(file, "w", encoding="ascii", newline="") as out:
+                        csv.writer(out, lineterminator="\n").writerows([COLUMNS, *sorted(rows, key=lambda r: r[0])])
 
 
 def plot(file, picture):
@@ -58,11 +61,10 @@ def plot(file, picture):
     for color, name in zip(("C0", "C3"), dict.fromkeys(r["experiment"] for r in rows)):
         points = [(int(r["photons"]), float(r["error_percent"])) for r in rows if r["experiment"] == name]
         counts = sorted({p for p, _ in points if p})
-        middle = [sorted(e for p, e in points if p == count)[DRAWS // 2] for count in counts]
+        middle = [statistics.median(e for p, e in points if p == count) for count in counts]
         axes.loglog(*zip(*(q for q in points if q[0])), ".", color=color, alpha=0.5)
         axes.loglog(counts, middle, "-", color=color, label=f"{name}, median")
-        clean = sorted(e for p, e in points if not p)[DRAWS // 2]
-        axes.axhline(clean, color=color, ls=":", lw=1, label=f"{name}, no noise")
+        axes.axhline(statistics.median(e for p, e in points if not p), color=color, ls=":", lw=1, label=f"{name}, no noise")
     axes.set_xlabel("photons per pixel and colour in the brightest gate")
     axes.set_ylabel("error at the end, % of the initial one")
     axes.grid(True, which="both", lw=0.4, alpha=0.4)
