@@ -40,8 +40,8 @@ def measure(file, names):
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary) / "run"
         for name in names:
-            for photons in PHOTONS:
-                for draw in range(1, DRAWS + 1):
+            for draw in range(1, DRAWS + 1):
+                for photons in PHOTONS:
                     # The target's seed draws the photons; the optimisation has other random numbers each time, too.
                     settings = [*SHORT[name], f"target.seed={100 + draw}"] + [f"target.noise.photons={photons}"] * (photons > 0)
                     words = [word for setting in settings for word in ("--set", setting)]
