@@ -195,11 +195,4 @@ double GateSet::relative_width() const {
   return shape_.width() * size() / sum;
 }
 
-double GateSet::mixture_pdf(double l) const {
-  if (shape_.is_steady()) return 0;
-  double sum = 0;
-  for_each_value(l, [&sum](int, double w) { sum += w; });
-  return sum / (shape_.mass() * size());
-}
-
 }  // namespace isochron

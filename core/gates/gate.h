@@ -176,14 +176,8 @@ class GateSet {
       }
     }
   }
-  /// Length drawn by choosing a gate uniformly (`pick` in (0, 1)) and then a length from it. Not for steady gates.
-  double sample_mixture(double pick, double u) const {
-    return center(std::min(static_cast<int>(pick * size()), size() - 1)) + shape_.sample(u);
-  }
   /// Standard deviation of the gates over the mean of their centres; steady: infinity.
   double relative_width() const;
-  /// Density of `sample_mixture`. Zero for the steady gate.
-  double mixture_pdf(double l) const;
 
  private:
   static constexpr int kBlock = 8;

@@ -120,14 +120,12 @@ class EllipsoidalConnections {
     const GateShape& shape = gates.shape();
     targets_.clear();
     if (pass_.value) {
-      double pick = rng.uniform();
-      const double u = rng.uniform();
-      Target t;
-      if (const int gate = worker_.pick.sample(pixel, pick); gate >= 0) {
-        t.tau[0] = gates.center(gate) + shape.sample(u);
-        t.present[0] = t.tau[0] > 0;
-      }
-      if (t.present[0]) {
+      const double pick = rng.uniform(), u = rng.uniform();
+      const auto length = worker_.pick.sample_length(pixel, pick, u);
+      if (length && *length > 0) {
+        Target t;
+        t.tau[0] = *length;
+        t.present[0] = true;
         t.scale = 1 / worker_.pick.length_pdf(pixel, t.tau[0]);
         targets_.push_back(t);
       }

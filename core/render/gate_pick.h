@@ -34,7 +34,14 @@ class GatePick {
   double probability(int pixel, int gate) const {
     return below_.empty() ? 1.0 / gates_.size() : below_[row(pixel) + gate + 1] - below_[row(pixel) + gate];
   }
-  /// Density per length of picking a gate and then a length from it.
+  /// Length drawn by picking a gate and then a length from it; empty where no gate counts. Not for steady
+  /// gates.
+  std::optional<double> sample_length(int pixel, double pick, double u) const {
+    const int gate = sample(pixel, pick);
+    if (gate < 0) return std::nullopt;
+    return gates_.center(gate) + gates_.shape().sample(u);
+  }
+  /// Density of `sample_length`.
   double length_pdf(int pixel, double length) const {
     double sum = 0;
     gates_.for_each_value(length, [&](int gate, double w) { sum += probability(pixel, gate) * w; });

@@ -1,5 +1,5 @@
-// The light side of a boundary segment: what a surface point sends towards a given point, gathered by a standard walk
-// or, under narrow gates, by ellipsoidal connections of lengths drawn from the gates.
+// The light side of a boundary segment: what a surface point sends towards a given point, gathered by a
+// standard walk or, under narrow gates, by ellipsoidal connections of lengths drawn from the gates.
 #pragma once
 #include <span>
 
@@ -16,6 +16,12 @@ struct GatheredLight {
   int target;     ///< which of the lengths before the path it is meant for; -1: all
 };
 
+/// What a boundary segment's light is joined with.
+struct CameraSide {
+  int pixel;      ///< or GatePick::kImage
+  double length;  ///< from the camera to where the light side begins
+};
+
 template <class Sink>
 class LightSide {
  public:
@@ -27,10 +33,10 @@ class LightSide {
         path_(worker.options.max_bounces),
         connections_(worker, {}, Receiver{*this}) {}
 
-  /// Light that x sends towards `towards`, to be joined with paths whose lengths, up to x, are `before`. The result
-  /// lives until the next call.
+  /// Light that x sends towards `towards`, to be joined with the paths `before`. The result lives until the
+  /// next call.
   const std::vector<GatheredLight>& gather(const SurfacePoint& towards, const SurfacePoint& x,
-                                           std::span<const double> before, int max_bounces, Rng& rng) {
+                                           std::span<const CameraSide> before, int max_bounces, Rng& rng) {
     lights_.clear();
     path_.start(towards, 0);
     path_.push(scene_, x, 0);
@@ -41,17 +47,19 @@ class LightSide {
         if (!radiance.is_black()) lights_.push_back({radiance, 0, 0, -1});
       }
       lengths_.clear();
-      for (const double l : before) {
+      for (const CameraSide& side : before) {
         const double pick = rng.uniform(), u = rng.uniform();
-        lengths_.push_back(worker_.gates.sample_mixture(pick, u) - l);
+        const auto length = worker_.pick.sample_length(side.pixel, pick, u);
+        lengths_.push_back(length ? *length - side.length : 0);
       }
       std::swap(worker_.path, path_);
       connections_.gather(lengths_, max_bounces, rng);
       std::swap(worker_.path, path_);
     } else {
-      const auto [shortest, longest] = std::ranges::minmax(before);
-      walk_standard(worker_, path_, max_bounces, {worker_.gates.lower() - longest, worker_.gates.upper() - shortest},
-                    rng, Visitor{lights_, path_});
+      const auto [shortest, longest] = std::ranges::minmax(before, {}, &CameraSide::length);
+      walk_standard(worker_, path_, max_bounces,
+                    {worker_.gates.lower() - longest.length, worker_.gates.upper() - shortest.length}, rng,
+                    Visitor{lights_, path_});
     }
     return lights_;
   }
@@ -67,7 +75,8 @@ class LightSide {
     LightSide& side;
     void take(int target, int bounces, const Rgb& value) {
       const double length = side.lengths_[target];
-      const double pdf = side.worker_.gates.mixture_pdf(length + side.before_[target]);
+      const CameraSide& before = side.before_[target];
+      const double pdf = side.worker_.pick.length_pdf(before.pixel, length + before.length);
       side.lights_.push_back({value * (1 / pdf), length, bounces, target});
     }
   };
@@ -77,7 +86,7 @@ class LightSide {
   const bool arcs_;
   Path path_;
   EllipsoidalConnections<Sink, Receiver> connections_;
-  std::span<const double> before_;
+  std::span<const CameraSide> before_;
   std::vector<double> lengths_;  ///< drawn from the gates, less `before_`
   std::vector<GatheredLight> lights_;
 };

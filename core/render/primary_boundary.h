@@ -97,14 +97,14 @@ class PrimaryBoundary {
       if (!x1) continue;
       Rng walk_rng = shared;
       if (moves) {
-        const double before = length(x1->p - eye_.p) * scene_.index_between(eye_, *x1);
+        const CameraSide before{pixel, length(x1->p - eye_.p) * scene_.index_between(eye_, *x1)};
         for (const GatheredLight& light :
              light_side_.gather(eye_, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng)) {
           note_boundary(worker_.sink, light.bounces, edge->face[0]);
-          worker_.sink.add(pixel, light.value * (-sign * factor), before + light.length, kValueOnly);
+          worker_.sink.add(pixel, light.value * (-sign * factor), before.length + light.length, kValueOnly);
         }
       }
-      follow(*x1, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng,
+      follow(*x1, pixel, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng,
              [&](const Rgb& value, double length) {
                worker_.sink.add(pixel, value * (sign * factor), length, kValueOnly);
              });
@@ -135,7 +135,7 @@ class PrimaryBoundary {
     const bool has_after = in_columns && in_rows, has_before = (axis == 0 ? column : row) > 0;
     const int before = pixel - (axis == 0 ? 1 : camera.width);
     const double factor = scale * borders / guide_.warp(table).density(x);
-    follow(*x1, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng,
+    follow(*x1, GatePick::kImage, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng,
            [&](const Rgb& value, double length) {
              if (has_after) worker_.sink.add(pixel, value * factor, length, kValueOnly);
              if (has_before) worker_.sink.add(before, value * -factor, length, kValueOnly);
@@ -147,7 +147,7 @@ class PrimaryBoundary {
   /// Hands the light that x1 sends to the camera from points that it follows to add(value, length), the sink
   /// being bound to g . (how x1 follows); ledgers put it down to the triangle `blamed`.
   template <class Add>
-  void follow(const SurfacePoint& x1, int blamed, const Vec3& g, Rng& rng, Add&& add) {
+  void follow(const SurfacePoint& x1, int pixel, int blamed, const Vec3& g, Rng& rng, Add&& add) {
     if (!scene_.camera_flow.possible_at(x1.p) || worker_.options.max_bounces < 1) return;
     Rgb throughput(1.0);
     const auto next = step(worker_, x1, normalize(eye_.p - x1.p), throughput, rng);
@@ -156,12 +156,12 @@ class PrimaryBoundary {
     add_following_flow(scene_, x1, next->point, g, following_);
     if (following_.empty()) return;
     worker_.sink.bind(following_);
-    const double before = length(x1.p - eye_.p) * scene_.index_between(eye_, x1) +
-                          length(next->point.p - x1.p) * scene_.index_between(x1, next->point);
+    const CameraSide before{pixel, length(x1.p - eye_.p) * scene_.index_between(eye_, x1) +
+                                       length(next->point.p - x1.p) * scene_.index_between(x1, next->point)};
     for (const GatheredLight& light :
          light_side_.gather(x1, next->point, {&before, 1}, worker_.options.max_bounces - 1, rng)) {
       note_boundary(worker_.sink, light.bounces + 1, blamed);
-      add(throughput * light.value, before + light.length);
+      add(throughput * light.value, before.length + light.length);
     }
   }
 

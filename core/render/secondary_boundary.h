@@ -70,7 +70,7 @@ class SecondaryBoundary {
     double tau = 0;
     if (at_length_) {
       const double pick = rng.uniform(), u = rng.uniform();
-      tau = worker_.gates.sample_mixture(pick, u);
+      tau = worker_.pick.sample_length(pixel, pick, u).value_or(0);
     }
     for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
       if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
@@ -311,7 +311,7 @@ class SecondaryBoundary {
     const Warp& warp = camera_warp(c.pixel, c.bounces);
     const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
     return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area[t] *
-           worker_.gates.mixture_pdf(c.length + g.r_d + g.r_s) * line.distance_rate(g.y.s);
+           worker_.pick.length_pdf(c.pixel, c.length + g.r_d + g.r_s) * line.distance_rate(g.y.s);
   }
 
   /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.
@@ -343,7 +343,7 @@ class SecondaryBoundary {
     const double length = (g.r_d + g.r_s) * scene_.index_between(g.camera_end, g.light);
     for (const Connection& c : connections_) {
       fewest = std::min(fewest, c.bounces);
-      before_.push_back(c.length + length);
+      before_.push_back({c.pixel, c.length + length});
     }
     const auto& lights = light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng);
     const LocalDifferential* bound = nullptr;
@@ -359,7 +359,7 @@ class SecondaryBoundary {
         const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
         const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
         note_boundary(worker_.sink, c.bounces + e.bounces, g.y.edge->face[0]);
-        worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i] + e.length, kValueOnly);
+        worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i].length + e.length, kValueOnly);
       }
     }
   }
@@ -376,7 +376,7 @@ class SecondaryBoundary {
   LocalDifferential camera_flow_, material_flow_;
   std::vector<SurfacePoint> walk_, camera_side_;
   std::vector<Connection> connections_;
-  std::vector<double> before_;  ///< lengths from the camera to S, one per connection
+  std::vector<CameraSide> before_;  ///< up to S, one per connection
 };
 
 }  // namespace isochron

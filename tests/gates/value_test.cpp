@@ -228,10 +228,8 @@ TEST(GateSet, VisitsExactlyTheGatesThatHoldTheLength) {
           slopes[g] = slope;
         });
         EXPECT_EQ(values.size(), slopes.size());
-        double density = 0;
         for (int g = 0; g < count; ++g) {
           const double x = l - centers[g], w = gate.value(x), slope = gate.derivative(x);
-          density += w / gate.mass() / count;
           EXPECT_NEAR(values.count(g) ? values[g] : 0, w, 1e-13 * w) << name;
           EXPECT_NEAR(slopes.count(g) ? slopes[g] : 0, slope, 1e-13 * std::abs(slope)) << name;
           EXPECT_EQ(set.center(g), centers[g]);
@@ -242,23 +240,8 @@ TEST(GateSet, VisitsExactlyTheGatesThatHoldTheLength) {
             EXPECT_TRUE(l >= set.lower() && l <= set.upper());
           }
         }
-        EXPECT_NEAR(set.mixture_pdf(l), density, 1e-13 * density) << name;
       }
     }
-  }
-}
-
-TEST(GateSet, MixtureIntegratesToOne) {
-  for (const auto& [name, gate] : finite_gates()) {
-    const double s = gate.upper() - gate.lower();
-    // Disjoint supports and a coinciding pair: each gate's own knots split the quadrature.
-    const GateSet set(gate, {10 * s, 20 * s, 20 * s, 15 * s});
-    double total = 0;
-    for (const double c : {10.0, 15.0, 20.0}) {
-      total += integrate(gate, [&](double x) { return set.mixture_pdf(c * s + x); });
-    }
-    EXPECT_NEAR(total, 1, 1e-11) << name;
-    EXPECT_EQ(set.mixture_pdf(12 * s), 0);
   }
 }
 
@@ -274,7 +257,6 @@ TEST(GateSet, SteadyKeepsTheNumberOfGates) {
     EXPECT_EQ(slope, 0);
   });
   EXPECT_EQ(calls, 3);
-  EXPECT_EQ(set.mixture_pdf(123), 0);
 }
 
 }  // namespace
