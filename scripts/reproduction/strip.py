@@ -6,6 +6,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+import yaml
 from matplotlib import colors
 
 import exr
@@ -26,10 +27,12 @@ def render(name, entry, folder, halfway, samples=None):
     count = samples or entry.samples
     common = ["--set", f"resolution=[{entry.resolution[0]}, {entry.resolution[1]}]", "--set", "target.samples=1", "--samples"]
     at = {"initial": "initial", "middle": point(halfway), "final": point(values(folder)), "target": "target"}
+    resolved = yaml.safe_load((folder / "experiment.yaml").read_text(encoding="utf-8"))
     for state, where in at.items():
         out = folder / "strip" / state
         experiment = ROOT / f"experiments/{name}.yaml"
-        program("render", experiment, "-o", out, "--at", where, *common, count)
+        bounces = (resolved["target"] if state == "target" else resolved)["max_bounces"]
+        program("render", experiment, "-o", out, "--at", where, *common, count, "--set", f"max_bounces={bounces}")
         if state != "target":
             # Boundary terms cost more per sample than images do, and derivatives are looked at for their shape alone.
             program("derive", experiment, "-o", out, "--at", where, "--parameter", entry.unknown, *common, max(count // 4, 2))
