@@ -150,6 +150,65 @@ void measure_gradient(const NamedScene& s, int rounds, Report& report) {
   }
 }
 
+/// CPU time of the primal and the interior pass with the first scene, gates and basis over that with the
+/// second.
+struct Load {
+  const Scene& scene;
+  const GateSet& gates;
+  const TangentBasis& basis;
+};
+void measure_load(const std::string& figure, const std::string& what, Sampling sampling, const Load& first,
+                  const Load& second, int rounds, const char* goal, Report& report) {
+  const EstimatorOptions options{.max_bounces = 3, .sampling = sampling};
+  const SampleRange samples{0, sampling == Sampling::ellipsoidal ? 2 : 64};
+  struct Side {
+    Renderer renderer;
+    GatedImage adjoint;
+    std::vector<double> gradient;
+    Side(const Load& load, const EstimatorOptions& o)
+        : renderer(load.scene, load.gates, o, &load.basis),
+          adjoint(unit_adjoint(load.scene, load.gates)),
+          gradient(DofLayout(load.scene).size()) {}
+  };
+  Side a(first, options), b(second, options);
+  const auto pair = [&](auto&& work) {
+    return measure_pair(
+               rounds, CLOCK_THREAD_CPUTIME_ID, [&] { return work(a), 1.0; }, [&] { return work(b), 1.0; })
+        .ratio;
+  };
+  report.add(figure, what + " render", pair([&](Side& s) { s.renderer.render({.seed = 3}, samples); }), "",
+             goal);
+  report.add(figure, what + " interior gradient", pair([&](Side& s) {
+               s.renderer.add_gradient(Term::interior, s.adjoint, {.seed = 3, .pass = 1}, samples,
+                                       s.gradient);
+             }),
+             "", goal);
+}
+
+/// What more unknowns, gates and triangles cost.
+void measure_loads(int rounds, Report& report) {
+  const Scene small = small_scene(), large = large_scene(), coarse = subdivided(small, 3),
+              fine = subdivided(small, 8);
+  const GateSet wide = wide_gates(), narrow = narrow_gates();
+  std::vector<double> centers;
+  for (int g = 0; g < 256; ++g) centers.push_back(5 + 4.5 * g / 255);
+  const GateSet many(GateShape::gaussian(0.05), centers), one(GateShape::gaussian(0.05), {6.5});
+  for (const Sampling sampling : {Sampling::standard, Sampling::ellipsoidal}) {
+    const bool standard = sampling == Sampling::standard;
+    const std::string how = standard ? "standard" : "ellipsoidal";
+    const GateSet& gates = standard ? wide : narrow;
+    const TangentBasis free = all_vertices(large), shift = translation(large);
+    measure_load("105 000 unknowns / one", how, sampling, {large, gates, free}, {large, gates, shift}, rounds,
+                 "<= 1.3", report);
+    const TangentBasis box = translation(small);
+    measure_load("256 gates / one", how, sampling, {small, many, box}, {small, one, box}, rounds, "<= 1.5",
+                 report);
+    const TangentBasis of_fine = translation(fine), of_coarse = translation(coarse);
+    measure_load("1.7 million triangles / 1700", how, sampling, {fine, gates, of_fine},
+                 {coarse, gates, of_coarse}, std::min(rounds, 5), "<= 3", report);
+  }
+}
+
 /// Wall time with one thread over that with two.
 void measure_threads(const NamedScene& s, int rounds, Report& report) {
   const TangentBasis basis = all_vertices(s.scene);
@@ -192,8 +251,10 @@ int main(int argc, char** argv) {
   const std::vector<NamedScene> scenes{{"small", small_scene()}, {"large", large_scene()}};
   for (const NamedScene& s : scenes) measure_forward(s, rounds, report);
   for (const NamedScene& s : scenes) measure_gradient(s, rounds, report);
+  measure_loads(rounds, report);
   // Unlike the figures above, wall times need both cores. The load counts this program itself.
   if (double load; getloadavg(&load, 1) == 1 && load > 1.5)
-    std::fprintf(stderr, "The machine is busy (load %.1f): the figures for threads are not worth much.\n", load);
+    std::fprintf(stderr, "The machine is busy (load %.1f): the figures for threads are not worth much.\n",
+                 load);
   for (const NamedScene& s : scenes) measure_threads(s, rounds, report);
 }
