@@ -42,8 +42,8 @@ def draw(name, entry, folder, file):
     strip = folder / "strip"
     images = {s: plot.read_stack(strip / s / "render.exr")[""][list(entry.gates)] for s in STATES}
     slopes = {s: plot.read_stack(strip / s / f"{entry.unknown}.exr")["total"][list(entry.gates)] for s in STATES[:3]}
-    rows, side = len(entry.gates), 1.2
-    figure = plt.figure(figsize=(7 * side + 3.4, max(rows * side, 2.6) + 0.5), layout="constrained")
+    rows, side, shape = len(entry.gates), 1.2, images["target"].shape[1:3]
+    figure = plt.figure(figsize=(7 * side + 3.4, max(rows * side * shape[0] / shape[1], 2.6) + 0.5), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[7 * side, 3.4])
     cells = left.subplots(rows, 7, squeeze=False)
     # Every gate has its own exposure, the same in all states: gates differ by orders of magnitude.
