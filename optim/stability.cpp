@@ -124,7 +124,9 @@ Direction direction(const Repeats& estimates, const Reference& reference) {
 Failure failure(const Direction& d, bool reference_resolved, double error_ratio) {
   const bool arrives = !(error_ratio > kWorksError);  // also where it is not known
   if (d.positive >= kWorksPositive && arrives) return Failure::none;
-  if (!reference_resolved || d.zero >= 0.5) return Failure::no_signal;
+  if (d.zero >= 0.5) return Failure::no_signal;
+  // The gradient is no larger than the reference's noise lets it be: noise of that size is too much in any case.
+  if (!reference_resolved) return d.variance.value >= 1 ? Failure::variance : Failure::no_signal;
   const double bias2 = significant(d.bias2) ? d.bias2.value : 0;
   if (bias2 >= d.variance.value && bias2 >= kMostOfBias * kMostOfBias) return Failure::bias;
   if (d.variance.value >= kMostOfVariance * kMostOfVariance) return Failure::variance;

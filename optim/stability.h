@@ -13,10 +13,10 @@ namespace isochron {
 enum class Failure {
   none,
   no_signal,  ///< half of the estimates or more are exactly zero, or the true gradient is lost in the
-              ///< reference's noise
-  bias,       ///< the larger part of the error, significant, and at least a tenth of the gradient
-  variance,   ///< the larger part of the error, and at least half of the gradient
-  descent     ///< neither: the gradient is right at the start, but following it does not lead to the target
+              ///< reference's noise and the method's own noise is not larger still
+  bias,      ///< the larger part of the error, significant, and at least a tenth of the gradient
+  variance,  ///< the larger part of the error, and at least half of the gradient
+  descent    ///< neither: the gradient is right at the start, but following it does not lead to the target
 };
 const char* name(Failure failure);
 
@@ -32,8 +32,8 @@ struct Direction {
 /// `norm2` of the reference is above 0.
 Direction direction(const Repeats& estimates, const Reference& reference);
 
-/// A method works where the reconstruction leaves at most this share of the initial error, and its estimates point the
-/// right way at least so often (the toss of a coin reaches that in 8 % of cells).
+/// A method works where the reconstruction leaves at most this share of the initial error, and its estimates
+/// point the right way at least so often (the toss of a coin reaches that in 8 % of cells).
 inline constexpr double kWorksError = 0.25, kWorksPositive = 2.0 / 3;
 
 /// `error_ratio`: of the reconstruction; NaN where there was none, which then does not count.

@@ -61,6 +61,7 @@ TEST(Stability, ReasonsOfFailure) {
   EXPECT_EQ(reason(noisy(24, {-3, -4}, 0.3, 6), 1.5), Failure::bias);
   EXPECT_EQ(reason(Repeats(24, {0, 0}), 1), Failure::no_signal);
   EXPECT_EQ(failure(direction(good, reference), false, 1), Failure::no_signal);
+  EXPECT_EQ(failure(direction(noisy(24, {3, 4}, 20, 3), reference), false, 1), Failure::variance);
   // Twice the gradient on average, but far more noise than that.
   EXPECT_EQ(reason(noisy(2000, {6, 8}, 20, 9), 0.9), Failure::variance);
   // A bias of 4 % leaves no mark.
