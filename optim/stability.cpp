@@ -97,18 +97,21 @@ Direction direction(const Repeats& estimates, const Reference& reference) {
   const double length = norm(truth), n = static_cast<double>(estimates.size());
   Direction result;
   double squares = 0;
+  int zero = 0, positive = 0;
   for (const auto& estimate : estimates) {
     const double own = norm(estimate);
     if (own == 0) {
-      result.zero += 1 / n;
+      ++zero;
       continue;
     }
     double cosine = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) cosine += estimate[i] / own * (truth[i] / length);
-    if (cosine > 0) result.positive += 1 / n;
+    if (cosine > 0) ++positive;
     result.cosine.value += cosine / n;
     squares += cosine * cosine / n;
   }
+  result.zero = zero / n;
+  result.positive = positive / n;
   result.cosine.standard_error =
       std::sqrt(std::max(0.0, squares - result.cosine.value * result.cosine.value) / (n - 1));
   const double norm2 = reference.norm2.value;
