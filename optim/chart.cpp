@@ -113,7 +113,8 @@ Reference make_reference(const Experiment& experiment, const std::vector<double>
   }
   const WeightedRepeats alone{&result.repeats, 1};
   result.norm2 = squared_norm({&alone, 1});
-  result.error = std::sqrt(total_variance(result.repeats).value / kReferenceRepeats / result.norm2.value);
+  const double noise2 = total_variance(result.repeats).value / kReferenceRepeats;
+  result.error = result.norm2.value > 0 ? std::sqrt(noise2 / result.norm2.value) : INFINITY;
   return result;
 }
 

@@ -77,10 +77,9 @@ StabilityCell map_cell(const Experiment& experiment, const Method& method, const
     cell.core_seconds += estimate.core_seconds / kEstimates;
     estimates.push_back(std::move(estimate.gradient));
   }
-  const bool seen = resolved(reference);
-  if (reference.norm2.value > 0) cell.direction = direction(estimates, reference);
+  cell.direction = direction(estimates, reference);
   cell.error_ratio = reconstruct(run.problem(), target, options.iterations, options.poll);
-  cell.failure = failure(cell.direction, seen, cell.error_ratio);
+  cell.failure = failure(cell.direction, resolved(reference), cell.error_ratio);
   cell.reference_error = reference.error;
   return cell;
 }
@@ -100,10 +99,8 @@ Direction direction(const Repeats& estimates, const Reference& reference) {
   int zero = 0, positive = 0;
   for (const auto& estimate : estimates) {
     const double own = norm(estimate);
-    if (own == 0) {
-      ++zero;
-      continue;
-    }
+    if (own == 0) ++zero;
+    if (own == 0 || length == 0) continue;
     double cosine = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) cosine += estimate[i] / own * (truth[i] / length);
     if (cosine > 0) ++positive;
@@ -114,10 +111,13 @@ Direction direction(const Repeats& estimates, const Reference& reference) {
   result.positive = positive / n;
   result.cosine.standard_error =
       std::sqrt(std::max(0.0, squares - result.cosine.value * result.cosine.value) / (n - 1));
-  const double norm2 = reference.norm2.value;
+  const Measured& square = reference.norm2;
+  const double norm2 =
+      resolved(reference) ? square.value : std::max(0.0, square.value) + 2 * square.standard_error;
   result.variance = total_variance(estimates);
   const WeightedRepeats groups[] = {{&estimates, 1}, {&reference.repeats, -1}};
   result.bias2 = squared_norm(groups);
+  if (norm2 == 0) return result;
   for (double* x : {&result.variance.value, &result.variance.standard_error, &result.bias2.value,
                     &result.bias2.standard_error, &result.bias2.error_if_zero})
     *x /= norm2;
@@ -128,7 +128,8 @@ Failure failure(const Direction& d, bool reference_resolved, double error_ratio)
   const bool arrives = !(error_ratio > kWorksError);  // also where it is not known
   if (d.positive >= kWorksPositive && arrives) return Failure::none;
   if (d.zero >= 0.5) return Failure::no_signal;
-  // The gradient is no larger than the reference's noise lets it be: noise of that size is too much in any case.
+  // The gradient is no larger than the reference's noise lets it be: noise of that size is too much in any
+  // case.
   if (!reference_resolved) return d.variance.value >= 1 ? Failure::variance : Failure::no_signal;
   const double bias2 = significant(d.bias2) ? d.bias2.value : 0;
   if (bias2 >= d.variance.value && bias2 >= kMostOfBias * kMostOfBias) return Failure::bias;
@@ -216,7 +217,8 @@ std::string stability_table(const Stability& map) {
     if (last) text += "\n";
   }
   text += fmt::format(
-      "Estimates that point the right way; error after the reconstruction over that before. Reasons where that is more "
+      "Estimates that point the right way; error after the reconstruction over that before. Reasons where "
+      "that is more "
       "than {}, or the first less than {:.0f} %\n",
       kWorksError, 100 * kWorksPositive);
   for (const std::string& note : map.notes) text += note + "\n";

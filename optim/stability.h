@@ -14,9 +14,9 @@ enum class Failure {
   none,
   no_signal,  ///< half of the estimates or more are exactly zero, or the true gradient is lost in the
               ///< reference's noise and the method's own noise is not larger still
-  bias,      ///< the larger part of the error, significant, and at least a tenth of the gradient
-  variance,  ///< the larger part of the error, and at least half of the gradient
-  descent    ///< neither: the gradient is right at the start, but following it does not lead to the target
+  bias,       ///< the larger part of the error, significant, and at least a tenth of the gradient
+  variance,   ///< the larger part of the error, and at least half of the gradient
+  descent     ///< neither: the gradient is right at the start, but following it does not lead to the target
 };
 const char* name(Failure failure);
 
@@ -29,7 +29,8 @@ struct Direction {
   SquaredNorm bias2;    ///< likewise
 };
 
-/// `norm2` of the reference is above 0.
+/// Where the reference is not resolved, squares are relative to the most that the gradient's may be, two
+/// standard errors above the estimate; absolute where it is zero.
 Direction direction(const Repeats& estimates, const Reference& reference);
 
 /// A method works where the reconstruction leaves at most this share of the initial error, and its estimates

@@ -74,6 +74,14 @@ TEST(Stability, ReferenceThatIsNoiseIsNotResolved) {
   EXPECT_FALSE(resolved(reference_of({0, 0}, 0)));
 }
 
+TEST(Stability, NothingAtAllIsNoSignal) {
+  const Direction d = direction(Repeats(24, {0, 0}), reference_of({0, 0}, 0));
+  EXPECT_EQ(d.positive, 0);
+  EXPECT_EQ(d.cosine.value, 0);
+  EXPECT_EQ(d.zero, 1);
+  EXPECT_EQ(failure(d, false, 1), Failure::no_signal);
+}
+
 TEST(Stability, GatesOfAnotherWidth) {
   GateSpec gates;
   gates.centers = {4, 6};
