@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <limits>
 
 #include "core/math/error.h"
@@ -61,15 +62,23 @@ double reconstruct(const Problem& problem, const GatedImage& target, int iterati
   return parameters.distance_to_target(state.theta) / before;
 }
 
-StabilityCell map_cell(const Experiment& experiment, const Method& method, const GatedImage& target,
-                       const Reference& reference, double core_seconds, const StabilityOptions& options) {
-  MethodRun run(experiment, method);
+StabilityCell map_cell(MethodRun& run, const GatedImage& target, const Reference& reference,
+                       double core_seconds, const StabilityOptions& options) {
   const std::vector<double> theta = run.problem().parameters().initial();
   const SampleTrial trial = try_samples(run, theta, target, 1, core_seconds, options.poll);
   const int step = trial.last_within(core_seconds, 1);
   StabilityCell cell;
-  cell.method = method.name;
-  cell.factor = std::max(run.least_factor(), trial.factor(step) * core_seconds / trial.core_seconds[step]);
+  cell.factor = trial.factor(step);
+  // Nearer to the time than powers of two and single trials come.
+  constexpr int kRounds = 3;
+  for (std::uint32_t round = 0; round < kRounds; ++round) {
+    run.set_factor(cell.factor);
+    double time = std::numeric_limits<double>::infinity();
+    for (std::uint32_t i = 0; i < 2; ++i)
+      time =
+          std::min(time, run.gradient(theta, target, kEstimates + 2 * round + i, options.poll).core_seconds);
+    cell.factor = std::max(run.least_factor(), cell.factor * std::clamp(core_seconds / time, 0.25, 4.0));
+  }
   run.set_factor(cell.factor);
   Repeats estimates;
   for (std::uint32_t i = 0; i < kEstimates; ++i) {
@@ -176,8 +185,17 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     const GatedImage target = quick_target(narrow, kTargetShare * of_width, options.poll);
     const Reference reference =
         make_reference(narrow, theta, target, kReferenceShare * of_width, options.poll);
+    // All take the time that the slowest needs for its least number of samples, if that is more.
+    std::deque<MethodRun> runs;
+    double time = of_gradient;
     for (const Method& method : methods) {
-      StabilityCell cell = map_cell(narrow, method, target, reference, of_gradient, options);
+      MethodRun& run = runs.emplace_back(narrow, method);
+      run.set_factor(run.least_factor());
+      time = std::max(time, run.gradient(theta, target, 0, options.poll).core_seconds);
+    }
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      StabilityCell cell = map_cell(runs[m], target, reference, time, options);
+      cell.method = methods[m].name;
       cell.width = width;
       map.cells.push_back(std::move(cell));
     }

@@ -42,7 +42,7 @@ Failure failure(const Direction& direction, bool reference_resolved, double erro
 
 struct StabilityOptions {
   std::vector<double> widths;  ///< standard deviation of the gates over the path length
-  double core_seconds = 360;   ///< for the whole map, about; cells take at least one sample per term
+  double core_seconds = 360;   ///< for the whole map, about; but a sample per term and pixel at least
   int iterations = 50;         ///< of a reconstruction
   std::vector<double> steps;   ///< of finite differences
   Poll poll;
