@@ -9,8 +9,9 @@ namespace {
 
 constexpr std::size_t kUpperRungs = 3;
 
-/// Of a group, for the noise's own size: enough for some percent, and quick for many unknowns.
-constexpr std::size_t kMostDifferences = 32;
+/// Of a group, for the noise's own size: enough for some percent, and quick for many unknowns; fewer tell
+/// nothing.
+constexpr std::size_t kMostDifferences = 32, kFewestDifferences = 6;
 
 double square(double x) {
   return x * x;
@@ -68,11 +69,13 @@ SquaredNorm squared_norm(std::span<const WeightedRepeats> groups) {
   double noise = 0;  // trace of C
   // Differences of repeats, scaled so that the average of their squares is their group's part of C.
   std::vector<Repeats> differences;
+  std::vector<double> noises;
   for (const auto& [repeats, weight] : groups) {
     const double n = static_cast<double>(repeats->size());
     const std::vector<double> center = mean(*repeats);
     for (std::size_t i = 0; i < total.size(); ++i) total[i] += weight * center[i];
-    noise += square(weight) * total_variance(*repeats).value / n;
+    noises.push_back(square(weight) * total_variance(*repeats).value / n);
+    noise += noises.back();
     Repeats& of_group = differences.emplace_back();
     const double scale = weight / std::sqrt(2 * n);
     for (std::size_t k = 0; k + 1 < repeats->size() && of_group.size() < kMostDifferences; k += 2) {
@@ -87,6 +90,10 @@ SquaredNorm squared_norm(std::span<const WeightedRepeats> groups) {
     for (const auto& u : differences[g])
       along += square(dot(total, u)) / static_cast<double>(differences[g].size());
     for (std::size_t h = 0; h < differences.size(); ++h) {
+      if (g == h && differences[g].size() < kFewestDifferences) {
+        square_trace += square(noises[g]);  // the most that it can be
+        continue;
+      }
       double sum = 0;
       for (std::size_t k = 0; k < differences[g].size(); ++k)
         for (std::size_t l = 0; l < differences[h].size(); ++l)

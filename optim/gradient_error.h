@@ -26,8 +26,8 @@ struct SquaredNorm : Measured {
 /// |sum of weight x expectation|^2 over the groups, unbiased: the squared norm of the combined means d less
 /// what their noise adds on average, the trace of its covariance C. Hence negative at times where the truth b
 /// is near zero. Variance of a quadratic form of a normal vector: 2 tr(C^2) + 4 b'Cb, where tr(C^2) and d'Cd
-/// (on average tr(C^2) more than b'Cb) come from differences of repeats. Near a truth of zero the error is
-/// too large by up to sqrt(2).
+/// (on average tr(C^2) more than b'Cb) come from differences of repeats (a group of fewer than 12: tr(C^2) at
+/// most). Near a truth of zero the error is too large by up to sqrt(2).
 SquaredNorm squared_norm(std::span<const WeightedRepeats> groups);
 
 /// Total variance (sum over components) of one repeat, from at least 2; the standard error is 0 for 2.

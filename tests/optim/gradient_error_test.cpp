@@ -72,8 +72,8 @@ TEST(GradientError, SquaredNormIsUnbiasedAndKnowsItsError) {
     const std::vector<double> zero(c.truth.size(), 0.0);
     // What the difference of two groups aims at, with weights that leave it: 0.25 a + 0.75 b - r.
     for (int trial = 0; trial < 4000; ++trial) {
-      const Repeats a = normal_repeats(normal, 6, c.truth, c.shared, c.own);
-      const Repeats b = normal_repeats(normal, 12, c.truth, c.shared, c.own);
+      const Repeats a = normal_repeats(normal, 12, c.truth, c.shared, c.own);
+      const Repeats b = normal_repeats(normal, 24, c.truth, c.shared, c.own);
       const Repeats reference = normal_repeats(normal, 16, zero, c.shared, 0.5 * c.own);
       const WeightedRepeats groups[] = {{&a, 0.25}, {&b, 0.75}, {&reference, -1}};
       const SquaredNorm norm = squared_norm(groups);
@@ -86,7 +86,7 @@ TEST(GradientError, SquaredNormIsUnbiasedAndKnowsItsError) {
     EXPECT_LT(std::abs(value.z(truth)), 4.5) << c.name << ": " << value.mean();
     // The mean's covariance: one eigenvalue along the shared direction.
     const double n = static_cast<double>(c.truth.size());
-    const double factor = 0.25 * 0.25 / 6 + 0.75 * 0.75 / 12;
+    const double factor = 0.25 * 0.25 / 12 + 0.75 * 0.75 / 24;
     const double shared2 = c.shared * c.shared * (factor + 1.0 / 16);
     const double own2 = c.own * c.own * (factor + 0.25 / 16);
     const double squares = (n - 1) * own2 * own2 + std::pow(own2 + n * shared2, 2);
