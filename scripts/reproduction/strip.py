@@ -58,8 +58,8 @@ def draw(name, entry, folder, file):
         for column, state in enumerate(STATES[:3], 4):
             slope = slopes[state][row]
             cells[row, column].imshow(slope, cmap="RdBu_r", norm=colors.Normalize(-steepest, steepest), interpolation="nearest")
-        center = "steady" if labels.centers is None else f"path length {labels.centers[gate]:.4g}"
-        cells[row, 0].set_ylabel(center, fontsize=7)
+        center = "steady" if labels.centers is None else f"{labels.centers[gate]:.4g}"
+        cells[row, 0].set_ylabel(center, fontsize=8)
     for axes, title in zip(cells[0], [*STATES, *(f"∂/∂{entry.unknown}\n{s}" for s in STATES[:3])]):
         axes.set_title(title, fontsize=8)
     for axes in cells.flat:
