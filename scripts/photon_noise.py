@@ -64,7 +64,8 @@ def plot(file, picture):
         middle = [statistics.median(e for p, e in points if p == count) for count in counts]
         axes.loglog(*zip(*(q for q in points if q[0])), ".", color=color, alpha=0.5)
         axes.loglog(counts, middle, "-", color=color, label=f"{name}, median")
-        axes.axhline(statistics.median(e for p, e in points if not p), color=color, ls=":", lw=1, label=f"{name}, no noise")
+        if clean := [e for p, e in points if not p]:
+            axes.axhline(statistics.median(clean), color=color, ls=":", lw=1, label=f"{name}, no noise")
     axes.set_xlabel("photons per pixel and colour in the brightest gate")
     axes.set_ylabel("error at the end, % of the initial one")
     axes.grid(True, which="both", lw=0.4, alpha=0.4)
