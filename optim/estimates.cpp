@@ -133,7 +133,7 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
     if (spec.term(term) > 0) batches_for(name(term), spec.term(term));  // before anything is rendered
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
-  const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility), &basis);
+  const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility, Purpose::images), &basis);
   std::vector<DerivativeEstimate> components;
   for (Term term : kTerms) {
     const int samples = spec.term(term);

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "core/math/error.h"
-#include "core/render/measure_mix.h"
 #include "core/scene/scene_loader.h"
 #include "optim/loss.h"
 #include "optim/photon_noise.h"
@@ -63,16 +62,17 @@ Problem::Problem(Experiment experiment)
   }
 }
 
-const EstimatorOptions& Problem::estimator() const {
-  if (!estimator_) {
+const EstimatorOptions& Problem::estimator(Purpose purpose) const {
+  auto& known = estimator_[purpose == Purpose::gradients];
+  if (!known) {
     EstimatorOptions options = experiment_.estimator;
     const std::vector<double> theta = parameters_->initial();
     const Scene scene = parameters_->apply(theta);
     const TangentBasis basis = parameters_->tangent(theta);
-    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix));
-    estimator_ = options;
+    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose);
+    known = options;
   }
-  return *estimator_;
+  return *known;
 }
 
 void Problem::require_parameters() const {
@@ -138,9 +138,9 @@ double Problem::loss(const GatedImage& image, const GatedImage& target,
   return penalty_.empty() ? of_image : of_image + mean_square(target) * penalty_.value(theta);
 }
 
-EstimatorOptions Problem::estimator(int visibility_samples) const {
+EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) const {
   constexpr double kLearningShare = 0.06;
-  EstimatorOptions options = estimator();
+  EstimatorOptions options = estimator(purpose);
   if (experiment_.guiding) options.guiding_samples = kLearningShare * visibility_samples;
   return options;
 }

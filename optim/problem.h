@@ -1,5 +1,6 @@
 // An experiment made ready: scene, gates and parameters, and what the optimiser asks of them.
 #pragma once
+#include <array>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -7,7 +8,7 @@
 
 #include "core/gates/gate.h"
 #include "core/image/image.h"
-#include "core/render/renderer.h"
+#include "core/render/measure_mix.h"
 #include "core/scene/scene.h"
 #include "optim/experiment.h"
 #include "optim/loss.h"
@@ -59,7 +60,7 @@ class Problem {
 
   /// The experiment's, with the mix of techniques that automatic sampling settles on, once for all values of the
   /// parameters: by a trial at their initial values.
-  const EstimatorOptions& estimator() const;
+  const EstimatorOptions& estimator(Purpose purpose = Purpose::gradients) const;
 
   /// Takes the place of the experiment's numbers of samples; what automatic sampling has settled on stays.
   void set_samples(const SampleSpec& samples) { experiment_.samples = samples; }
@@ -83,7 +84,7 @@ class Problem {
 
   /// The experiment's options for a renderer that will take so many visibility samples per pixel: guiding learns from
   /// a small share of their number.
-  EstimatorOptions estimator(int visibility_samples) const;
+  EstimatorOptions estimator(int visibility_samples, Purpose purpose = Purpose::gradients) const;
 
   /// The experiment's loss, made absolute by the target's root mean square. Squared where the target is
   /// black.
@@ -112,7 +113,7 @@ class Problem {
   std::unique_ptr<Parameters> parameters_;
   Preconditioner preconditioner_;
   PairPenalty penalty_;
-  mutable std::optional<EstimatorOptions> estimator_;
+  mutable std::array<std::optional<EstimatorOptions>, 2> estimator_;  ///< per purpose
 };
 
 Pass pass_of(Term term);

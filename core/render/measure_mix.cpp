@@ -17,10 +17,15 @@ constexpr int kSamples[] = {16, 8,
                             4};  ///< per pixel and batch at most, of each share: for about the same work
 constexpr int kMostBatches = 12, kFewestBatches = 4;
 constexpr int kPixels = 4096;  ///< at most: where pixels are larger, connections from the camera look better
-constexpr double kPaths = 80000;  ///< of standard sampling, about
+constexpr int kBlocks = 4;     ///< across the image
+constexpr double kPaths = 300000;  ///< of standard sampling, about
 /// The combination must look this much better than either technique alone: trials are noisy, and what it can
 /// lose where it is not the best is more than what it can win.
 constexpr double kClearlyBetter = 0.75;
+/// Standard sampling, whose rare hits a trial may miss, must look this much better than ellipsoidal: per
+/// purpose. For gradients, noise counts most where narrow gates cut, and there standard sampling is worse
+/// than on average.
+constexpr double kRarelyHits[] = {0.8, 0.5};
 
 /// The camera's image in fewer pixels.
 Scene reduced(const Scene& scene) {
@@ -53,12 +58,24 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
   return one;
 }
 
-/// Sum over pixels and gates of the variance between batches of images, times the work behind them.
+/// Sums over square blocks of pixels.
+GatedImage blocks_of(const GatedImage& image, int size) {
+  GatedImage sums((image.width + size - 1) / size, (image.height + size - 1) / size, image.gates,
+                  image.channels);
+  for (int pixel = 0; pixel < image.pixels(); ++pixel) {
+    const int block = pixel / image.width / size * sums.width + pixel % image.width / size;
+    for (int g = 0; g < image.gates; ++g)
+      for (int c = 0; c < image.channels; ++c) sums.at(block, g, c) += image.at(pixel, g, c);
+  }
+  return sums;
+}
+
+/// Sum over blocks of pixels and gates of the variance between batches of images, times the work behind them.
 template <class Estimate>
-double variance_and_work(const Renderer& renderer, int batches, int samples, Estimate&& estimate) {
+double variance_and_work(const Renderer& renderer, int block, int batches, int samples, Estimate&& estimate) {
   std::vector<double> mean, squares;
   for (int b = 0; b < batches; ++b) {
-    const GatedImage image = estimate(SampleRange{b * samples, (b + 1) * samples});
+    const GatedImage image = blocks_of(estimate(SampleRange{b * samples, (b + 1) * samples}), block);
     mean.resize(image.data.size());
     squares.resize(image.data.size());
     for (std::size_t i = 0; i < image.data.size(); ++i) {
@@ -75,14 +92,15 @@ double variance_and_work(const Renderer& renderer, int batches, int samples, Est
 }  // namespace
 
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
-                        const TangentBasis* basis, const Stream& stream) {
+                        const TangentBasis* basis, const Stream& stream, Purpose purpose) {
   const double width = gates.relative_width();
   if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   const Scene small = reduced(scene);
   const double samples = kPaths / (small.camera.width * small.camera.height);
   const int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
-  const auto choose = [&](const Doubtful& widths, const TangentBasis* moving, auto&& estimate) -> double {
+  const auto choose = [&](const Doubtful& widths, int block, const TangentBasis* moving,
+                          auto&& estimate) -> double {
     if (width < widths.from) return 1;
     if (width > widths.to) return 0;
     double cost[3];
@@ -91,21 +109,22 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       trial.mix = SamplingMix{kShares[i], kShares[i]};
       const Renderer renderer(small, gates, trial, moving);
       cost[i] = variance_and_work(
-          renderer, batches,
+          renderer, block, batches,
           std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
           [&](SampleRange range) { return estimate(renderer, range); });
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
-    const int alone = cost[0] <= cost[2] ? 0 : 2;
+    const int alone = cost[0] <= kRarelyHits[purpose == Purpose::gradients] * cost[2] ? 0 : 2;
     return kShares[cost[1] < kClearlyBetter * cost[alone] ? 1 : alone];
   };
   SamplingMix best;
-  best.image =
-      choose(kImage, nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
+  best.image = choose(kImage, 1, nullptr,
+                      [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
-  best.interior = choose(kInterior, &one, [&](const Renderer& r, SampleRange range) {
+  const int block = purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
+  best.interior = choose(kInterior, block, &one, [&](const Renderer& r, SampleRange range) {
     return r.derive(Term::interior, stream, range)[0];
   });
   return best;

@@ -15,7 +15,7 @@ struct Everything {
 Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling,
                           const TangentBasis& basis, int samples = 16) {
   EstimatorOptions options{.max_bounces = 3, .sampling = sampling};
-  if (sampling == Sampling::automatic) options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 2});
+  if (sampling == Sampling::automatic) options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 2}, Purpose::gradients);
   const Renderer renderer(scene, gates, options, &basis);
   Everything all;
   const GatedImage image = renderer.render({1, 0, 0}, {0, samples});

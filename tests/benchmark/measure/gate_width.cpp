@@ -69,7 +69,7 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
       options.max_bounces = setting.max_bounces;
       options.sampling = method.sampling;
       options.antithetic = method.antithetic;
-      const SamplingMix mix = measure_mix(scene, gates, options, &basis, {2, 0, 0});
+      const SamplingMix mix = measure_mix(scene, gates, options, &basis, {2, 0, 0}, Purpose::images);
       options.mix = mix;
       const Renderer renderer(scene, gates, options, &basis);
       const auto report = [&](const char* quantity, double share, auto&& image) {
