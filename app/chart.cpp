@@ -63,8 +63,7 @@ int chart(const ChartCommand& command) {
   begin_session(command.common);
   const Problem problem(read_experiment(command.common));
   problem.require_parameters();
-  const std::string folder =
-      command.common.output.empty() ? "runs/" + problem.experiment().name + "-chart" : command.common.output;
+  const std::string folder = output_folder(command.common, problem.experiment(), "-chart");
   make_output_folder(folder);
   catch_interrupts();
   (command.solvers ? chart_solvers : chart_gradient)(command, problem, folder);

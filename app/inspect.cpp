@@ -172,8 +172,7 @@ int inspect_experiment(const InspectCommand& command) {
   problem.require_parameters();
   const std::vector<double> start =
       problem.parameters().parse_point(command.common.at.empty() ? "initial" : command.common.at);
-  const std::string folder =
-      command.common.output.empty() ? "runs/" + experiment.name + "-inspect" : command.common.output;
+  const std::string folder = output_folder(command.common, experiment, "-inspect");
   make_output_folder(folder);
   catch_interrupts();
   const Inspection inspection = inspect(problem, start, command.seconds, poll_interrupt);

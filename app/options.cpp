@@ -58,8 +58,8 @@ Experiment read_experiment(const CommonOptions& options) {
   return experiment;
 }
 
-std::string output_folder(const CommonOptions& options, const Experiment& experiment) {
-  return options.output.empty() ? "runs/" + experiment.name : options.output;
+std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix) {
+  return options.output.empty() ? "runs/" + experiment.name + suffix : options.output;
 }
 
 void add_parameter_option(CLI::App& command, std::string& name) {

@@ -38,8 +38,8 @@ void begin_session(const CommonOptions& options);
 /// Reads the experiment with the command line's changes. Throws InputError.
 Experiment read_experiment(const CommonOptions& options);
 
-/// The -o folder or runs/NAME.
-std::string output_folder(const CommonOptions& options, const Experiment& experiment);
+/// The -o folder or runs/NAME followed by `suffix`.
+std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix = "");
 
 /// --parameter, of the commands that can look at one parameter alone.
 void add_parameter_option(CLI::App& command, std::string& name);

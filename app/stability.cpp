@@ -40,8 +40,7 @@ int stability(const StabilityCommand& command) {
   const Problem problem(experiment);
   problem.require_parameters();
   const std::vector<double> theta = problem.parameters().initial();
-  const std::string folder =
-      command.common.output.empty() ? "runs/" + experiment.name + "-stability" : command.common.output;
+  const std::string folder = output_folder(command.common, experiment, "-stability");
   make_output_folder(folder);
   catch_interrupts();
   options.core_seconds = command.seconds * thread_count(command.common);

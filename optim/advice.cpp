@@ -8,6 +8,7 @@
 
 #include "core/math/error.h"
 #include "optim/heavy_tail.h"
+#include "optim/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -24,10 +25,6 @@ std::array<int, kPasses> samples_of(const Experiment& experiment, const std::arr
 }
 
 /// Median of the points' costs, pass by pass.
-double median(std::vector<double> values) {
-  std::sort(values.begin(), values.end());
-  return values[values.size() / 2];
-}
 PerPass cost_per_sample(const std::vector<GradientCost>& costs) {
   PerPass result;
   for (int i = 0; i < kPasses; ++i) {

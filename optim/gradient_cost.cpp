@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/math/cpu_time.h"
 #include "optim/estimates.h"
 #include "optim/inspection.h"
+#include "optim/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -46,13 +48,6 @@ Times time_evaluation(const Problem& problem, const std::vector<double>& theta, 
     lap(2 + t);
   }
   return times;
-}
-
-/// Of the entries.
-double mean(const std::vector<double>& row) {
-  double sum = 0;
-  for (double x : row) sum += x / static_cast<double>(row.size());
-  return sum;
 }
 
 /// Gradients of every image's residual with every batch of every term. Adds up the variance by its causes.
@@ -142,15 +137,14 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
     times.push_back(time_evaluation(problem, theta, target, kept, samples, i));
     poll();
   }
-  const auto median = [&](int what) {
+  const auto median_time = [&](int what) {
     std::vector<double> values;
     for (const Times& t : times) values.push_back(t[what]);
-    std::nth_element(values.begin(), values.begin() + kTimings / 2, values.end());
-    return values[kTimings / 2];
+    return median(values);
   };
   const double pixels = problem.scene().camera.width * problem.scene().camera.height;
-  result.overhead = median(0);
-  for (int i = 0; i < kPasses; ++i) result.seconds[i] = median(1 + i) / samples[i] / pixels;
+  result.overhead = median_time(0);
+  for (int i = 0; i < kPasses; ++i) result.seconds[i] = median_time(1 + i) / samples[i] / pixels;
 
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = problem.parameters().tangent(theta);

@@ -1,5 +1,7 @@
 #include "optim/inspection.h"
 
+#include "core/math/cpu_time.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -97,12 +99,6 @@ class ShareCollector {
 };
 
 }  // namespace
-
-double cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 std::vector<double> comparable_units(const Parameters& parameters) {
   std::vector<double> result(parameters.size(), 1.0);

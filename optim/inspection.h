@@ -57,7 +57,4 @@ std::vector<double> comparable_units(const Parameters& parameters);
 /// Random numbers of inspections, apart from those of any iteration.
 Stream inspection_stream(const Problem& problem, Pass pass, int index);
 
-/// CPU time of this process so far, all threads.
-double cpu_seconds();
-
 }  // namespace isochron

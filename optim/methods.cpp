@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/math/cpu_time.h"
 #include "optim/check.h"
 #include "optim/loss.h"
 
@@ -36,12 +37,6 @@ Experiment changed(Experiment experiment, const Method& method) {
 }
 
 }  // namespace
-
-double process_cpu_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 Method automatic_method() {
   return {"auto", set_automatic};
@@ -169,10 +164,10 @@ GatedImage MethodRun::derivative(const std::vector<double>& theta, int component
 
 MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const GatedImage& target,
                                         std::uint32_t iteration, const Poll& poll) const {
-  const double start = process_cpu_seconds();
+  const double start = cpu_seconds();
   if (kind_ == Method::Gradient::adjoint) {
     const std::vector<double> all = problem_.evaluate(theta, target, iteration, poll).gradient;
-    Estimate result{{}, process_cpu_seconds() - start};
+    Estimate result{{}, cpu_seconds() - start};
     for (int component : components_) result.gradient.push_back(all[component]);
     return result;
   }
@@ -191,7 +186,7 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
   const GatedImage adjoint = loss_adjoint(image, target, problem_.robust_loss(target));
   std::vector<double> penalty(theta.size(), 0.0);
   problem_.penalty().add_gradient(theta, mean_square(target), penalty);
-  const double before_derivatives = process_cpu_seconds();
+  const double before_derivatives = cpu_seconds();
   Estimate result;
   for (int component : components_) {
     result.gradient.push_back(inner_product(adjoint, derivative(theta, component, iteration, poll)) +
@@ -199,7 +194,7 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
     poll();
   }
   const double share = static_cast<double>(theta.size()) / static_cast<double>(components_.size());
-  result.core_seconds = before_derivatives - start + share * (process_cpu_seconds() - before_derivatives);
+  result.core_seconds = before_derivatives - start + share * (cpu_seconds() - before_derivatives);
   return result;
 }
 

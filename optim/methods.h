@@ -10,9 +10,6 @@
 
 namespace isochron {
 
-/// CPU seconds of this process so far, all threads.
-double process_cpu_seconds();
-
 struct Method {
   enum class Gradient {
     adjoint,            ///< one pass for all unknowns and gates

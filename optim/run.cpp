@@ -17,6 +17,7 @@
 #include "optim/rendered_objective.h"
 #include "optim/run_folder.h"
 #include "optim/summary.h"
+#include "optim/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -25,12 +26,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double norm(const std::vector<double>& v) {
-  double sum = 0;
-  for (double x : v) sum += x * x;
-  return std::sqrt(sum);
 }
 
 class Run {

@@ -1,5 +1,7 @@
 #include "optim/safeguard.h"
 
+#include "optim/vector_math.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -12,12 +14,6 @@ constexpr int kMostRejectedInRow = 5;
 /// Median of |difference| of two normal numbers of standard deviation 1: 0.6745 sqrt(2).
 constexpr double kMedianDifference = 0.9539;
 
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
 /// Square of the standard error of the mean.
 double squared_error(const std::vector<double>& values) {
   const double centre = mean(values), n = static_cast<double>(values.size());
@@ -27,12 +23,6 @@ double squared_error(const std::vector<double>& values) {
 }
 
 }  // namespace
-
-double median(std::vector<double> values) {
-  const std::size_t middle = values.size() / 2;
-  std::sort(values.begin(), values.end());
-  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
-}
 
 Verdict Safeguard::observe(double loss, bool finite, const std::vector<double>& theta) {
   if (state_.best_theta.empty()) state_.best_theta = theta;

@@ -61,7 +61,4 @@ class Safeguard {
   SafeguardState state_;
 };
 
-/// Middle of the values, which are not empty; the mean of the two middle ones where their number is even.
-double median(std::vector<double> values);
-
 }  // namespace isochron

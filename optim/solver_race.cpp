@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/math/cpu_time.h"
 #include "core/math/error.h"
 #include "optim/loop.h"
 #include "optim/methods.h"
 #include "optim/rendered_objective.h"
+#include "optim/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -31,12 +33,12 @@ RaceRun race(const Problem& problem, const GatedImage& target, double core_secon
   RaceRun run{name(experiment.optimizer.method), experiment.seed, {{0, 0, 1}}};
   Checkpoint state;
   state.theta = parameters.initial();
-  const double before = parameters.distance_to_target(state.theta), start = process_cpu_seconds();
+  const double before = parameters.distance_to_target(state.theta), start = cpu_seconds();
   LoopOptions options;
   options.iterations = std::numeric_limits<int>::max() - 2;
   options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
   options.save = [&] {
-    const double time = process_cpu_seconds() - start;
+    const double time = cpu_seconds() - start;
     run.points.push_back({state.iteration, time, parameters.distance_to_target(state.theta) / before});
     if (time > core_seconds) throw TimeIsUp();
   };

@@ -7,9 +7,11 @@
 #include <deque>
 #include <limits>
 
+#include "core/math/cpu_time.h"
 #include "core/math/error.h"
 #include "optim/loop.h"
 #include "optim/rendered_objective.h"
+#include "optim/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -21,12 +23,6 @@ constexpr double kMostOfBias = 0.1, kMostOfVariance = 0.5;
 /// Finite differences of more unknowns would take nearly all the time.
 constexpr int kMostDifferences = 16;
 
-double norm(const std::vector<double>& v) {
-  double sum = 0;
-  for (double x : v) sum += x * x;
-  return std::sqrt(sum);
-}
-
 /// Target images with as many samples as fit the time, but no more than the experiment's.
 GatedImage quick_target(Experiment experiment, double core_seconds, const Poll& poll) {
   automatic_method().change(experiment);
@@ -35,9 +31,9 @@ GatedImage quick_target(Experiment experiment, double core_seconds, const Poll& 
     experiment.target.samples = samples;
     const Problem problem(experiment);
     problem.estimator();
-    const double start = process_cpu_seconds();
+    const double start = cpu_seconds();
     GatedImage image = problem.make_target(poll);
-    const double time = process_cpu_seconds() - start;
+    const double time = cpu_seconds() - start;
     if (samples == most || 4 * time > core_seconds) return image;
   }
 }

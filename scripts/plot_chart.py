@@ -6,7 +6,6 @@ usage: plot_chart.py DIR
 """
 
 import csv
-import os
 import pathlib
 import sys
 
@@ -15,6 +14,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
+
+from plot import PlotError, save
 
 # Colour says what kind of method it is, marker and dashes which one.
 STYLES = {
@@ -27,10 +28,6 @@ STYLES = {
 }
 STEEP = -0.65  # slopes of fewer samples than the law of -1/2 needs
 DIFFERENCES = [("#1b7837", "v"), ("#5aae61", "^"), ("#a6dba0", ">")]
-
-
-class PlotError(Exception):
-    """Something that keeps a picture from being drawn, in one line."""
 
 
 def read_rows(path):
@@ -50,13 +47,6 @@ def number(text):
     return float(text) if text else np.nan
 
 
-def save(figure, path):
-    temporary = path.with_name(path.name + ".tmp")
-    figure.savefig(temporary, format="png", dpi=110)
-    plt.close(figure)
-    os.replace(temporary, path)
-
-
 def styles(methods):
     """Method -> colour and marker; finite differences in the order of the file."""
     differences = [m for m in methods if m.startswith("finite_difference")]
@@ -67,7 +57,6 @@ def styles(methods):
 def plain(method):
     """A method's name for people."""
     return method.replace("finite_difference_", "finite differences, step ").replace("_", " ")
-
 
 
 

@@ -15,7 +15,6 @@ struct Bounds {
       high[axis] = std::max(high[axis], p[axis]);
     }
   }
-  bool empty() const { return !(low.x <= high.x); }
   Bounds grown(double margin) const {
     const Vec3 m{margin, margin, margin};
     return {low - m, high + m};

@@ -3,9 +3,6 @@
 namespace isochron {
 namespace {
 
-/// Faces whose normals differ by less than this angle are one plane: a mesh read in single precision cannot tell.
-constexpr double kCoplanarAngle = 1e-6;
-
 /// Unit direction in the plane of face t, perpendicular to the edge, towards the face's third vertex.
 Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const Vec3& tangent) {
   for (int v : scene.scene.triangles[t].vertex) {

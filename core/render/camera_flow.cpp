@@ -7,10 +7,6 @@
 namespace isochron {
 namespace {
 
-/// Dihedral angles that differ from flat by less, as a sine, count as flat: meshes are read in single
-/// precision.
-constexpr double kFlat = 1e-6;
-
 Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
   Bounds bounds;
   for (const int v : triangle.vertex) bounds.add(scene.positions[v]);
@@ -54,7 +50,7 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
     const Vec3 n = normal(edge.face[0]);
     for (const int v : scene.triangles[edge.face[1]].vertex) {
       const Vec3 d = scene.positions[v] - scene.positions[edge.vertex[0]];
-      const double height = dot(n, d), scale = kFlat * length(n) * length(d);
+      const double height = dot(n, d), scale = kCoplanarAngle * length(n) * length(d);
       if (height > scale) return false;
       flat &= height >= -scale;
     }

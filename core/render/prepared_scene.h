@@ -64,7 +64,7 @@ struct MovingParts {
 class PreparedScene {
  public:
   /// `follow_radius`: see CameraFlow.
-  explicit PreparedScene(const Scene& scene, const TangentBasis* basis, double follow_radius = 0);
+  PreparedScene(const Scene& scene, const TangentBasis* basis, double follow_radius = 0);
 
   const Scene& scene;
   CameraModel camera;

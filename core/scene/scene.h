@@ -22,6 +22,9 @@ struct Triangle {
   int shape;
 };
 
+/// Faces whose normals differ by less than this angle are one plane: a mesh read in single precision cannot tell.
+inline constexpr double kCoplanarAngle = 1e-6;
+
 /// Mesh edge between welded vertices. `face[1]` is -1 on an open border.
 struct Edge {
   std::array<int, 2> vertex;

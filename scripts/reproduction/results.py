@@ -1,6 +1,7 @@
 """experiments/RESULTS.md: a table of the measured runs beside the paper's Table 2, and the pictures."""
 
 import os
+import statistics
 
 from .catalogue import PAPER_CORES, RECONSTRUCTIONS
 from .measure import load
@@ -27,14 +28,8 @@ rendered anew with more pixels and samples than the optimisation takes.
 """
 
 
-def _median(values):
-    values = sorted(values)
-    middle = len(values) // 2
-    return values[middle] if len(values) % 2 else 0.5 * (values[middle - 1] + values[middle])
-
-
 def _row(name, entry, runs):
-    middle = lambda field: _median([getattr(r, field) for r in runs])
+    middle = lambda field: statistics.median([getattr(r, field) for r in runs])
     cores, paper = middle("iteration_cpu_seconds"), entry.paper_core_seconds
     ends = {r: "" if r.status == "iterations_reached" else f" ({r.status})" for r in runs}
     errors = ", ".join(f"{r.error_percent:.2g}{end}" for r, end in ends.items())

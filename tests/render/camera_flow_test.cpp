@@ -136,6 +136,27 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
   EXPECT_GT(following, 20) << "paths close enough to test anything";
 }
 
+/// Two estimates of the same values, more than `least` of which are not zero: mean of their squared z-scores
+/// below `most`, root mean square error below `error` times that of the second one's values.
+void expect_same(const std::vector<Batches>& one, const std::vector<Batches>& other, int least, double most,
+                 double error) {
+  double sum = 0, difference = 0, scale = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    const Estimate a = one[i].estimate(), b = other[i].estimate();
+    if (a.standard_error == 0 && b.standard_error == 0) continue;
+    sum += std::pow(z_score(a, b), 2);
+    difference += std::pow(std::hypot(a.standard_error, b.standard_error), 2);
+    scale += b.mean * b.mean;
+    ++count;
+  }
+  ASSERT_GT(count, least);
+  EXPECT_LT(sum / count, most) << count << " values";
+  EXPECT_LT(std::sqrt(difference / scale), error);
+  ::testing::Test::RecordProperty("mean_square_z", std::to_string(sum / count));
+  ::testing::Test::RecordProperty("error_over_scale", std::to_string(std::sqrt(difference / scale)));
+}
+
 struct Case {
   const char* name;
   bool glass;
@@ -193,21 +214,7 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
     return pixels;
   };
   const auto one = estimate(c.radius), other = estimate(c.reference_radius);
-  double sum = 0, difference = 0, scale = 0;
-  int count = 0;
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    const Estimate a = one[i].estimate(), b = other[i].estimate();
-    if (a.standard_error == 0 && b.standard_error == 0) continue;
-    sum += std::pow(z_score(a, b), 2);
-    difference += std::pow(std::hypot(a.standard_error, b.standard_error), 2);
-    scale += b.mean * b.mean;
-    ++count;
-  }
-  ASSERT_GT(count, 100);
-  EXPECT_LT(sum / count, 1.7) << count << " values";
-  RecordProperty("mean_square_z", std::to_string(sum / count));
-  RecordProperty("error_over_scale", std::to_string(std::sqrt(difference / scale)));
-  EXPECT_LT(std::sqrt(difference / scale), c.glass ? 0.8 : 0.3);
+  expect_same(one, other, 100, 1.7, c.glass ? 0.8 : 0.3);
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, CameraFlowOfEveryPixel,
@@ -234,14 +241,20 @@ Scene moving_corner() {
   return scene;
 }
 
+/// The same with a board that hides parts of the corner from the camera and from each other.
+Scene corner_with_board() {
+  Scene scene = moving_corner();
+  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}),
+            diffuse(Rgb(0.1), true));
+  return scene;
+}
+
 /// Against finite differences in every pixel: a static board in the corner hides parts of it from the camera
 /// and from each other. Most follows, so that what the camera sees beside the board's edges flows across
 /// them. Mean of squared z-scores over 64 pixels: 1.07 expected, standard deviation 0.19; limit 1.9,
 /// false-alarm rate below 1e-4.
 TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
-  Scene scene = moving_corner();
-  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}),
-            diffuse(Rgb(0.1), true));
+  const Scene scene = corner_with_board();
   const Motion motion = translate(scene, "corner", {0.5, 1, 1});
   const TangentBasis basis = make_basis(scene, {motion});
   const GateSet gates(GateShape::steady(), {0.0});
@@ -267,20 +280,7 @@ TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
       reference[i].add((plus.data[i] - minus.data[i]) / (2 * kStep));
     }
   }
-  double sum = 0, difference = 0, scale = 0;
-  int count = 0;
-  for (int i = 0; i < 64; ++i) {
-    const Estimate a = ours[i].estimate(), b = reference[i].estimate();
-    if (a.standard_error == 0 && b.standard_error == 0) continue;
-    sum += std::pow(z_score(a, b), 2);
-    difference += std::pow(std::hypot(a.standard_error, b.standard_error), 2);
-    scale += b.mean * b.mean;
-    ++count;
-  }
-  EXPECT_LT(sum / count, 1.9);
-  EXPECT_LT(std::sqrt(difference / scale), 0.04);
-  RecordProperty("mean_square_z", std::to_string(sum / count));
-  RecordProperty("error_over_scale", std::to_string(std::sqrt(difference / scale)));
+  expect_same(ours, reference, 32, 1.9, 0.04);
 }
 
 /// Takes the velocities of boundary segments, everything being moved along (0.3, 1, 0.5).
@@ -301,9 +301,7 @@ struct VelocitySink {
 
 /// Where all move alike and x1 follows entirely, no edge moves relative to the light that grazes it.
 TEST(CameraFlow, ShadowsMoveWithEverything) {
-  Scene scene = moving_corner();
-  add_shape(scene, "board", quad({-0.3, 0.1, -0.6}, {0.3, 0.1, -0.3}, {0.3, 0.5, -0.3}, {-0.3, 0.5, -0.6}),
-            diffuse(Rgb(0.1), true));
+  const Scene scene = corner_with_board();
   std::vector<Motion> all;
   for (const char* shape : {"corner", "board", "lamp"}) all.push_back(translate(scene, shape, {0.3, 1, 0.5}));
   const TangentBasis basis = make_basis(scene, all);

@@ -2,27 +2,21 @@
 // more for 64 gates than for one. Processor time of one thread, in interleaved pairs; the median ratio
 // counts, and a noisy machine gets three tries.
 #include <gtest/gtest.h>
-#include <time.h>
 
 #include <numeric>
 
+#include "core/math/cpu_time.h"
 #include "scene_building.h"
 #include "support.h"
 
 namespace isochron::testing {
 namespace {
 
-double processor_seconds() {
-  timespec now;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 template <class F>
 double seconds(F&& f) {
-  const double start = processor_seconds();
+  const double start = cpu_seconds();
   f();
-  return processor_seconds() - start;
+  return cpu_seconds() - start;
 }
 
 /// Median over pairs of time(a) / time(b).

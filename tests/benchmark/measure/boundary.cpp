@@ -6,23 +6,16 @@
 //   sensor   a field of view of 0.004 degrees that looks at one point of a floor past an occluder
 //   ball     a ball of 320 faces, of whose edges few are silhouettes at a time; under both gates
 // The variance is that of the image derivative's mean over pixels, and the mean over pixels of each pixel's variance.
-#include <time.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <map>
 
+#include "core/math/cpu_time.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 
 namespace isochron::benchmarks {
 namespace {
-
-double cpu_seconds() {
-  timespec t;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
 
 struct Setting {
   const char* name;

@@ -14,8 +14,8 @@
 #include <cstdlib>
 #include <string>
 
+#include "core/math/cpu_time.h"
 #include "optim/problem.h"
-#include "tests/benchmark/measure/cpu_time.h"
 #include "tests/render/pixel_statistics.h"
 #include "tests/render/support.h"
 

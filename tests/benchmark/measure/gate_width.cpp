@@ -9,8 +9,8 @@
 #include <cstdio>
 #include <cstdlib>
 
+#include "core/math/cpu_time.h"
 #include "core/render/measure_mix.h"
-#include "tests/benchmark/measure/cpu_time.h"
 #include "tests/render/support.h"
 #include "tests/render/width_growth.h"
 

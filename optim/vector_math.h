@@ -1,0 +1,29 @@
+// Small sums over vectors of numbers.
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace isochron {
+
+inline double mean(const std::vector<double>& values) {
+  double sum = 0;
+  for (double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// Middle of the values, which are not empty; the mean of the two middle ones where their number is even.
+inline double median(std::vector<double> values) {
+  const std::size_t middle = values.size() / 2;
+  std::sort(values.begin(), values.end());
+  return values.size() % 2 == 1 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+/// Euclidean.
+inline double norm(const std::vector<double>& v) {
+  double sum = 0;
+  for (double x : v) sum += x * x;
+  return std::sqrt(sum);
+}
+
+}  // namespace isochron
