@@ -61,7 +61,7 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
 
 int chart(const ChartCommand& command) {
   begin_session(command.common);
-  const Problem problem(read_experiment(command.common));
+  const Problem problem(read_experiment(command.common), warn);
   problem.require_parameters();
   const std::string folder = output_folder(command.common, problem.experiment(), "-chart");
   make_output_folder(folder);

@@ -53,7 +53,7 @@ void print_table(const std::vector<Comparison>& table, double limit) {
 int check(const CheckCommand& command) {
   begin_session(command.common);
   std::vector<std::string> notes;
-  const Problem problem(check_experiment(read_experiment(command.common), notes));
+  const Problem problem(check_experiment(read_experiment(command.common), notes), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta =

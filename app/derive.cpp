@@ -24,7 +24,7 @@ constexpr double kMostBytes = 1e9;
 
 int derive(const DeriveCommand& command) {
   begin_session(command.common);
-  const Problem problem(read_experiment(command.common));
+  const Problem problem(read_experiment(command.common), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta =

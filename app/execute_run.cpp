@@ -19,7 +19,7 @@ int execute_run(const std::string& folder, const CommonOptions& common, bool for
   options.progress = [&](const Progress& progress) { line.show(progress); };
   options.warning = [&](const std::string& text) {
     line.end();
-    spdlog::warn("{}", text);
+    warn(text);
   };
   const RunStatus status = start(options);
   line.end();

@@ -14,7 +14,7 @@ namespace {
 
 int gradient(const CommonOptions& options) {
   begin_session(options);
-  const Problem problem(read_experiment(options));
+  const Problem problem(read_experiment(options), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(options.at.empty() ? "initial" : options.at);

@@ -167,7 +167,7 @@ int inspect_experiment(const InspectCommand& command) {
   begin_session(command.common);
   if (command.apply && (!command.common.set.empty() || command.common.samples))
     throw InputError("--apply: not with --set or --samples, which change what is inspected (allowed: alone)");
-  const Problem problem(read_experiment(command.common));
+  const Problem problem(read_experiment(command.common), warn);
   const Experiment& experiment = problem.experiment();
   problem.require_parameters();
   const std::vector<double> start =

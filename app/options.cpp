@@ -51,6 +51,10 @@ void begin_session(const CommonOptions& options) {
   set_thread_count(options.threads);
 }
 
+void warn(const std::string& text) {
+  spdlog::warn("{}", text);
+}
+
 Experiment read_experiment(const CommonOptions& options) {
   Experiment experiment = load_experiment(options.file, options.set);
   if (options.samples) experiment.samples.set_all(*options.samples);

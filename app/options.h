@@ -35,6 +35,9 @@ void add_experiment_options(CLI::App& command, CommonOptions& options);
 /// Applies threads and verbosity. To be called first by every action.
 void begin_session(const CommonOptions& options);
 
+/// Shows a warning of one line.
+void warn(const std::string& text);
+
 /// Reads the experiment with the command line's changes. Throws InputError.
 Experiment read_experiment(const CommonOptions& options);
 

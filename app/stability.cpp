@@ -37,7 +37,7 @@ int stability(const StabilityCommand& command) {
   options.widths = command.widths.empty() ? half_decades() : command.widths;
   std::sort(options.widths.begin(), options.widths.end(), std::greater<>());
   with_relative_width(experiment.gates, options.widths.front());  // steady gates fail here
-  const Problem problem(experiment);
+  const Problem problem(experiment, warn);
   problem.require_parameters();
   const std::vector<double> theta = problem.parameters().initial();
   const std::string folder = output_folder(command.common, experiment, "-stability");

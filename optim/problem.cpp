@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/math/error.h"
+#include "core/scene/coincidence.h"
 #include "core/scene/scene_loader.h"
 #include "optim/loss.h"
 #include "optim/photon_noise.h"
@@ -48,7 +49,7 @@ GatedImage ImageMean::mean() const {
   return mean;
 }
 
-Problem::Problem(Experiment experiment)
+Problem::Problem(Experiment experiment, const std::function<void(const std::string&)>& warning)
     : experiment_(std::move(experiment)),
       scene_(load_scene_at(experiment_)),
       gates_(make_gates(experiment_.gates)),
@@ -60,6 +61,11 @@ Problem::Problem(Experiment experiment)
       preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
     if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
   }
+  if (!warning) return;
+  std::string coincidences = coincidence_warning(parameters_->apply(parameters_->initial()));
+  if (coincidences.empty() && parameters_->target_known())
+    coincidences = coincidence_warning(parameters_->apply(parameters_->target()));
+  if (!coincidences.empty()) warning(experiment_.scene + ": " + coincidences);
 }
 
 const EstimatorOptions& Problem::estimator(Purpose purpose) const {

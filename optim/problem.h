@@ -4,6 +4,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/gates/gate.h"
@@ -47,8 +48,9 @@ struct Interrupted {};
 
 class Problem {
  public:
-  /// Loads the scene and binds the parameters. Throws InputError.
-  explicit Problem(Experiment experiment);
+  /// Loads the scene and binds the parameters. Throws InputError. `warning` receives one line where shapes
+  /// lie on each other at the initial or the target values.
+  explicit Problem(Experiment experiment, const std::function<void(const std::string&)>& warning = {});
 
   const Experiment& experiment() const { return experiment_; }
   const Scene& scene() const { return scene_; }

@@ -126,7 +126,7 @@ class Run {
 }  // namespace
 
 RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
-  const Problem problem(experiment);
+  const Problem problem(experiment, options.warning);
   problem.require_parameters();
   require_jacobian_fits(problem);
   prepare_run_folder(options.folder, options.force, options.warning);
@@ -138,7 +138,7 @@ RunStatus resume_run(const RunOptions& options) {
   const std::string file = options.folder + "/experiment.yaml";
   if (!std::filesystem::exists(file))
     throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
-  const Problem problem(load_experiment(file));
+  const Problem problem(load_experiment(file), options.warning);
   problem.require_parameters();
   require_jacobian_fits(problem);
   make_output_folder(options.folder);

@@ -299,6 +299,25 @@ TEST_F(Program, GatesThatNoPathReaches) {
   }
 }
 
+TEST_F(Program, ShapesOnTheSameSurfaceAreNamedOnce) {
+  const std::string file = folder_.file("tiny.yaml"), scene = folder_.read("scene.yaml");
+  const std::string ghost = "  - {name: ghost, file: block.obj, material: white}\n";
+  folder_.write("scene.yaml", scene + ghost);
+  const std::string warning = "'block' and 'ghost' (2 triangles)";
+  const auto warnings = [&](const Result& result) {
+    EXPECT_EQ(result.status, 0);
+    int count = 0;
+    for (std::size_t at = result.errors.find(warning); at != std::string::npos;
+         at = result.errors.find(warning, at + 1))
+      ++count;
+    return count;
+  };
+  // The block starts 0.2 above and is to come down on it.
+  EXPECT_EQ(warnings(run({"render", file, "-o", folder_.file("look"), "--no-plots", "--quiet"})), 1);
+  EXPECT_EQ(warnings(run(run_command("run"))), 1);
+  EXPECT_EQ(warnings(run(run_command("away", {"--set", "parameters[0].target=0.1"}))), 0);
+}
+
 TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
   const Result lit = run(run_command("a"));
   ASSERT_EQ(lit.status, 0);
