@@ -1,5 +1,6 @@
 // Axis-aligned bounding boxes.
 #pragma once
+#include <algorithm>
 #include <limits>
 
 #include "core/math/vec.h"
@@ -14,6 +15,12 @@ struct Bounds {
       low[axis] = std::min(low[axis], p[axis]);
       high[axis] = std::max(high[axis], p[axis]);
     }
+  }
+  void add(const Bounds& b) { add(b.low), add(b.high); }
+  Vec3 center() const { return low * 0.5 + high * 0.5; }
+  double half_area() const {
+    const Vec3 d = high - low;
+    return d.x * d.y + d.y * d.z + d.z * d.x;
   }
   Bounds grown(double margin) const {
     const Vec3 m{margin, margin, margin};

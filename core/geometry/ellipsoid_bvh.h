@@ -33,6 +33,19 @@ class EllipsoidBvh {
   /// strictly between them, of which a fine mesh has many. The others come in the order of `query`.
   int query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
 
+  /// A focus and the cone that paths leave it by.
+  struct Focus {
+    Vec3 p;
+    Vec3 axis;            ///< unit; zero (with a right angle): all directions
+    double cosine, sine;  ///< of the angle between the axis and the cone's border, at most a right angle
+    bool lambertian;      ///< paths count by their cosine with the axis
+  };
+  /// A random choice of the triangles of `query_surfaces` between the foci's cones, where a fine mesh has many: as many
+  /// as make up a few leaves, at a cost that grows with the hierarchy's depth alone. Appends to `ids` and, of the same
+  /// length, one over each triangle's probability, which favours what is near the foci. `u`: uniform in (0, 1).
+  void sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u,
+                       std::vector<int>& ids, std::vector<double>& inverse_probability) const;
+
  private:
   struct Shell;
   std::optional<Shell> make_shell(const Vec3& a, const Vec3& b, double tau_low, double tau_high) const;

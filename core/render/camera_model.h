@@ -16,6 +16,7 @@ class CameraModel {
     right_ = normalize(cross(forward, camera.up));
     up_ = cross(right_, forward);
     pixel_size_ = 2 * std::tan(0.5 * camera.fov * kPi / 180) / camera.width;
+    cos_corner = dot(direction(0, 0), forward);
   }
 
   int pixels() const { return width * height; }
@@ -54,6 +55,7 @@ class CameraModel {
 
   Vec3 position, forward;
   int width, height;
+  double cos_corner;  ///< between `forward` and the image's corners
 
  private:
   Vec3 right_, up_;

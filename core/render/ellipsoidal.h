@@ -167,7 +167,7 @@ class EllipsoidalConnections {
   void connect_surface(const Target& target, int pixel, const Rgb& throughput, Rng& rng) {
     const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
     const double along = rng.uniform();
-    double pick = rng.uniform();
+    const double pick = rng.uniform(), thinning = rng.uniform();
     double pdf_y;
     const SurfacePoint y = scene_.sample_emitter(u0, u1, u2, pdf_y);
     const Path& path = worker_.path;
@@ -178,9 +178,7 @@ class EllipsoidalConnections {
 
     const Ellipsoid ellipsoids[2] = {{x.p, y.p, target.tau[0] - before}, {x.p, y.p, target.tau[1] - before}};
     const EllipsoidBvh& bvh = ends_are_static(y.triangle) ? scene_.moving_triangles : scene_.all_triangles;
-    worker_.candidates.clear();
-    bvh.query_surfaces(x.p, y.p, low, high, worker_.candidates);
-    worker_.arcs += 1 + worker_.candidates.size();
+    find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
 
     const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
     ArcPair chosen;
@@ -206,17 +204,41 @@ class EllipsoidalConnections {
     }
   }
 
+  /// Candidates for arcs between the path's last vertex and another focus: all triangles that may hold one, or some of
+  /// the many of a fine mesh.
+  void find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low, double high,
+                       double thinning) {
+    worker_.candidates.clear();
+    worker_.inverse_probability.clear();
+    if (worker_.options.pick == ArcPick::uniform)
+      bvh.query_surfaces(worker_.path.back().p, other.p, low, high, worker_.candidates);
+    else
+      bvh.sample_surfaces(focus(), other, low, high, thinning, worker_.candidates, worker_.inverse_probability);
+    worker_.arcs += 1 + worker_.candidates.size();
+  }
+  /// The path's last vertex with the half space that it scatters into; the camera with its field of view.
+  EllipsoidBvh::Focus focus() const {
+    const Path& path = worker_.path;
+    const SurfacePoint& x = path.back();
+    if (path.size() == 1) {
+      const double cosine = scene_.camera.cos_corner;
+      return {x.p, scene_.camera.forward, cosine, std::sqrt(1 - cosine * cosine), false};
+    }
+    const Vec3& before = path.vertex[path.size() - 2].p;
+    const bool back = scene_.material_of(x.triangle).two_sided && dot(x.n, before - x.p) < 0;
+    return {x.p, back ? -x.n : x.n, 0, 1, true};
+  }
+
   void connect_emitter(const Target& target, int pixel, const Rgb& throughput, Rng& rng) {
     const double along = rng.uniform();
-    const double pick = rng.uniform();
+    const double pick = rng.uniform(), thinning = rng.uniform();
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
     const double before = path.length.back();
     const double high = 2 * (target.longest() - before), low = 2 * (target.shortest() - before);
     if (!(high > 0)) return;
-    worker_.candidates.clear();
-    scene_.emitter_triangles.query(x.p, x.p, low, high, worker_.candidates);
-    worker_.arcs += 1 + worker_.candidates.size();
+    const EllipsoidBvh::Focus anywhere{x.p, {0, 0, 0}, 0, 1, false};
+    find_candidates(scene_.emitter_triangles, anywhere, low, high, thinning);
 
     const Ellipsoid spheres[2] = {{x.p, x.p, 2 * (target.tau[0] - before)}, {x.p, x.p, 2 * (target.tau[1] - before)}};
     ArcPair chosen;
@@ -238,8 +260,8 @@ class EllipsoidalConnections {
   }
 
   /// Picks one of the candidates' arcs, which sample(triangle, arcs) fills in: uniformly, or in proportion to the
-  /// unshadowed contribution (a weighted reservoir that re-uses one number). Returns one over the probability, 0 where
-  /// nothing is carried.
+  /// unshadowed contribution (a weighted reservoir that re-uses one number). Returns one over the probability (times
+  /// what the candidates themselves were chosen with), 0 where nothing is carried.
   template <class F>
   double choose(double pick, ArcPair& chosen, F&& sample) const {
     const std::vector<int>& candidates = worker_.candidates;
@@ -249,23 +271,23 @@ class EllipsoidalConnections {
       sample(candidates[std::min(static_cast<int>(pick * count), count - 1)], chosen);
       return chosen.weight() > 0 ? count : 0;
     }
-    double total = 0, chosen_weight = 0;
-    for (const int t : candidates) {
+    double total = 0;
+    const std::vector<double>& inverse_probability = worker_.inverse_probability;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
       ArcPair arcs;
-      sample(t, arcs);
-      const double weight = arcs.weight();
+      sample(candidates[i], arcs);
+      const double weight = arcs.weight() * (inverse_probability.empty() ? 1 : inverse_probability[i]);
       if (!(weight > 0)) continue;
       total += weight;
       const double share = weight / total;
       if (pick < share) {
         chosen = arcs;
-        chosen_weight = weight;
         pick /= share;
       } else {
         pick = (pick - share) / (1 - share);
       }
     }
-    return total > 0 ? total / chosen_weight : 0;
+    return total > 0 ? total / chosen.weight() : 0;
   }
 
   /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.

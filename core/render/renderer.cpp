@@ -22,7 +22,7 @@ int thread_count = 0;
 /// do not depend on which thread takes which strand. Their number depends on the accumulators' size alone.
 constexpr int kMostStrands = 32, kFewestStrands = 8;
 constexpr int kSharedStrands = 256;  // where strands need no accumulators of their own
-constexpr std::size_t kStrandBudget = std::size_t{512} << 20;  // bytes, all strands together
+constexpr std::size_t kStrandBudget = std::size_t{64} << 20;  // bytes, all strands together
 constexpr int kPixelsPerBlock = 8;
 
 /// The pass that guiding learns from: its own random numbers; with fewer samples it would teach noise.

@@ -20,7 +20,8 @@ struct Worker {
   Sink sink;
   Path path;
   LocalDifferential differential;
-  std::vector<int> candidates;
+  std::vector<int> candidates;              ///< triangles that may hold an arc
+  std::vector<double> inverse_probability;  ///< of each candidate, where they are a choice; else empty
   long long rays = 0;
   long long arcs = 0;  ///< triangles looked at for arcs, and the queries that found them
 
