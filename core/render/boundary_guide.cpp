@@ -13,6 +13,9 @@ constexpr double kDefensiveShare = 0.25;
 constexpr int kMostBins = 512;
 /// A histogram has a bin for as many records as this, and fewer than these teach a tile nothing of its own.
 constexpr int kRecordsPerBin = 4, kFewRecords = 32;
+/// How often a technique is used follows from the sum of its squares, which is known as well as if so many records of
+/// equal squares made it up. With as few as these, half of it (of its logarithm) is believed.
+constexpr double kFewEqual = 8;
 /// How much more or less often than once per sample a technique may be used.
 constexpr double kMostRate = 8, kLeastRate = 1.0 / 8;
 
@@ -86,15 +89,20 @@ BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records,
   // For a given total cost, the variance is least where each technique is used in proportion to the root of its
   // second moment over its cost.
   double total_cost = 0, wanted_cost = 0;
+  std::array<double, kTechniques> trust;
+  trust.fill(1);
   for (int t = 0; t < kTechniques; ++t) {
-    double square = 0;
-    for (const GuideRecord& r : of_technique[t]) square += r.square;
+    double square = 0, fourth = 0;
+    for (const GuideRecord& r : of_technique[t]) square += r.square, fourth += r.square * r.square;
+    if (fourth > 0) trust[t] = square * square / (square * square + kFewEqual * fourth);
     rate_[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
     total_cost += cost[t];
     wanted_cost += rate_[t] * cost[t];
   }
-  for (int t = 0; t < kTechniques; ++t)
-    rate_[t] = wanted_cost > 0 ? std::clamp(rate_[t] * total_cost / wanted_cost, kLeastRate, kMostRate) : 1;
+  for (int t = 0; t < kTechniques; ++t) {
+    const double wanted = wanted_cost > 0 ? std::clamp(rate_[t] * total_cost / wanted_cost, kLeastRate, kMostRate) : 1;
+    rate_[t] = std::pow(wanted, trust[t]);
+  }
 }
 
 }  // namespace isochron

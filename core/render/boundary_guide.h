@@ -49,7 +49,7 @@ class BoundaryGuide {
   static constexpr int kTechniques = 4;
 
   /// Unguided: every technique once per sample.
-  BoundaryGuide() : warps_(kTables) {}
+  BoundaryGuide() : warps_(kTables) { rate_.fill(1); }
   /// From the records of unguided samples and the cost of each technique over all of them, in any unit.
   BoundaryGuide(const std::vector<GuideRecord>& records, const std::array<double, kTechniques>& cost);
 
@@ -69,7 +69,7 @@ class BoundaryGuide {
   static constexpr int kTiles = 4;  ///< across the image, either way
   static constexpr int kTables = kTechniques + kTiles * kTiles;
   std::vector<Warp> warps_;
-  double rate_[kTechniques] = {1, 1, 1};
+  std::array<double, kTechniques> rate_;
 };
 
 /// Sink of the learning pass.
