@@ -19,9 +19,9 @@ constexpr int kMostBatches = 12, kFewestBatches = 4;
 constexpr int kPixels = 4096;  ///< at most: where pixels are larger, connections from the camera look better
 constexpr int kBlocks = 4;     ///< across the image
 constexpr double kPaths = 300000;  ///< of standard sampling, about
-/// The combination must look this much better than either technique alone: trials are noisy, and what it can
-/// lose where it is not the best is more than what it can win.
-constexpr double kClearlyBetter = 0.75;
+/// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
+/// can lose where it is not the best is more than what it can win.
+constexpr double kClearlyBetter[] = {0.75, 0.5};
 /// Standard sampling, whose rare hits a trial may miss, must look this much better than ellipsoidal: per
 /// purpose. For gradients, noise counts most where narrow gates cut, and there standard sampling is worse
 /// than on average.
@@ -115,8 +115,9 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
-    const int alone = cost[0] <= kRarelyHits[purpose == Purpose::gradients] * cost[2] ? 0 : 2;
-    return kShares[cost[1] < kClearlyBetter * cost[alone] ? 1 : alone];
+    const bool gradients = purpose == Purpose::gradients;
+    const int alone = cost[0] <= kRarelyHits[gradients] * cost[2] ? 0 : 2;
+    return kShares[cost[1] < kClearlyBetter[gradients] * cost[alone] ? 1 : alone];
   };
   SamplingMix best;
   best.image = choose(kImage, 1, nullptr,
