@@ -35,17 +35,19 @@ class EllipsoidalConnections {
   EllipsoidalConnections(Worker<Sink>& worker, const GatePass& pass, Receiver receiver = {})
       : worker_(worker), scene_(worker.scene), pass_(pass), receiver_(receiver) {}
 
-  /// One camera path through `pixel` with connections at every vertex. Contributions to the pixel itself are scaled by
-  /// `scale`; those of the camera's own connections, which land on any pixel, by `scale` / number of pixels.
-  void sample(int pixel, double scale, Rng& rng) {
-    const Rgb splat_scale(scale / scene_.camera.pixels());
-    const int max_bounces = worker_.options.max_bounces;
+  /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`.
+  void sample_from_camera(double scale, Rng& rng) {
     worker_.start_path_at_camera();
     draw_targets(GatePick::kImage, rng);
     for (const Target& target : targets_) {
-      connect_emitter(target, pixel, splat_scale, rng);
-      if (max_bounces >= 1) connect_surface(target, pixel, splat_scale, rng);
+      connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
+      if (worker_.options.max_bounces >= 1) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
     }
+  }
+
+  /// One camera path through `pixel` with connections at its other vertices; contributions are scaled by `scale`.
+  void sample_walk(int pixel, double scale, Rng& rng) {
+    const int max_bounces = worker_.options.max_bounces;
     draw_targets(pixel, rng);
     if (targets_.empty() || max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
     connect_along(pixel, scale, max_bounces, rng);
@@ -363,13 +365,14 @@ class EllipsoidalConnections {
     const bool jump = target.jump[i];
     const Path& path = worker_.path;
     const GatePick& pick = worker_.pick;
-    // Only where the camera's own connections, which serve the whole image, compete with another's do densities of the
-    // length differ between the two techniques.
-    const bool same_length_pdf = kGathers || pick.uniform() || path.size() != 4;
+    // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
+    // densities of the length differ between the two techniques.
+    const bool same_length_pdf = kGathers || pick.uniform() || path.size() != 3;
     const ArcDensities d = worker_.techniques.arcs(path, kGathers, [&](int from) {
       if (same_length_pdf) return 1.0;
       const int served = from == 0 ? GatePick::kImage : pixel;
-      return jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]);
+      return (from == 0 ? 1 : pick.rate(pixel)) *
+             (jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]));
     });
     const double sum = d.surface + d.emitter;
     if (!(sum > 0)) return 0;

@@ -1,6 +1,7 @@
-// Which gate a connection's length is drawn for. Images: every gate alike. Gradients of a loss: in proportion
-// to what the gate's image counts in it, |dLoss/dImage|, of the pixel that the connection serves, or of the
-// whole image for connections of the camera itself, which may land on any pixel.
+// Which gate a connection's length is drawn for, and how many samples a pixel gets. Images: every gate and every pixel
+// alike. Gradients of a loss: gates in proportion to what their image counts in it, |dLoss/dImage|, of the pixel that
+// the connection serves, or of the whole image for connections of the camera itself, which may land on any pixel;
+// pixels in proportion to what their gates count for together.
 #pragma once
 #include <optional>
 #include <vector>
@@ -31,6 +32,8 @@ class GatePick {
     }
     return sample_row(pixel, u);
   }
+  /// Samples of the pixel over their mean number. 0 for pixels that do not count.
+  double rate(int pixel) const { return rate_.empty() ? 1 : rate_[pixel]; }
   double probability(int pixel, int gate) const {
     return below_.empty() ? 1.0 / gates_.size() : below_[row(pixel) + gate + 1] - below_[row(pixel) + gate];
   }
@@ -55,6 +58,7 @@ class GatePick {
   const GateSet& gates_;
   std::vector<double>
       below_;  ///< cumulative probabilities from 0; the image's row first, then one per pixel; empty: uniform
+  std::vector<double> rate_;  ///< empty: uniform
 };
 
 }  // namespace isochron

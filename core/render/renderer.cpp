@@ -130,19 +130,27 @@ struct Renderer::Impl {
     arcs += worker.arcs;
   }
 
+  /// Number of samples where they are to be `rate` on average.
+  static int sample_count(double rate, Rng& rng) { return rate == 1 ? 1 : static_cast<int>(rate + rng.uniform()); }
+
   /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling.
   template <class Sink>
   void run_paths(Worker<Sink>& worker, double share, const GatePass& pass, int strand, int strands,
                  const Stream& stream, SampleRange range) const {
-    const double scale = 1.0 / range.count();
+    const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
     worker.ellipsoidal_share = share;
     worker.pair_gain = pair_gain;
     EllipsoidalConnections connections(worker, pass);
+    const auto by_connections = [share](Rng& rng) { return share == 1 || (share > 0 && rng.uniform() < share); };
     for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
-      if (share == 1 || (share > 0 && rng.uniform() < share))
-        connections.sample(pixel, scale, rng);
-      else
-        sample_standard(worker, pixel, scale, pass.pairs, rng);
+      if (by_connections(rng)) connections.sample_from_camera(splat_scale, rng);
+      const double rate = worker.pick.rate(pixel);
+      for (int i = sample_count(rate, rng); i > 0; --i) {
+        if (by_connections(rng))
+          connections.sample_walk(pixel, scale / rate, rng);
+        else
+          sample_standard(worker, pixel, scale / rate, pass.pairs, rng);
+      }
     });
     count(worker);
   }
@@ -217,17 +225,16 @@ struct Renderer::Impl {
       const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
       PrimaryBoundary primary(worker, edges, guide, mix.interior == 1);
       SecondaryBoundary secondary(worker, edges, guide, mix.interior == 1);
-      const auto run = [&](BoundaryGuide::Technique technique, Rng& rng, auto&& sample) {
-        const double rate = guide.rate(technique);
-        for (int i = static_cast<int>(rate + rng.uniform()); i > 0; --i) sample(1 / rate);
+      const auto run = [&](double rate, Rng& rng, auto&& sample) {
+        for (int i = sample_count(rate, rng); i > 0; --i) sample(1 / rate);
       };
       for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
-        run(BoundaryGuide::primary, rng, [&](double share) { primary.sample(share * splat_scale, rng); });
+        run(guide.rate(BoundaryGuide::primary), rng, [&](double share) { primary.sample(share * splat_scale, rng); });
         if (scene.camera_flow.possible())
-          run(BoundaryGuide::pixel_border, rng,
+          run(guide.rate(BoundaryGuide::pixel_border), rng,
               [&](double share) { primary.sample_pixel_border(share * splat_scale, rng); });
-        run(BoundaryGuide::from_edge, rng, [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
-        run(BoundaryGuide::from_camera, rng,
+        run(guide.rate(BoundaryGuide::from_edge), rng, [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
+        run(guide.rate(BoundaryGuide::from_camera) * worker.pick.rate(pixel), rng,
             [&](double share) { secondary.sample_from_camera(pixel, share * scale, rng); });
       });
       count(worker);

@@ -179,7 +179,8 @@ class SecondaryBoundary {
   /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
   double camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k, int pixel) const {
     if (!techniques_.from_camera) return 0;
-    double ratio = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) / edge_warp().density(g.y.x());
+    double ratio = camera_over_edge_rate_ * worker_.pick.rate(pixel) * camera_warp(pixel, k).density(g.y.x()) /
+                   edge_warp().density(g.y.x());
     ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
                    solid_angle_to_area(x[0].p, x[1]) / scene_.camera.pixels();
     for (int j = 1; j < k; ++j)

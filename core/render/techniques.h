@@ -23,7 +23,8 @@ class Techniques {
  public:
   Techniques(const PreparedScene& scene, const GatePick& pick) : scene_(scene), pick_(pick) {}
 
-  /// Of the complete path x0 .. x(K). `length_pdf(k)`: density of the path's length in connections of x(k).
+  /// Of the complete path x0 .. x(K). `length_pdf(k)`: density of the path's length in connections of x(k), times the
+  /// number of samples that make them.
   /// `walks_only`: x0 makes no connections (it is no camera).
   template <class LengthPdf>
   ArcDensities arcs(const Path& path, bool walks_only, LengthPdf&& length_pdf) const {
@@ -49,25 +50,27 @@ class Techniques {
     const double to_y = length - path.length[last - 1];
     // The arc that an emitter of this size leaves on a sphere of this radius.
     const double across = std::min(1 / std::sqrt(pdf_y), 2 * kPi * to_y);
+    const double rate = pick_.rate(pixel);  // of walks through the pixel
     double standard, ellipsoidal;
     if (last == 1) {
-      standard = step_pdf(path, 0, y);
+      standard = rate * step_pdf(path, 0, y);
       ellipsoidal = pick_.length_pdf(GatePick::kImage, length) / across;
     } else {
       const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
       if (!scene_.outside(q, y)) return 0;
-      const double to_q = path.length[last - 1] - path.length[last - 2], pdf_q = step_pdf(path, last - 2, q);
+      const double to_q = path.length[last - 1] - path.length[last - 2], pdf_q = rate * step_pdf(path, last - 2, q);
       standard = pdf_q * (pdf_y + step_pdf(path, last - 1, y));
       // Ellipsoids cross the scene on a few closed curves, where dA = |q-a| |q-b| / sqrt(tau^2 - |P(b-a)|^2)
       // dphi dtau.
       constexpr double kCurves = 1;
       const Vec3 d = y.p - x.p;
       const double in_plane = isochron::length_squared(d) - dot(d, q.n) * dot(d, q.n);
-      const double rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
+      const double area_rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
       ellipsoidal = pdf_q * pick_.length_pdf(pixel, length) / across;
       if (scene_.outside(x, q))
-        ellipsoidal += pdf_y * pick_.length_pdf(last == 2 ? GatePick::kImage : pixel, length) /
-                       (2 * kPi * kCurves * rate);
+        ellipsoidal += pdf_y *
+                       (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
+                       (2 * kPi * kCurves * area_rate);
     }
     return gain * share * ellipsoidal / (gain * share * ellipsoidal + (1 - share) * standard);
   }

@@ -125,10 +125,9 @@ TEST_P(Cost, NearlyIndependentOfTheNumberOfGates) {
   const GateSet one_gate(GateShape::gaussian(0.3), {5.46}), many_gates(GateShape::gaussian(0.3), centers);
   const EstimatorOptions options{.max_bounces = 3, .sampling = GetParam()};
   const Renderer one(scene, one_gate, options, &basis), many(scene, many_gates, options, &basis);
-  const GatedImage like_one = one.render({1, 0, 0}, {0, 1});
-  GatedImage like_many = many.render({1, 0, 0}, {0, 1});
-  for (std::size_t i = 0; i < like_many.data.size(); ++i)
-    like_many.data[i] = std::sin(1.0 + static_cast<double>(i));
+  GatedImage like_one = one.render({1, 0, 0}, {0, 1}), like_many = many.render({1, 0, 0}, {0, 1});
+  for (GatedImage* adjoint : {&like_one, &like_many})
+    for (std::size_t i = 0; i < adjoint->data.size(); ++i) adjoint->data[i] = std::sin(1.0 + static_cast<double>(i));
   std::vector<double> sum(DofLayout(scene).size(), 0.0);
   const SampleRange range{0, GetParam() == Sampling::standard ? 64 : 16};
   expect_cost_ratio_below(

@@ -93,7 +93,9 @@ TEST_P(Ledger, HoldsWhatFewerBouncesFind) {
   // A walk that may go on draws the same numbers up to where another one stops: both find the same paths.
   // (Not so connections for a length and a pair at the same vertex: see below.)
   const Renderer all(scene_, gates_, options(3), &basis_);
-  const GatedImage adjoints[2] = {adjoint_for(scene_, gates_, 0.2), adjoint_for(scene_, gates_, 1)};
+  GatedImage adjoints[2] = {adjoint_for(scene_, gates_, 0.2), adjoint_for(scene_, gates_, 1)};
+  for (GatedImage& adjoint : adjoints)  // one walk for every sample
+    for (double& a : adjoint.data) a = std::copysign(1.0, a);
   const SampleRange range{0, 16};
   const ImageLedger light = all.render_ledger({6, 0, 0}, range);
   for (int limit : {1, 2}) {
