@@ -21,7 +21,8 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
   Vec3 into_front;
   for (int i = 0; i < edge.faces(); ++i) {
     const double across = dot(edge.inward[i], side);
-    if (!(across > 0)) continue;
+    // A face seen edge-on takes no part of the image: what lies behind it is seen beside the edge.
+    if (!(across > 0) || std::abs(dot(scene.normal[edge.face[i]], d)) <= kCoplanarAngle) continue;
     const double slope = dot(edge.inward[i], d) / across;  // depth gained per distance beside the edge
     if (front < 0 || slope < front_slope)
       front = edge.face[i], front_slope = slope, into_front = edge.inward[i];

@@ -213,10 +213,11 @@ class SecondaryBoundary {
       if (const int pixel = camera.project(x.p); pixel >= 0) {
         const Vec3 w_o = to_camera / distance;
         const double scattered = lobe(material, dot(x.n, from), dot(x.n, w_o), dot(from, w_o));
-        if (scattered > 0 && worker_.visible_from_camera(x)) {
+        // Zero for a face seen edge-on, which has no flow along the pixel's ray either.
+        const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
+        if (scattered > 0 && importance > 0 && worker_.visible_from_camera(x)) {
           camera_side_.assign(1, eye);
           camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
-          const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
           connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
                                   walked + distance * scene_.index_between(x, eye),
                                   camera_over_edge(g, camera_side_, bounce, pixel)});
