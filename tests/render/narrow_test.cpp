@@ -159,7 +159,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(std::tuple(Case{"gaussian_narrow", GateShape::gaussian(0.0114), 5e-4}, Sampling::ellipsoidal),
                       std::tuple(Case{"truncated_narrow", GateShape::truncated_gaussian(0.0114, 0.0171), 5e-4},
                                  Sampling::ellipsoidal),
-                      std::tuple(Case{"boxcar_narrow", GateShape::boxcar(0.0228), 2e-3}, Sampling::ellipsoidal),
+                      std::tuple(Case{"boxcar_narrow", GateShape::boxcar(0.0228), 2.5e-4}, Sampling::ellipsoidal),
                       std::tuple(Case{"gaussian_wide", GateShape::gaussian(0.1), 5e-4}, Sampling::standard),
                       std::tuple(Case{"boxcar_wide", GateShape::boxcar(0.2), 2e-3}, Sampling::standard)),
     [](const auto& test) { return std::get<0>(test.param).name; });
