@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 
+#include "core/math/sobol.h"
+
 namespace isochron {
 
 /// What separates independent streams: (seed, iteration, pass). `pass` tells primal, target and derivative terms apart.
@@ -38,10 +40,28 @@ class Rng {
   /// The numbers of another sample of the same stream and index, without folding the key again.
   Rng with_sample(std::uint32_t sample) const { return Rng(key_, {0, counter_[1], sample, counter_[3]}); }
 
+  /// What scrambles the points of one set of samples of this stream and index; `set` tells sets apart.
+  std::uint64_t scramble_key(std::uint32_t set) const {
+    // No sample has the largest number: no other use of these counters.
+    const auto bits = philox({set, counter_[1], ~std::uint32_t{0}, counter_[3]}, key_);
+    return std::uint64_t{bits[0]} << 32 | bits[1];
+  }
+  /// The numbers of another sample as above, the first of them, as many as a point has, from point `point` of the
+  /// scrambled Sobol sequence of the key. Each sample by itself is as random as before; points 0, 1, ... n - 1 together
+  /// cover their cube evenly, best where n is a power of two.
+  Rng with_point(std::uint32_t sample, std::uint64_t scramble_key, std::uint32_t point) const {
+    Rng rng = with_sample(sample);
+    rng.scramble_key_ = scramble_key;
+    rng.point_ = point;
+    rng.point_blocks_ = kSobolBlocks;
+    return rng;
+  }
+
   /// Uniform in the open interval (0, 1), with 32 random bits.
   double uniform() {
     if (used_ == 4) {
-      block_ = philox(counter_, key_);
+      block_ = counter_[0] < point_blocks_ ? scrambled_sobol(scramble_key_, point_, counter_[0])
+                                           : philox(counter_, key_);
       ++counter_[0];
       used_ = 0;
     }
@@ -56,6 +76,8 @@ class Rng {
   std::array<std::uint32_t, 4> counter_;
   std::array<std::uint32_t, 4> block_{};
   int used_ = 4;
+  std::uint64_t scramble_key_ = 0;
+  std::uint32_t point_ = 0, point_blocks_ = 0;
 };
 
 }  // namespace isochron
