@@ -294,6 +294,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
       experiment.estimator.antithetic = antithetic->boolean();
     if (const auto pick = estimator.find("pick"))
       experiment.estimator.pick = static_cast<ArcPick>(pick->choice({"contribution", "uniform"}));
+    if (const auto numbers = estimator.find("numbers"))
+      experiment.estimator.numbers = static_cast<Numbers>(numbers->choice({"low_discrepancy", "independent"}));
     if (const auto guiding = estimator.find("guiding")) experiment.guiding = guiding->boolean();
     if (const auto radius = estimator.find("follow_radius"))
       experiment.estimator.follow_radius = radius->number(NumberRange::non_negative());

@@ -112,9 +112,11 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
                  e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
   constexpr const char* kPicks[] = {"contribution", "uniform"};
-  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  pick: {}\n  guiding: {}\n  follow_radius: {}\n",
+  constexpr const char* kNumbers[] = {"low_discrepancy", "independent"};
+  fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  pick: {}\n  numbers: {}\n",
                  kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic,
-                 kPicks[static_cast<int>(e.estimator.pick)], e.guiding, e.estimator.follow_radius);
+                 kPicks[static_cast<int>(e.estimator.pick)], kNumbers[static_cast<int>(e.estimator.numbers)]);
+  fmt::format_to(out, "  guiding: {}\n  follow_radius: {}\n", e.guiding, e.estimator.follow_radius);
   const bool analytic = e.gradient.method == GradientMethod::analytic;
   fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
   // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.

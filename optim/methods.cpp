@@ -20,6 +20,7 @@ void set_automatic(Experiment& experiment) {
   experiment.estimator.sampling = Sampling::automatic;
   experiment.estimator.antithetic = true;
   experiment.estimator.pick = ArcPick::contribution;
+  experiment.estimator.numbers = Numbers::low_discrepancy;
   experiment.gradient.method = GradientMethod::analytic;
 }
 
@@ -74,6 +75,7 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
                        set_automatic(e);
                        e.estimator.sampling = Sampling::ellipsoidal;
                        e.estimator.pick = ArcPick::uniform;
+                       e.estimator.numbers = Numbers::independent;
                      },
                      Method::Gradient::forward});
   return methods;

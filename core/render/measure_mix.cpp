@@ -107,6 +107,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     for (int i = 0; i < 3; ++i) {
       EstimatorOptions trial = options;
       trial.mix = SamplingMix{kShares[i], kShares[i]};
+      // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
+      trial.numbers = Numbers::independent;
       const Renderer renderer(small, gates, trial, moving);
       cost[i] = variance_and_work(
           renderer, block, batches,

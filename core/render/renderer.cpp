@@ -117,8 +117,11 @@ struct Renderer::Impl {
     for (int block = strand * kPixelsPerBlock; block < pixels; block += strands * kPixelsPerBlock)
       for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) {
         const Rng of_pixel(stream, static_cast<std::uint64_t>(pixel), 0);
+        const bool together = options.numbers == Numbers::low_discrepancy;
+        const std::uint64_t key = together ? of_pixel.scramble_key(static_cast<std::uint32_t>(range.begin)) : 0;
         for (int s = range.begin; s < range.end; ++s) {
-          Rng rng = of_pixel.with_sample(static_cast<std::uint32_t>(s));
+          const auto number = static_cast<std::uint32_t>(s), point = static_cast<std::uint32_t>(s - range.begin);
+          Rng rng = together ? of_pixel.with_point(number, key, point) : of_pixel.with_sample(number);
           sample(pixel, rng);
         }
       }

@@ -18,6 +18,10 @@ enum class Sampling { automatic, standard, ellipsoidal };
 /// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
 enum class ArcPick { contribution, uniform };
 
+/// The first numbers of each sample: together the samples of a pixel cover what they are taken from evenly (see Rng), or
+/// every number is independent of all others.
+enum class Numbers { low_discrepancy, independent };
+
 /// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
 struct BoundaryTechniques {
   bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
@@ -38,6 +42,7 @@ struct EstimatorOptions {
   Sampling sampling = Sampling::automatic;
   bool antithetic = true;                   ///< coupled pairs for the gate's derivative under ellipsoidal sampling
   ArcPick pick = ArcPick::contribution;     ///< of ellipsoidal sampling
+  Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};      ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
   /// Within how many widths of a pixel what the camera sees follows what moves beside it, see CameraFlow; 0: not at all.
@@ -51,7 +56,10 @@ enum class Term { interior, visibility, path_length };
 inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_length};
 const char* name(Term term);
 
-/// Samples [begin, end) of each pixel. Disjoint ranges of one stream are independent.
+/// Samples [begin, end) of each pixel. Disjoint ranges of one stream are independent. Low-discrepancy samples belong
+/// together within a range, those of other ranges are scrambled anew: the mean over [0, 8) is not that of the means over
+/// [0, 4) and [4, 8), and varies less. Ranges with the same begin are not independent: the longer one has the samples of
+/// the shorter one.
 struct SampleRange {
   int begin = 0, end = 0;
   int count() const { return end - begin; }

@@ -27,7 +27,8 @@ class Rendered : public testing::Test {
 
 TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
   for (const char* loss : {"loss={kind: squared}", "loss={kind: cauchy, scale: 0.3}"}) {
-    const Problem problem(load_experiment(file_, {loss}));
+    // Independent samples do not know that the objective takes them in halves.
+    const Problem problem(load_experiment(file_, {loss, "estimator={numbers: independent}"}));
     const GatedImage target = problem.make_target(kGoOn);
     const RenderedObjective objective(problem, target, kGoOn);
     const std::vector<double> theta = problem.parameters().initial();
@@ -125,8 +126,9 @@ TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
       "type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, smoothing: "
       "{slopes: 3}}");
   const std::string file = folder_.write("dent.yaml", text);
-  // Standard sampling: connections would pick their gates otherwise for a gradient than for a Jacobian.
-  const std::string standard = "estimator={sampling: standard}";
+  // Standard sampling: connections would pick their gates otherwise for a gradient than for a Jacobian. Independent
+  // numbers: a Jacobian's samples come in halves.
+  const std::string standard = "estimator={sampling: standard, numbers: independent}";
   const Problem with(load_experiment(file, {standard})),
       without(load_experiment(file, {standard, "parameters[0].smoothing={slopes: 0}"}));
   const GatedImage target = with.make_target(kGoOn);

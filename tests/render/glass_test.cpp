@@ -89,7 +89,7 @@ TEST(Glass, StandardAgreesWithEllipsoidal) {
   for (const bool ellipsoidal : {false, true}) {
     const Sampling sampling = ellipsoidal ? Sampling::ellipsoidal : Sampling::standard;
     const Renderer renderer(scene, gates, {.max_bounces = 4, .sampling = sampling});
-    results[ellipsoidal] = image_means(renderer, 3, ellipsoidal ? 56 : 160, kBatches, {63, ellipsoidal, 0});
+    results[ellipsoidal] = image_means(renderer, 3, ellipsoidal ? 80 : 60, kBatches, {63, ellipsoidal, 0});
   }
   for (int g = 0; g < 3; ++g) {
     const Estimate &a = results[0][g], &b = results[1][g];
