@@ -18,8 +18,8 @@ enum class Sampling { automatic, standard, ellipsoidal };
 /// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
 enum class ArcPick { contribution, uniform };
 
-/// The first numbers of each sample: together the samples of a pixel cover what they are taken from evenly (see Rng), or
-/// every number is independent of all others.
+/// The first numbers of each sample: together a pixel's samples cover evenly what they are taken from (see Rng), or every
+/// number is independent of all others.
 enum class Numbers { low_discrepancy, independent };
 
 /// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
@@ -57,9 +57,8 @@ inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_l
 const char* name(Term term);
 
 /// Samples [begin, end) of each pixel. Disjoint ranges of one stream are independent. Low-discrepancy samples belong
-/// together within a range, those of other ranges are scrambled anew: the mean over [0, 8) is not that of the means over
-/// [0, 4) and [4, 8), and varies less. Ranges with the same begin are not independent: the longer one has the samples of
-/// the shorter one.
+/// together within a range, others are scrambled anew: [0, 8) is not the mean of [0, 4) and [4, 8), and varies less.
+/// Ranges with the same begin are not independent: the longer one has the samples of the shorter one.
 struct SampleRange {
   int begin = 0, end = 0;
   int count() const { return end - begin; }

@@ -68,14 +68,23 @@ TEST(Sobol, StillSoAfterScrambling) {
     expect_even([key = random_key(k)](std::uint32_t i) { return scrambled(key, i); });
 }
 
-TEST(Sobol, DimensionsDiffer) {
-  // No two dimensions have the same points in the same order, nor so in their first 64 and first 6 bits.
-  for (int a = 0; a < kSobolDimensions; ++a)
-    for (int b = 0; b < a; ++b) {
-      int equal = 0;
-      for (std::uint32_t i = 0; i < 64; ++i) equal += plain(i)[a] >> 26 == plain(i)[b] >> 26;
-      EXPECT_LT(equal, 64) << a << ' ' << b;
-    }
+// Irreducible polynomials of degrees e and f, coprime, make a (t, 2)-sequence with t = e - 1 + f - 1: of 2^k points, each
+// box of area 2^(t - k) holds 2^t. (The first dimension counts as of degree 1.) A polynomial with factors fails.
+TEST(Sobol, PairsOfDimensionsFillBoxes) {
+  constexpr int kDegrees[kSobolDimensions] = {1, 1, 2, 3, 3, 4, 4, 5, 5, 5, 5, 5, 5, 6, 6, 6};
+  constexpr int kMostBits = 5;
+  std::vector<Point> points;
+  for (std::uint32_t i = 0; i < 1u << (10 + kMostBits); ++i) points.push_back(plain(i));
+  for (int x = 0; x < kSobolDimensions; ++x)
+    for (int y = 0; y < x; ++y)
+      for (int bits = 1; bits <= kMostBits; ++bits)
+        for (int a = 1; a < bits; ++a) {
+          const int t = kDegrees[x] + kDegrees[y] - 2, b = bits - a;
+          std::vector<int> counts(std::size_t{1} << bits);
+          for (std::size_t i = 0; i < std::size_t{1} << (t + bits); ++i)
+            ++counts[points[i][x] >> (32 - a) << b | points[i][y] >> (32 - b)];
+          for (int count : counts) ASSERT_EQ(count, 1 << t) << x << ' ' << y << ": " << a << ' ' << b;
+        }
 }
 
 // The lowest bits, too, are a permutation: all 32 directions of a dimension are independent over GF(2).
