@@ -74,13 +74,11 @@ int chart(const ChartCommand& command) {
 
 void add_chart(CLI::App& app, Action& action) {
   auto command = std::make_shared<ChartCommand>();
-  CLI::App* sub =
-      app.add_subcommand("chart", "Chart the error of the loss gradient against time, for every method");
+  CLI::App* sub = app.add_subcommand("chart", "Chart the error of the loss gradient against time, for every method");
   add_experiment_options(*sub, command->common);
-  sub->add_option(
-         "--seconds", command->seconds,
-         "time for all of it on idle cores, about; a quarter goes to the reference, the target is not "
-         "counted")
+  sub->add_option("--seconds", command->seconds,
+                  "time for all of it on idle cores, about; a quarter goes to the reference, the target is not "
+                  "counted")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("N");
@@ -88,10 +86,9 @@ void add_chart(CLI::App& app, Action& action) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("PERCENT");
-  sub->add_option(
-         "--steps", command->steps,
-         "steps of the finite differences, in units of the parameters; default: 4, 1 and 1/4 times the step "
-         "that `check` would take")
+  sub->add_option("--steps", command->steps,
+                  "steps of the finite differences, in units of the parameters; default: 4, 1 and 1/4 times the step "
+                  "that `check` would take")
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->type_name("A,B,C");

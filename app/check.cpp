@@ -39,14 +39,14 @@ std::vector<int> components_to_check(const Parameters& parameters, const Paramet
 void print_table(const std::vector<Comparison>& table, double limit) {
   std::size_t width = std::string_view("parameter").size();
   for (const Comparison& row : table) width = std::max(width, row.parameter.size());
-  fmt::print("{:<{}} {:>4} {:>11} {:>11} {:>11} {:>23} {:>23} {:>7}  verdict\n", "parameter", width, "gate",
-             "interior", "visibility", "path_length", "total +- se", "finite diff. +- se", "z");
+  fmt::print("{:<{}} {:>4} {:>11} {:>11} {:>11} {:>23} {:>23} {:>7}  verdict\n", "parameter", width, "gate", "interior",
+             "visibility", "path_length", "total +- se", "finite diff. +- se", "z");
   for (const Comparison& row : table)
     fmt::print(
         "{:<{}} {:>4} {:>11.4g} {:>11.4g} {:>11.4g} {:>11.4g} +- {:>8.2g} {:>11.4g} +- {:>8.2g} "
         "{:>7.2f}  {}\n",
-        row.parameter, width, row.gate, row.terms[0], row.terms[1], row.terms[2], row.total,
-        row.standard_error, row.finite_difference, row.finite_difference_error, row.z,
+        row.parameter, width, row.gate, row.terms[0], row.terms[1], row.terms[2], row.total, row.standard_error,
+        row.finite_difference, row.finite_difference_error, row.z,
         disagreements({row}, limit).empty() ? "ok" : "DIFFERS");
 }
 
@@ -56,16 +56,14 @@ int check(const CheckCommand& command) {
   const Problem problem(check_experiment(read_experiment(command.common), notes), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
-  const std::vector<double> theta =
-      parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
+  const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
   const std::string folder = output_folder(command.common, problem.experiment());
   make_output_folder(folder);
   catch_interrupts();
   for (const std::string& note : notes) fmt::print("{}\n", note);
   const std::vector<int> components = components_to_check(parameters, chosen);
-  for (int component : components)
-    check_step(problem, theta, component);  // fails before anything is rendered
+  for (int component : components) check_step(problem, theta, component);  // fails before anything is rendered
 
   std::vector<Comparison> table;
   for (int component : components) {
@@ -79,8 +77,7 @@ int check(const CheckCommand& command) {
   fmt::print("{} of {} differ; limit |z| = {:.2f} (1 % chance of a false alarm in the whole table)\n", wrong,
              comparisons, limit);
   if (wrong > 0)
-    fmt::print(
-        "Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
+    fmt::print("Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
   write_file_atomically(folder + "/check.csv", check_csv(table));
   HeavyTails tails;
   for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.kurtosis);
@@ -93,8 +90,8 @@ int check(const CheckCommand& command) {
 
 void add_check(CLI::App& app, Action& action) {
   auto command = std::make_shared<CheckCommand>();
-  CLI::App* sub = app.add_subcommand(
-      "check", "Compare the derivatives with finite differences; exit status 1 if they differ");
+  CLI::App* sub =
+      app.add_subcommand("check", "Compare the derivatives with finite differences; exit status 1 if they differ");
   add_experiment_options(*sub, command->common);
   add_parameter_option(*sub, command->parameter);
   sub->footer(

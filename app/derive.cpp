@@ -27,8 +27,7 @@ int derive(const DeriveCommand& command) {
   const Problem problem(read_experiment(command.common), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
-  const std::vector<double> theta =
-      parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
+  const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block block = chosen_parameter(parameters, command.parameter);
   const std::string folder = output_folder(command.common, problem.experiment());
   make_output_folder(folder);

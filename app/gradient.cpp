@@ -36,9 +36,8 @@ int gradient(const CommonOptions& options) {
     tails.add(name, -1, estimate.gradient.kurtosis[i]);
   }
   write_file_atomically(folder + "/gradient.csv", table);
-  write_file_atomically(folder + "/gradient.yaml",
-                        fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds, thread_count(options),
-                                    estimate.repeats));
+  write_file_atomically(folder + "/gradient.yaml", fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds,
+                                                               thread_count(options), estimate.repeats));
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {}/gradient.csv", folder);
   return 0;
@@ -48,8 +47,7 @@ int gradient(const CommonOptions& options) {
 
 void add_gradient(CLI::App& app, Action& action) {
   auto options = std::make_shared<CommonOptions>();
-  CLI::App* sub =
-      app.add_subcommand("gradient", "Estimate the gradient of the loss, its standard error and cost");
+  CLI::App* sub = app.add_subcommand("gradient", "Estimate the gradient of the loss, its standard error and cost");
   add_experiment_options(*sub, *options);
   sub->footer(
       "Examples:\n"

@@ -32,12 +32,11 @@ std::string share_of_term(const PointInspection& p, const Statistics& s, int ter
 
 /// One row per bounce, gate or shape: light, then the gradient by terms.
 void print_rows(const PointInspection& p, const std::string& title, const std::vector<std::string>& names,
-                const Statistics& light, const Statistics& gradient,
-                const std::vector<std::string>& more = {}) {
+                const Statistics& light, const Statistics& gradient, const std::vector<std::string>& more = {}) {
   std::size_t width = title.size();
   for (const std::string& name : names) width = std::max(width, name.size());
-  fmt::print("  {:>{}} {:>15} {:>15} {:>15} {:>15}{}\n", title, width, "light", "interior", "visibility",
-             "path_length", more.empty() ? "" : "   bias if paths stop here");
+  fmt::print("  {:>{}} {:>15} {:>15} {:>15} {:>15}{}\n", title, width, "light", "interior", "visibility", "path_length",
+             more.empty() ? "" : "   bias if paths stop here");
   for (std::size_t i = 0; i < names.size(); ++i) {
     fmt::print("  {:>{}} {}", names[i], width, percent(light, i));
     for (int t = 0; t < 3; ++t) fmt::print(" {}", share_of_term(p, gradient, t, t * names.size() + i));
@@ -76,8 +75,7 @@ void print_point(const Problem& problem, const PointInspection& p) {
              p.shares.by_bounces, bias);
   names.clear();
   for (int g = 0; g < gates; ++g) names.push_back(std::to_string(g));
-  print_rows(p, "gate", names, sum(gates, most + 1, [&](int g, int b) { return b * gates + g; }),
-             p.shares.by_gate);
+  print_rows(p, "gate", names, sum(gates, most + 1, [&](int g, int b) { return b * gates + g; }), p.shares.by_gate);
   names.clear();
   for (const Shape& s : problem.scene().shapes) names.push_back(s.name);
   print_rows(p, "shape", names, p.shares.light_by_shape, p.shares.by_shape);
@@ -102,8 +100,8 @@ void print_costs(const Inspection& inspection) {
                1e6 * c.seconds[0]);
     for (int t = 0; t < 3; ++t)
       if (c.seconds[1 + t] > 0)
-        fmt::print("  {:<16} {:<12} {:>11.3g} {:>17.3g} {:>16.3g}\n", point, name(kTerms[t]),
-                   c.variance.term[t], c.variance.cross[t], 1e6 * c.seconds[1 + t]);
+        fmt::print("  {:<16} {:<12} {:>11.3g} {:>17.3g} {:>16.3g}\n", point, name(kTerms[t]), c.variance.term[t],
+                   c.variance.cross[t], 1e6 * c.seconds[1 + t]);
   }
 }
 
@@ -123,8 +121,7 @@ void print_advice(const Problem& problem, const Inspection& inspection) {
   double beyond = 0;
   for (const PointInspection& p : inspection.points) beyond = std::max(beyond, expected_beyond(p.gradient));
   if (std::isinf(beyond))
-    fmt::print(
-        "The last bounce brings no less than the one before: the full model itself may need far more\n");
+    fmt::print("The last bounce brings no less than the one before: the full model itself may need far more\n");
   else if (beyond > kBiasTolerance)
     fmt::print(
         "If further bounces shrink like the last, the full model itself is off by {:.1f} %: it may need "
@@ -137,11 +134,10 @@ void print_advice(const Problem& problem, const Inspection& inspection) {
       "variance:\n");
   fmt::print("  {:<30} {:<28} {:>9.4f}\n", "now", numbers(advice.before.samples), advice.seconds_before);
   for (const SamplingTrial& trial : advice.trials)
-    fmt::print("  {:<30} {:<28} {:>9.4f}{}\n", fmt::format("advised, {} sampling", name(trial.sampling)),
-               numbers(trial.samples), trial.seconds,
-               trial.kurtosis > kHeavyTailKurtosis
-                   ? "  (a few rare samples make the variance: not to be trusted)"
-                   : "");
+    fmt::print(
+        "  {:<30} {:<28} {:>9.4f}{}\n", fmt::format("advised, {} sampling", name(trial.sampling)),
+        numbers(trial.samples), trial.seconds,
+        trial.kurtosis > kHeavyTailKurtosis ? "  (a few rare samples make the variance: not to be trusted)" : "");
   fmt::print("\n{}", advice_yaml(problem.experiment(), advice.after));
 }
 
@@ -204,8 +200,7 @@ void add_inspect(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "inspect", "Measure how much of the model a scene needs: bounces, terms, sampling, numbers of samples");
   add_experiment_options(*sub, command->common);
-  sub->add_option("--seconds", command->seconds,
-                  "CPU seconds to spend, of all cores together, about; default 60")
+  sub->add_option("--seconds", command->seconds, "CPU seconds to spend, of all cores together, about; default 60")
       ->check(CLI::Range(0.1, 1e6))
       ->type_name("N");
   sub->add_flag("--apply", command->apply, "write the advice into the experiment file");

@@ -27,8 +27,7 @@ int main(int argc, char** argv) {
   CLI::App app("Differentiable time-gated rendering and optimisation", "isochron");
   app.set_version_flag("--version", "isochron " ISOCHRON_VERSION);
   app.require_subcommand(1);
-  app.footer(
-      "Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");
+  app.footer("Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");
   isochron::Action action;
   isochron::add_run(app, action);
   isochron::add_resume(app, action);

@@ -67,8 +67,7 @@ std::string output_folder(const CommonOptions& options, const Experiment& experi
 }
 
 void add_parameter_option(CLI::App& command, std::string& name) {
-  command.add_option("--parameter", name, "only this parameter (NAME or NAME[INDEX]); default all")
-      ->type_name("NAME");
+  command.add_option("--parameter", name, "only this parameter (NAME or NAME[INDEX]); default all")->type_name("NAME");
 }
 
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name) {

@@ -35,8 +35,8 @@ bool run_script(const std::string& script, const std::string& folder) {
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
   std::array<const char*, 4> arguments = {"/usr/bin/python3", script.c_str(), argument.c_str(), nullptr};
   pid_t child = 0;
-  const int error = posix_spawn(&child, arguments[0], &actions, nullptr,
-                                const_cast<char* const*>(arguments.data()), environ);
+  const int error =
+      posix_spawn(&child, arguments[0], &actions, nullptr, const_cast<char* const*>(arguments.data()), environ);
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   std::string messages;

@@ -26,11 +26,9 @@ ProgressLine::~ProgressLine() {
 
 void ProgressLine::show(const Progress& p) {
   if (quiet_) return;
-  const std::string error =
-      std::isnan(p.param_rmse) ? "" : fmt::format("  parameter error {:.4g}", p.param_rmse);
-  const std::string text =
-      fmt::format("iteration {}/{}  loss {:.4g}{}  {:.3g} s each  {} left", p.iteration, p.iterations, p.loss,
-                  error, p.seconds_per_iteration, duration(p.seconds_left));
+  const std::string error = std::isnan(p.param_rmse) ? "" : fmt::format("  parameter error {:.4g}", p.param_rmse);
+  const std::string text = fmt::format("iteration {}/{}  loss {:.4g}{}  {:.3g} s each  {} left", p.iteration,
+                                       p.iterations, p.loss, error, p.seconds_per_iteration, duration(p.seconds_left));
   if (terminal_)
     fmt::print(stderr, "\r\x1b[K{}", text);
   else

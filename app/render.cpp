@@ -14,8 +14,7 @@ namespace {
 int render(const CommonOptions& options) {
   begin_session(options);
   const Problem problem(read_experiment(options), warn);
-  const std::vector<double> theta =
-      problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
+  const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
   const std::string folder = output_folder(options, problem.experiment());
   make_output_folder(folder);
   catch_interrupts();

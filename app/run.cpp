@@ -19,8 +19,7 @@ void start_at(const std::string& point, Experiment& experiment) {
   const std::vector<double> theta = problem.parameters().parse_point(point);
   for (std::size_t i = 0; i < experiment.parameters.size(); ++i) {
     const Parameters::Block& block = problem.parameters().blocks()[i];
-    experiment.parameters[i].initial.assign(theta.begin() + block.begin,
-                                            theta.begin() + block.begin + block.count);
+    experiment.parameters[i].initial.assign(theta.begin() + block.begin, theta.begin() + block.begin + block.count);
   }
 }
 
@@ -39,7 +38,8 @@ void add_run(CLI::App& app, Action& action) {
   auto command = std::make_shared<RunCommand>();
   CLI::App* sub = app.add_subcommand("run", "Optimise from the initial values towards the target");
   add_experiment_options(*sub, command->common);
-  sub->add_flag("--force", command->force, "overwrite the run that the folder holds (else it is moved to DIR.1, DIR.2, ...)");
+  sub->add_flag("--force", command->force,
+                "overwrite the run that the folder holds (else it is moved to DIR.1, DIR.2, ...)");
   sub->footer(
       "Examples:\n"
       "  isochron run cube.yaml\n"

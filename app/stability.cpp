@@ -59,13 +59,12 @@ int stability(const StabilityCommand& command) {
 
 void add_stability(CLI::App& app, Action& action) {
   auto command = std::make_shared<StabilityCommand>();
-  CLI::App* sub = app.add_subcommand(
-      "stability", "Map over gate width and method where gradients and reconstructions fail");
+  CLI::App* sub =
+      app.add_subcommand("stability", "Map over gate width and method where gradients and reconstructions fail");
   add_experiment_options(*sub, command->common);
   sub->get_option("--at")->group("");
-  sub->add_option(
-         "--seconds", command->seconds,
-         "time for the whole map on idle cores, about; every gradient of a width takes the same time")
+  sub->add_option("--seconds", command->seconds,
+                  "time for the whole map on idle cores, about; every gradient of a width takes the same time")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("N");
@@ -73,9 +72,8 @@ void add_stability(CLI::App& app, Action& action) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str()
       ->type_name("N");
-  sub->add_option(
-         "--widths", command->widths,
-         "standard deviations of the gates over the path length; default: 1e-1 to 1e-4.5 in half decades")
+  sub->add_option("--widths", command->widths,
+                  "standard deviations of the gates over the path length; default: 1e-1 to 1e-4.5 in half decades")
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->type_name("A,B,C");

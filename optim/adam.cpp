@@ -10,12 +10,12 @@ class Adam : public Optimizer {
   Adam(double learning_rate, const Preconditioner& preconditioner, const RateDecay& decay)
       : learning_rate_(learning_rate), preconditioner_(preconditioner), decay_(decay) {}
 
-  std::vector<double> step(const Objective& objective, const Evaluation& now,
-                           const std::vector<double>& theta, std::uint32_t iteration, double rate) override {
+  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+                           std::uint32_t iteration, double rate) override {
     std::vector<double> next = theta;
     const double factor = rate * decay_.factor(static_cast<int>(iteration));
-    adam_step({.learning_rate = learning_rate_ * factor}, now.gradient, objective.lower(), objective.upper(),
-              state_, next, preconditioner_);
+    adam_step({.learning_rate = learning_rate_ * factor}, now.gradient, objective.lower(), objective.upper(), state_,
+              next, preconditioner_);
     return next;
   }
   void reset() override { state_ = {}; }

@@ -27,9 +27,9 @@ struct AdamState {
 /// Every vector has its size, `state.m` and `state.v` may be empty before the first step. The algorithm's
 /// epsilon (1e-8 in the paper, absolute) is left out: it would make the step depend on the unit of the loss.
 /// Where every gradient so far was zero the unknown stays.
-inline void adam_step(const AdamOptions& options, const std::vector<double>& gradient,
-                      const std::vector<double>& lower, const std::vector<double>& upper, AdamState& state,
-                      std::vector<double>& theta, const Preconditioner& preconditioner = {}) {
+inline void adam_step(const AdamOptions& options, const std::vector<double>& gradient, const std::vector<double>& lower,
+                      const std::vector<double>& upper, AdamState& state, std::vector<double>& theta,
+                      const Preconditioner& preconditioner = {}) {
   state.m.resize(theta.size(), 0.0);
   state.v.resize(theta.size(), 0.0);
   ++state.steps;
@@ -51,8 +51,7 @@ inline void adam_step(const AdamOptions& options, const std::vector<double>& gra
     if (mean_square[i] > 0)
       step[i] = options.learning_rate * (state.m[i] / correction1) / std::sqrt(mean_square[i] / correction2);
   preconditioner.apply(step);
-  for (std::size_t i = 0; i < theta.size(); ++i)
-    theta[i] = std::clamp(theta[i] - step[i], lower[i], upper[i]);
+  for (std::size_t i = 0; i < theta.size(); ++i) theta[i] = std::clamp(theta[i] - step[i], lower[i], upper[i]);
 }
 
 }  // namespace isochron

@@ -35,8 +35,7 @@ PerPass cost_per_sample(const std::vector<GradientCost>& costs) {
   return result;
 }
 
-double seconds_of(const std::vector<GradientCost>& costs, const std::array<int, kPasses>& samples,
-                  double pixels) {
+double seconds_of(const std::vector<GradientCost>& costs, const std::array<int, kPasses>& samples, double pixels) {
   std::vector<double> overheads;
   for (const GradientCost& c : costs) overheads.push_back(c.overhead);
   const PerPass cost = cost_per_sample(costs);
@@ -53,8 +52,7 @@ PerPass real(const std::array<int, kPasses>& samples) {
 
 std::vector<GradientCost> measure_all(const Problem& problem, const std::vector<PointInspection>& points,
                                       const std::array<bool, 3>& kept,
-                                      const std::vector<std::array<int, kPasses>>& samples,
-                                      const Poll& poll) {
+                                      const std::vector<std::array<int, kPasses>>& samples, const Poll& poll) {
   std::vector<GradientCost> costs;
   for (std::size_t i = 0; i < points.size(); ++i)
     costs.push_back(measure_cost(problem, points[i].point.theta, points[i].target, kept, samples[i], poll));
@@ -90,28 +88,25 @@ void choose_samples(Advice& advice, double pixels) {
       const bool kept = advice.reduction.kept.terms[t];
       present[1 + t] = kept ? std::max(present[1 + t], 1) : 0;
     }
-    trial.samples = wanted > 0 ? cheapest_split(variance, cost_per_sample(trial.costs),
-                                                advice.reduction.kept.terms, wanted)
-                               : present;
+    trial.samples = wanted > 0
+                        ? cheapest_split(variance, cost_per_sample(trial.costs), advice.reduction.kept.terms, wanted)
+                        : present;
     trial.seconds = seconds_of(trial.costs, trial.samples, pixels);
     const double unchanged = seconds_of(trial.costs, present, pixels);
     const bool good_enough = variance(real(present)) <= kSameVariance * wanted;
-    if (trial.kurtosis > kHeavyTailKurtosis ||
-        (trial.seconds > kWorthNewSamples * unchanged && good_enough)) {
+    if (trial.kurtosis > kHeavyTailKurtosis || (trial.seconds > kWorthNewSamples * unchanged && good_enough)) {
       trial.samples = present;
       trial.seconds = unchanged;
     }
   }
   const SamplingTrial* best = &advice.trials.front();
   for (const SamplingTrial& trial : advice.trials)
-    if (trial.seconds < kWorthNewSampling * best->seconds && trial.kurtosis <= kHeavyTailKurtosis)
-      best = &trial;
+    if (trial.seconds < kWorthNewSampling * best->seconds && trial.kurtosis <= kHeavyTailKurtosis) best = &trial;
   advice.after = {advice.reduction.kept.max_bounces, best->sampling, best->samples};
   advice.seconds_after = best->seconds;
 }
 
-Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds,
-                   const Poll& poll) {
+Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds, const Poll& poll) {
   problem.require_parameters();
   const Experiment& experiment = problem.experiment();
   if (experiment.gradient.method != GradientMethod::analytic)
@@ -120,8 +115,8 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   Inspection result;
   const auto points = points_to_inspect(problem.parameters(), start);
   for (const InspectedPoint& point : points)
-    result.points.push_back(inspect_point(
-        problem, point, (1 - kShareOfCosts) * seconds / static_cast<double>(points.size()), poll));
+    result.points.push_back(
+        inspect_point(problem, point, (1 - kShareOfCosts) * seconds / static_cast<double>(points.size()), poll));
 
   const auto finds_any = [](const PointInspection& p) { return p.found[0] || p.found[1] || p.found[2]; };
   if (std::none_of(result.points.begin(), result.points.end(), finds_any))
@@ -133,16 +128,13 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   advice.reduction = choose_reduction(replicates, kBiasTolerance);
 
   std::array<bool, 3> present;
-  for (int t = 0; t < 3; ++t)
-    present[t] = experiment.samples.term(kTerms[t]) > 0 && result.points[0].can_be[t];
-  advice.before = {experiment.estimator.max_bounces, experiment.estimator.sampling,
-                   samples_of(experiment, present)};
+  for (int t = 0; t < 3; ++t) present[t] = experiment.samples.term(kTerms[t]) > 0 && result.points[0].can_be[t];
+  advice.before = {experiment.estimator.max_bounces, experiment.estimator.sampling, samples_of(experiment, present)};
 
-  const bool as_before = advice.reduction.kept.max_bounces == advice.before.max_bounces &&
-                         advice.reduction.kept.terms == present;
+  const bool as_before =
+      advice.reduction.kept.max_bounces == advice.before.max_bounces && advice.reduction.kept.terms == present;
   const bool other_sampling = experiment.estimator.sampling != Sampling::automatic;
-  const double each =
-      kShareOfCosts * seconds / (2 - as_before + other_sampling) / static_cast<double>(points.size());
+  const double each = kShareOfCosts * seconds / (2 - as_before + other_sampling) / static_cast<double>(points.size());
   std::vector<std::array<int, kPasses>> samples;
   for (const PointInspection& p : result.points)
     samples.push_back(affordable_samples(problem, p.point.theta, p.target, present, each, poll));
@@ -188,14 +180,12 @@ std::string inspection_csv(const Problem& problem, const Inspection& inspection)
   const int gates = problem.gates().size(), most = full_bounces(problem.experiment());
   const auto& shapes = problem.scene().shapes;
   for (const PointInspection& p : inspection.points) {
-    const auto row = [&](const char* quantity, const char* term, const std::string& bounces,
-                         const std::string& gate, const std::string& shape, double share, double error) {
-      text += fmt::format("{},{},{},{},{},{},{},{}\n", p.point.name, quantity, term, bounces, gate, shape,
-                          share, error);
+    const auto row = [&](const char* quantity, const char* term, const std::string& bounces, const std::string& gate,
+                         const std::string& shape, double share, double error) {
+      text +=
+          fmt::format("{},{},{},{},{},{},{},{}\n", p.point.name, quantity, term, bounces, gate, shape, share, error);
     };
-    const auto entry = [](const Statistics& s, std::size_t i) {
-      return std::pair(s.mean[i], s.standard_error[i]);
-    };
+    const auto entry = [](const Statistics& s, std::size_t i) { return std::pair(s.mean[i], s.standard_error[i]); };
     for (int b = 0; b <= most; ++b)
       for (int g = 0; g < gates; ++g) {
         const auto [share, error] = entry(p.shares.light, b * gates + g);

@@ -56,8 +56,7 @@ ChartMethod climb(const Experiment& experiment, const Method& method, const std:
                   const GatedImage& target, double core_seconds, const Poll& poll) {
   MethodRun run(experiment, method);
   const int unknowns = run.problem().parameters().size();
-  if (method.gradient != Method::Gradient::adjoint)
-    run.set_components(spread_components(unknowns, kMostComponents));
+  if (method.gradient != Method::Gradient::adjoint) run.set_components(spread_components(unknowns, kMostComponents));
   const SampleTrial trial = try_samples(run, theta, target, kRepeats, core_seconds, poll);
   int rungs = kRungs;
   while (rungs > 1 && trial.last_within(core_seconds / rungs, kRepeats) < rungs - 1) --rungs;
@@ -94,8 +93,8 @@ bool fine_enough(const Reference& reference, double error) {
   return reference.error < 0.5 * error;
 }
 
-Reference make_reference(const Experiment& experiment, const std::vector<double>& theta,
-                         const GatedImage& target, double core_seconds, const Poll& poll) {
+Reference make_reference(const Experiment& experiment, const std::vector<double>& theta, const GatedImage& target,
+                         double core_seconds, const Poll& poll) {
   Experiment own = experiment;
   own.seed ^= kReferenceSeed;
   own.estimator.max_bounces = std::max(own.estimator.max_bounces, own.target.max_bounces);
@@ -103,8 +102,7 @@ Reference make_reference(const Experiment& experiment, const std::vector<double>
   const SampleTrial trial = try_samples(run, theta, target, kReferenceRepeats, core_seconds, poll);
   // All of the time, in equal repeats.
   const int last = trial.last_within(core_seconds, kReferenceRepeats);
-  run.set_factor(trial.factor(last) *
-                 std::max(1.0, core_seconds / (kReferenceRepeats * trial.core_seconds[last])));
+  run.set_factor(trial.factor(last) * std::max(1.0, core_seconds / (kReferenceRepeats * trial.core_seconds[last])));
   Reference result;
   for (int i = 0; i < kReferenceRepeats; ++i) {
     MethodRun::Estimate estimate = run.gradient(theta, target, static_cast<std::uint32_t>(i), poll);
@@ -124,13 +122,12 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
   chart.error = options.error;
   chart.unknowns = static_cast<int>(theta.size());
   options.progress("reference");
-  chart.reference =
-      make_reference(experiment, theta, target, kReferenceShare * options.core_seconds, options.poll);
+  chart.reference = make_reference(experiment, theta, target, kReferenceShare * options.core_seconds, options.poll);
   if (!resolved(chart.reference))
-    throw std::runtime_error(fmt::format(
-        "the gradient does not stand out of its noise at this point (squared norm {:.3g} +- {:.2g}): "
-        "another point (--at), or more time (--seconds)",
-        chart.reference.norm2.value, chart.reference.norm2.standard_error));
+    throw std::runtime_error(
+        fmt::format("the gradient does not stand out of its noise at this point (squared norm {:.3g} +- {:.2g}): "
+                    "another point (--at), or more time (--seconds)",
+                    chart.reference.norm2.value, chart.reference.norm2.standard_error));
   const std::vector<Method> methods = methods_for(experiment, options.steps, chart.notes);
   const double each = (1 - kReferenceShare) * options.core_seconds / static_cast<double>(methods.size());
   for (const Method& method : methods) {
@@ -139,15 +136,14 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
     const std::vector<int> components = spread_components(chart.unknowns, row.components);
     const double scale = static_cast<double>(chart.unknowns) / row.components;
     // A squared loss has a gradient whose mean does not depend on the number of samples.
-    row.error = method_error(row.rungs, select(chart.reference.repeats, components),
-                             chart.reference.norm2.value, scale, experiment.loss.kind == LossKind::squared);
+    row.error = method_error(row.rungs, select(chart.reference.repeats, components), chart.reference.norm2.value, scale,
+                             experiment.loss.kind == LossKind::squared);
     row.to_error = core_seconds_to(options.error, row.error);
     chart.methods.push_back(std::move(row));
   }
   if (!fine_enough(chart.reference, options.error))
-    chart.notes.push_back(
-        fmt::format("the reference's own error is {}: too noisy to tell a bias of {} (--seconds)",
-                    percent(chart.reference.error), percent(options.error)));
+    chart.notes.push_back(fmt::format("the reference's own error is {}: too noisy to tell a bias of {} (--seconds)",
+                                      percent(chart.reference.error), percent(options.error)));
   return chart;
 }
 
@@ -156,29 +152,27 @@ std::string chart_csv(const Chart& chart) {
   std::string text =
       "method,factor,repeats,core_seconds,error,variance,variance_error,bias2,bias2_error,components,"
       "unknowns\n";
-  text += fmt::format("reference,,{},{},{},{},,,,{},{}\n", chart.reference.repeats.size(),
-                      chart.reference.core_seconds, chart.reference.error,
-                      chart.reference.error * chart.reference.error, chart.unknowns, chart.unknowns);
+  text +=
+      fmt::format("reference,,{},{},{},{},,,,{},{}\n", chart.reference.repeats.size(), chart.reference.core_seconds,
+                  chart.reference.error, chart.reference.error * chart.reference.error, chart.unknowns, chart.unknowns);
   for (const ChartMethod& method : chart.methods) {
     const double scale = static_cast<double>(chart.unknowns) / method.components;
-    const Repeats reference =
-        select(chart.reference.repeats, spread_components(chart.unknowns, method.components));
+    const Repeats reference = select(chart.reference.repeats, spread_components(chart.unknowns, method.components));
     for (const Rung& rung : method.rungs) {
       const Measured variance = total_variance(rung.repeats);
       const SquaredNorm bias2 = method_error({rung}, reference, norm2, scale, false).bias2;
       const double relative = variance.value * scale / norm2;
       text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", method.name, rung.factor, rung.repeats.size(),
                           rung.core_seconds, std::sqrt(std::max(0.0, relative + bias2.value)), relative,
-                          variance.standard_error * scale / norm2, bias2.value, bias2.standard_error,
-                          method.components, chart.unknowns);
+                          variance.standard_error * scale / norm2, bias2.value, bias2.standard_error, method.components,
+                          chart.unknowns);
     }
   }
   return text;
 }
 
 std::string chart_table_csv(const Chart& chart) {
-  std::string text =
-      "method,core_seconds,standard_error,ratio,rate,slope,bias2,bias2_error,bias_significant\n";
+  std::string text = "method,core_seconds,standard_error,ratio,rate,slope,bias2,bias2_error,bias_significant\n";
   const double best = best_of(chart);
   for (const ChartMethod& m : chart.methods)
     text += fmt::format("{},{},{},{},{},{},{},{},{}\n", m.name, m.to_error.value, m.to_error.standard_error,
@@ -194,22 +188,17 @@ std::string chart_table(const Chart& chart) {
                                  "core-seconds to " + percent(chart.error) + " error", "ratio", "slope");
   const double best = best_of(chart);
   for (const ChartMethod& m : chart.methods) {
-    const std::string time =
-        std::isfinite(m.to_error.value)
-            ? fmt::format("{:.3g} +- {:.2g}", m.to_error.value, m.to_error.standard_error)
-            : fmt::format("never (bias {})", bias_text(m.error.bias2));
-    const std::string ratio =
-        std::isfinite(m.to_error.value) ? fmt::format("{:.3g}", m.to_error.value / best) : "";
-    text += fmt::format("{:<{}}  {:>26}  {:>8}  {:>7.2f}  {}{}\n", m.name, width, time, ratio, m.error.slope,
-                        bias_text(m.error.bias2),
-                        m.components < chart.unknowns
-                            ? fmt::format("  (from {} of {} unknowns)", m.components, chart.unknowns)
-                            : "");
+    const std::string time = std::isfinite(m.to_error.value)
+                                 ? fmt::format("{:.3g} +- {:.2g}", m.to_error.value, m.to_error.standard_error)
+                                 : fmt::format("never (bias {})", bias_text(m.error.bias2));
+    const std::string ratio = std::isfinite(m.to_error.value) ? fmt::format("{:.3g}", m.to_error.value / best) : "";
+    text += fmt::format(
+        "{:<{}}  {:>26}  {:>8}  {:>7.2f}  {}{}\n", m.name, width, time, ratio, m.error.slope, bias_text(m.error.bias2),
+        m.components < chart.unknowns ? fmt::format("  (from {} of {} unknowns)", m.components, chart.unknowns) : "");
   }
   text += fmt::format("reference: {} error, {:.3g} core-seconds\n", percent(chart.reference.error),
                       chart.reference.core_seconds);
-  text +=
-      "slope: of the error over time, on log scales; where it is steeper than -0.5, times are upper bounds\n";
+  text += "slope: of the error over time, on log scales; where it is steeper than -0.5, times are upper bounds\n";
   for (const std::string& note : chart.notes) text += note + "\n";
   return text;
 }

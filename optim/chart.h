@@ -15,9 +15,8 @@
 namespace isochron {
 
 struct ChartOptions {
-  double core_seconds =
-      120;              ///< for the whole chart, about, without the target; the reference takes a quarter
-  double error = 0.01;  ///< relative, that the table asks for
+  double core_seconds = 120;  ///< for the whole chart, about, without the target; the reference takes a quarter
+  double error = 0.01;        ///< relative, that the table asks for
   std::vector<double> steps;  ///< of finite differences
   Poll poll;
   std::function<void(const std::string&)> progress;  ///< one line
@@ -38,8 +37,8 @@ bool fine_enough(const Reference& reference, double error);
 
 /// `auto` with random numbers of its own and as many bounces as the target has, in 32 parts that take `core_seconds`
 /// together (or one sample each).
-Reference make_reference(const Experiment& experiment, const std::vector<double>& theta,
-                         const GatedImage& target, double core_seconds, const Poll& poll);
+Reference make_reference(const Experiment& experiment, const std::vector<double>& theta, const GatedImage& target,
+                         double core_seconds, const Poll& poll);
 
 struct ChartMethod {
   std::string name;

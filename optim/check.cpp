@@ -20,8 +20,7 @@ constexpr double kMostDegrees = 1;
 constexpr double kRelativeValue = 0.05;
 
 bool moves_geometry(ParameterType type) {
-  return type == ParameterType::translation || type == ParameterType::rotation ||
-         type == ParameterType::vertices;
+  return type == ParameterType::translation || type == ParameterType::rotation || type == ParameterType::vertices;
 }
 
 ParameterType type_of(const Problem& problem, int component) {
@@ -78,8 +77,8 @@ struct DifferenceEstimate {
   std::vector<double> rounding;
 };
 
-DifferenceEstimate estimate_difference(const Problem& problem, const std::vector<double>& theta,
-                                       int component, const Poll& poll) {
+DifferenceEstimate estimate_difference(const Problem& problem, const std::vector<double>& theta, int component,
+                                       const Poll& poll) {
   const double step = check_step(problem, theta, component);
   const int samples = problem.experiment().samples.primal, batches = check_batches(problem);
   const EstimatorOptions& options = problem.estimator();
@@ -95,8 +94,7 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
     scenes.push_back(problem.parameters().apply(below));
   }
   std::vector<std::unique_ptr<Renderer>> renderers;
-  for (const Scene& scene : scenes)
-    renderers.push_back(std::make_unique<Renderer>(scene, problem.gates(), options));
+  for (const Scene& scene : scenes) renderers.push_back(std::make_unique<Renderer>(scene, problem.gates(), options));
 
   const int gates = problem.gates().size();
   const Stream stream = problem.stream(Pass::finite_difference);
@@ -111,8 +109,7 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
       const GatedImage below = renderers[2 * s + 1]->render(stream, range);
       for (int g = 0; g < gates; ++g) {
         differences[s].push_back((above.mean(g) - below.mean(g)) / distances[s]);
-        const double rounding =
-            std::numeric_limits<double>::epsilon() * std::abs(above.mean(g)) / distances[s];
+        const double rounding = std::numeric_limits<double>::epsilon() * std::abs(above.mean(g)) / distances[s];
         result.rounding[g] = std::max(result.rounding[g], rounding);
       }
       poll();
@@ -158,15 +155,13 @@ Experiment check_experiment(Experiment experiment, std::vector<std::string>& not
   SampleSpec& spec = experiment.samples;
   const int samples = std::max({spec.primal, spec.interior, spec.visibility, spec.path_length});
   if (samples < 2)
-    throw InputError(
-        fmt::format("samples: {} is too few for a standard error (allowed: at least 2)", samples));
+    throw InputError(fmt::format("samples: {} is too few for a standard error (allowed: at least 2)", samples));
   const bool motion = std::any_of(experiment.parameters.begin(), experiment.parameters.end(),
                                   [](const ParameterSpec& p) { return moves_geometry(p.type); });
   const bool jumps = make_gates(experiment.gates).shape().pair_mass(PairPart::atoms) > 0;
   const auto set = [&](int& term, const char* name, bool needed) {
     if (term == 0 && needed)
-      notes.push_back(
-          fmt::format("the experiment leaves out the {} term; checked with {} samples", name, samples));
+      notes.push_back(fmt::format("the experiment leaves out the {} term; checked with {} samples", name, samples));
     term = needed ? samples : 0;
   };
   set(spec.primal, "primal", true);
@@ -196,16 +191,16 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
   }
   if (!experiment.gradient.step_given) step = kRelativeValue * std::abs(theta[component]);
   const Parameters& parameters = problem.parameters();
-  const double room = std::min(theta[component] - parameters.lower()[component],
-                               parameters.upper()[component] - theta[component]);
+  const double room =
+      std::min(theta[component] - parameters.lower()[component], parameters.upper()[component] - theta[component]);
   if (!(room > 0))
     throw InputError(fmt::format("--at: {} = {} lies on a bound, where there is no central difference",
                                  parameters.component_names()[component], theta[component]));
   return std::min(step, room);
 }
 
-std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta,
-                                         int component, const Poll& poll) {
+std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component,
+                                         const Poll& poll) {
   const auto analytic = estimate_derivatives(problem, theta, component, 1, poll);
   const DifferenceEstimate difference = estimate_difference(problem, theta, component, poll);
   std::vector<Comparison> rows;
@@ -232,9 +227,9 @@ std::string check_csv(const std::vector<Comparison>& table) {
       "parameter,gate,interior,visibility,path_length,total,standard_error,finite_difference,"
       "finite_difference_error,z,kurtosis\n";
   for (const Comparison& row : table)
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", row.parameter, row.gate, row.terms[0],
-                        row.terms[1], row.terms[2], row.total, row.standard_error, row.finite_difference,
-                        row.finite_difference_error, row.z, row.kurtosis);
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", row.parameter, row.gate, row.terms[0], row.terms[1],
+                        row.terms[2], row.total, row.standard_error, row.finite_difference, row.finite_difference_error,
+                        row.z, row.kurtosis);
   return text;
 }
 

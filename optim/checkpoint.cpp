@@ -57,8 +57,7 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   const YAML::Node root = YAML::Load(text);
   const std::string version = root["version"].as<std::string>();
   if (version != program_version())
-    throw InputError(
-        fmt::format("{}: version: written by {}; allowed: {}", file, version, program_version()));
+    throw InputError(fmt::format("{}: version: written by {}; allowed: {}", file, version, program_version()));
   Checkpoint c;
   c.iteration = root["iteration"].as<int>();
   c.seconds = root["seconds"].as<double>();
@@ -77,8 +76,8 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
     const int count = static_cast<int>(values.size());
     c.theta.insert(c.theta.end(), values.begin(), values.end());
     if (name != block.name || count != block.count)
-      throw InputError(fmt::format("{}: parameters: '{}' with {} values; the experiment has '{}' with {}",
-                                   file, name, count, block.name, block.count));
+      throw InputError(fmt::format("{}: parameters: '{}' with {} values; the experiment has '{}' with {}", file, name,
+                                   count, block.name, block.count));
   }
   for (const auto& entry : root["optimizer"])
     c.optimizer[entry.first.as<std::string>()] = entry.second.as<std::vector<double>>();
@@ -93,8 +92,7 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
 
 }  // namespace
 
-Checkpoint::Checkpoint()
-    : loss_initial(kUnknown), image_rmse_initial(kUnknown), param_rmse_initial(kUnknown) {}
+Checkpoint::Checkpoint() : loss_initial(kUnknown), image_rmse_initial(kUnknown), param_rmse_initial(kUnknown) {}
 
 void save_checkpoint(const std::string& folder, const Checkpoint& c, const Parameters& parameters) {
   std::string text = fmt::format(
@@ -106,15 +104,13 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
   auto out = std::back_inserter(text);
   for (const Parameters::Block& block : parameters.blocks()) {
     const auto begin = c.theta.begin() + block.begin;
-    fmt::format_to(out, "  - name: {}\n    value: [{}]\n", block.name,
-                   fmt::join(begin, begin + block.count, ", "));
+    fmt::format_to(out, "  - name: {}\n    value: [{}]\n", block.name, fmt::join(begin, begin + block.count, ", "));
   }
   text += c.optimizer.empty() ? "optimizer: {}\n" : "optimizer:\n";
   for (const auto& [key, values] : c.optimizer) fmt::format_to(out, "  {}: {}\n", key, list(values));
   SafeguardState safeguard = c.safeguard;
   fmt::format_to(out, "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n",
-                 scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row,
-                 scalar(safeguard.best_level));
+                 scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row, scalar(safeguard.best_level));
   for (const auto& [key, values] : lists_of(safeguard)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
   text += kChecksumKey + checksum(text) + "\n";
   const std::string latest = folder + "/checkpoint.yaml", previous = folder + "/checkpoint.previous.yaml";

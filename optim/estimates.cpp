@@ -12,9 +12,8 @@ namespace {
 
 int batches_for(const char* term, int samples) {
   if (samples < 2)
-    throw InputError(fmt::format("samples.{}: {} is too few for a standard error (allowed: at least 2{})",
-                                 term, samples,
-                                 std::string_view(term) == "primal" ? "" : ", or 0 to leave the term out"));
+    throw InputError(fmt::format("samples.{}: {} is too few for a standard error (allowed: at least 2{})", term,
+                                 samples, std::string_view(term) == "primal" ? "" : ", or 0 to leave the term out"));
   return std::min(kMostBatches, samples);
 }
 
@@ -26,8 +25,8 @@ std::vector<double> gate_means(const GatedImage& image) {
 
 /// Means and batch statistics of the images that `estimate(range)` gives, `count` at a time.
 template <class Estimate>
-DerivativeEstimate collect(const std::string& component, int samples, int batches, int count,
-                           const Poll& poll, Estimate&& estimate) {
+DerivativeEstimate collect(const std::string& component, int samples, int batches, int count, const Poll& poll,
+                           Estimate&& estimate) {
   std::vector<ImageMean> means(count);
   std::vector<BatchStatistics> statistics(count);
   for (int b = 0; b < batches; ++b) {
@@ -121,13 +120,11 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
   const SampleSpec& spec = problem.experiment().samples;
   if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
     const Stream stream = problem.stream(Pass::finite_difference);
-    return {collect("total", spec.primal, batches_for("primal", spec.primal), count, poll,
-                    [&](SampleRange range) {
-                      std::vector<GatedImage> images;
-                      for (int i = first; i < first + count; ++i)
-                        images.push_back(problem.finite_difference(theta, i, stream, range));
-                      return images;
-                    })};
+    return {collect("total", spec.primal, batches_for("primal", spec.primal), count, poll, [&](SampleRange range) {
+      std::vector<GatedImage> images;
+      for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
+      return images;
+    })};
   }
   for (Term term : kTerms)
     if (spec.term(term) > 0) batches_for(name(term), spec.term(term));  // before anything is rendered
@@ -156,8 +153,8 @@ int gradient_repeats(const Problem& problem) {
   return repeats;
 }
 
-GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta,
-                                   const GatedImage& target, const Poll& poll) {
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                   const Poll& poll) {
   GradientEstimate result;
   result.repeats = gradient_repeats(problem);
   BatchStatistics statistics;

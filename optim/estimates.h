@@ -63,7 +63,7 @@ int gradient_repeats(const Problem& problem);
 
 /// The gradient of the loss at theta. All repeats together use the experiment's samples once. Throws as
 /// above.
-GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta,
-                                   const GatedImage& target, const Poll& poll);
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                   const Poll& poll);
 
 }  // namespace isochron

@@ -63,10 +63,8 @@ std::vector<double> read_centers(const YamlValue& value) {
     const double stop = stop_value.number(NumberRange::non_negative());
     const int count = static_cast<int>(map.require("count").integer(1, kMostGates));
     map.reject_unknown();
-    if (stop < start)
-      stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
-    for (int i = 0; i < count; ++i)
-      centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
+    if (stop < start) stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
+    for (int i = 0; i < count; ++i) centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
     return centers;
   }
   if (!value.is_list()) value.fail("is neither", "a list of numbers, or {start, stop, count}");
@@ -78,20 +76,17 @@ std::vector<double> read_centers(const YamlValue& value) {
 GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder) {
   YamlMap map = value.map();
   GateSpec gates;
-  constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar,
-                                 GateKind::truncated_gaussian, GateKind::tabulated};
-  gates.kind =
-      kKinds[map.require("kind").choice({"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"})];
-  if (const auto unit = map.find("unit"))
-    gates.unit = static_cast<LengthUnit>(unit->choice({"scene", "ns", "ps"}));
+  constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar, GateKind::truncated_gaussian,
+                                 GateKind::tabulated};
+  gates.kind = kKinds[map.require("kind").choice({"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"})];
+  if (const auto unit = map.find("unit")) gates.unit = static_cast<LengthUnit>(unit->choice({"scene", "ns", "ps"}));
   if (gates.unit != LengthUnit::scene)
     gates.scene_unit_m = map.require("scene_unit_m").number(NumberRange::positive());
   else if (const auto metres = map.find("scene_unit_m"))
     gates.scene_unit_m = metres->number(NumberRange::positive());
   if (gates.kind != GateKind::steady) gates.centers = read_centers(map.require("centers"));
   const auto positive = [&](const char* key) { return map.require(key).number(NumberRange::positive()); };
-  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian)
-    gates.sigma = positive("sigma");
+  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian) gates.sigma = positive("sigma");
   if (gates.kind == GateKind::boxcar) gates.width = positive("width");
   if (gates.kind == GateKind::truncated_gaussian) gates.half_width = positive("half_width");
   if (gates.kind == GateKind::tabulated) {
@@ -113,8 +108,7 @@ GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder)
     const bool positive_values =
         std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
         std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
-    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) ||
-        !positive_values)
+    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive_values)
       value.fail("the table is no gate",
                  "two rows or more, offsets in rising order, values at least 0 and one of them above");
   }
@@ -146,8 +140,7 @@ Selection read_selection(const YamlValue& value) {
   return selection;
 }
 
-ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder,
-                             bool target_required) {
+ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder, bool target_required) {
   YamlMap map = value.map();
   ParameterSpec spec;
   spec.where.emplace("", value);
@@ -183,8 +176,7 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
     if (direction.is_list())
       spec.direction = direction.direction();
     else if (direction.is_scalar())
-      spec.direction_kind =
-          direction.choice({"normal", "free"}) == 0 ? VertexDirection::normal : VertexDirection::free;
+      spec.direction_kind = direction.choice({"normal", "free"}) == 0 ? VertexDirection::normal : VertexDirection::free;
     else
       direction.fail("is neither", "[x, y, z], normal or free");
   }
@@ -213,8 +205,7 @@ void read_target(const YamlValue& value, const std::filesystem::path& folder, Ta
   if (const auto images = map.find("images")) {
     target.images = existing_file(*images, folder);
   } else {
-    if (const auto samples = map.find("samples"))
-      target.samples = static_cast<int>(samples->integer(1, kMostSamples));
+    if (const auto samples = map.find("samples")) target.samples = static_cast<int>(samples->integer(1, kMostSamples));
     if (const auto seed = map.find("seed"))
       target.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
     if (const auto bounces = map.find("max_bounces"))
@@ -245,8 +236,7 @@ OptimizerSpec read_optimizer(const YamlValue& value) {
   OptimizerSpec optimizer;
   if (const auto method = map.find("method"))
     optimizer.method = static_cast<OptimizerMethod>(method->choice({"adam", "lbfgs", "levenberg_marquardt"}));
-  if (const auto rate = map.find("learning_rate"))
-    optimizer.learning_rate = rate->number(NumberRange::positive());
+  if (const auto rate = map.find("learning_rate")) optimizer.learning_rate = rate->number(NumberRange::positive());
   if (const auto iterations = map.find("iterations"))
     optimizer.iterations = static_cast<int>(iterations->integer(0, kMostIterations));
   if (const auto tolerance = map.find("tolerance"))
@@ -288,10 +278,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
   if (const auto value = map.find("estimator")) {
     YamlMap estimator = value->map();
     if (const auto sampling = estimator.find("sampling"))
-      experiment.estimator.sampling =
-          static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
-    if (const auto antithetic = estimator.find("antithetic"))
-      experiment.estimator.antithetic = antithetic->boolean();
+      experiment.estimator.sampling = static_cast<Sampling>(sampling->choice({"auto", "standard", "ellipsoidal"}));
+    if (const auto antithetic = estimator.find("antithetic")) experiment.estimator.antithetic = antithetic->boolean();
     if (const auto pick = estimator.find("pick"))
       experiment.estimator.pick = static_cast<ArcPick>(pick->choice({"contribution", "uniform"}));
     if (const auto numbers = estimator.find("numbers"))
@@ -304,8 +292,7 @@ void read_settings(YamlMap& map, Experiment& experiment) {
   if (const auto value = map.find("gradient")) {
     YamlMap gradient = value->map();
     if (const auto method = gradient.find("method"))
-      experiment.gradient.method =
-          static_cast<GradientMethod>(method->choice({"analytic", "finite_difference"}));
+      experiment.gradient.method = static_cast<GradientMethod>(method->choice({"analytic", "finite_difference"}));
     if (const auto step = gradient.find("step")) {
       experiment.gradient.step = step->number(NumberRange::positive());
       experiment.gradient.step_given = true;

@@ -69,10 +69,9 @@ struct ParameterSpec {
   std::string material;  ///< albedo, roughness, ior
   Selection selection;
   VertexDirection direction_kind = VertexDirection::fixed;
-  Vec3
-      direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
-  Vec3 axis;      ///< rotation, by the right-hand rule; only its direction matters
-  Vec3 pivot;     ///< rotation; a fixed point of the world that no other parameter moves
+  Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
+  Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
+  Vec3 pivot;      ///< rotation; a fixed point of the world that no other parameter moves
   std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
                                                       ///< empty (all but initial)
 
@@ -83,8 +82,7 @@ struct ParameterSpec {
   /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
   std::map<std::string, YamlValue> where;
   /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
-  [[noreturn]] void fail(const std::string& key, const std::string& wrong,
-                         const std::string& allowed = "") const;
+  [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
 };
 
 struct TargetSpec {
@@ -92,15 +90,13 @@ struct TargetSpec {
   int samples = 4096;
   std::uint64_t seed = 7;
   int max_bounces = 8;  ///< of the rendered target; the experiment's own where the file does not say
-  double photons = 0;  ///< of add_photon_noise; 0: no noise
+  double photons = 0;   ///< of add_photon_noise; 0: no noise
 };
 
 /// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1.
 struct SampleSpec {
   int primal = 64, interior = 64, visibility = 64, path_length = 64;
-  int term(Term t) const {
-    return t == Term::interior ? interior : t == Term::visibility ? visibility : path_length;
-  }
+  int term(Term t) const { return t == Term::interior ? interior : t == Term::visibility ? visibility : path_length; }
   /// Sets every term to n, but leaves out what is left out already.
   void set_all(int n);
 };
@@ -109,7 +105,7 @@ enum class GradientMethod { analytic, finite_difference };
 
 struct GradientSpec {
   GradientMethod method = GradientMethod::analytic;
-  double step = 0.01;  ///< finite_difference: half the distance of the two images, in units of the parameter
+  double step = 0.01;       ///< finite_difference: half the distance of the two images, in units of the parameter
   bool step_given = false;  ///< whether the file gives it
 };
 
@@ -139,8 +135,8 @@ struct OptimizerSpec {
   /// levenberg_marquardt: without meaning.
   double learning_rate = 0.02;
   int iterations = 100;
-  double tolerance = 0;  ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
-  int stop_window = 0;   ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
+  double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
+  int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
   RateDecay decay;           ///< adam
   int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
 };

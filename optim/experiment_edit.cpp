@@ -127,11 +127,9 @@ class Lines {
   struct Place {
     std::size_t line, value;
   };
-  std::optional<Place> find(std::size_t begin, std::size_t end, std::size_t indent,
-                            const std::string& key) const {
+  std::optional<Place> find(std::size_t begin, std::size_t end, std::size_t indent, const std::string& key) const {
     for (std::size_t i = begin; i < end; ++i)
-      if (const std::size_t value = value_at(lines_[i], indent, key); value != kNowhere)
-        return Place{i, value};
+      if (const std::size_t value = value_at(lines_[i], indent, key); value != kNowhere) return Place{i, value};
     return std::nullopt;
   }
   void set_scalar(std::size_t i, std::size_t at, const std::string& value) {

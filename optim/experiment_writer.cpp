@@ -55,13 +55,11 @@ std::string parameter_yaml(const ParameterSpec& spec) {
   if (selection.kind == Selection::Kind::list)
     fmt::format_to(out, "    selection: [{}]\n", fmt::join(selection.indices, ", "));
   if (selection.kind == Selection::Kind::box)
-    fmt::format_to(out, "    selection: {{box: {{min: {}, max: {}}}}}\n", vector(selection.min),
-                   vector(selection.max));
+    fmt::format_to(out, "    selection: {{box: {{min: {}, max: {}}}}}\n", vector(selection.min), vector(selection.max));
   if (spec.type == ParameterType::rotation)
     fmt::format_to(out, "    axis: {}\n    pivot: {}\n", vector(spec.axis), vector(spec.pivot));
   if (spec.direction_kind != VertexDirection::fixed)
-    fmt::format_to(out, "    direction: {}\n",
-                   spec.direction_kind == VertexDirection::normal ? "normal" : "free");
+    fmt::format_to(out, "    direction: {}\n", spec.direction_kind == VertexDirection::normal ? "normal" : "free");
   else if (spec.type == ParameterType::translation || spec.type == ParameterType::vertices)
     fmt::format_to(out, "    direction: {}\n", vector(spec.direction));
   if (spec.diffusion > 0 || spec.slopes > 0)
@@ -80,8 +78,7 @@ const char* program_version() {
 }
 
 const char* name(ParameterType type) {
-  constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo",
-                                    "roughness",   "ior",      "emission"};
+  constexpr const char* kNames[] = {"translation", "rotation", "vertices", "albedo", "roughness", "ior", "emission"};
   return kNames[static_cast<int>(type)];
 }
 
@@ -109,8 +106,8 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   else
     fmt::format_to(out, "target:\n  images: {}\n", relative(e.target.images));
   if (e.target.photons > 0) fmt::format_to(out, "  noise: {{photons: {}}}\n", e.target.photons);
-  fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
-                 e.samples.primal, e.samples.interior, e.samples.visibility, e.samples.path_length);
+  fmt::format_to(out, "samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n", e.samples.primal,
+                 e.samples.interior, e.samples.visibility, e.samples.path_length);
   constexpr const char* kPicks[] = {"contribution", "uniform"};
   constexpr const char* kNumbers[] = {"low_discrepancy", "independent"};
   fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  pick: {}\n  numbers: {}\n",

@@ -69,8 +69,7 @@ void make_output_folder(const std::string& folder) {
     throw InputError(fmt::format("output folder {}: cannot be made: {}", folder, error.message()));
   const std::string probe = folder + "/.isochron.tmp";
   const int fd = open(probe.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
-  if (fd < 0)
-    throw InputError(fmt::format("output folder {}: cannot be written: {}", folder, std::strerror(errno)));
+  if (fd < 0) throw InputError(fmt::format("output folder {}: cannot be written: {}", folder, std::strerror(errno)));
   close(fd);
   std::filesystem::remove(probe, error);
 }

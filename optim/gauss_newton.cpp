@@ -4,12 +4,11 @@
 
 namespace isochron {
 
-void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint,
-                  const std::vector<double>& weight, Evaluation& into) {
+void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint, const std::vector<double>& weight,
+                  Evaluation& into) {
   const auto rows = static_cast<Eigen::Index>(jacobian.residuals),
              columns = static_cast<Eigen::Index>(jacobian.unknowns);
-  Eigen::Map<Eigen::MatrixXd> a(jacobian.half[0].data(), rows, columns),
-      b(jacobian.half[1].data(), rows, columns);
+  Eigen::Map<Eigen::MatrixXd> a(jacobian.half[0].data(), rows, columns), b(jacobian.half[1].data(), rows, columns);
   const Eigen::Map<const Eigen::VectorXd> slope(adjoint.data(), rows), weights(weight.data(), rows);
 
   into.gradient.resize(jacobian.unknowns);

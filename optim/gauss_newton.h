@@ -15,7 +15,7 @@ struct JacobianHalves {
 
 /// Gradient and curvatures of a loss 1/R sum rho(r): gradient = J'adjoint with adjoint = dLoss/dr, and the
 /// curvature 2/R J' W J with W = diag(weight). The Jacobian is overwritten.
-void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint,
-                  const std::vector<double>& weight, Evaluation& into);
+void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint, const std::vector<double>& weight,
+                  Evaluation& into);
 
 }  // namespace isochron

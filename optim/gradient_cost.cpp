@@ -43,8 +43,8 @@ Times time_evaluation(const Problem& problem, const std::vector<double>& theta, 
   std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
   for (int t = 0; t < 3; ++t) {
     if (!kept[t]) continue;
-    renderer.add_gradient(kTerms[t], adjoint, stream_of(problem, pass_of(kTerms[t]), index),
-                          {0, samples[1 + t]}, dof_gradient);
+    renderer.add_gradient(kTerms[t], adjoint, stream_of(problem, pass_of(kTerms[t]), index), {0, samples[1 + t]},
+                          dof_gradient);
     lap(2 + t);
   }
   return times;
@@ -108,8 +108,8 @@ class VarianceCollector {
 }  // namespace
 
 std::array<int, kPasses> affordable_samples(const Problem& problem, const std::vector<double>& theta,
-                                            const GatedImage& target, const std::array<bool, 3>& kept,
-                                            double seconds, const Poll& poll) {
+                                            const GatedImage& target, const std::array<bool, 3>& kept, double seconds,
+                                            const Poll& poll) {
   const SampleSpec& spec = problem.experiment().samples;
   const std::array<int, kPasses> all{spec.primal, spec.interior, spec.visibility, spec.path_length};
   const auto scaled = [&](double factor) {
@@ -129,8 +129,7 @@ std::array<int, kPasses> affordable_samples(const Problem& problem, const std::v
 }
 
 GradientCost measure_cost(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                          const std::array<bool, 3>& kept, const std::array<int, kPasses>& samples,
-                          const Poll& poll) {
+                          const std::array<bool, 3>& kept, const std::array<int, kPasses>& samples, const Poll& poll) {
   GradientCost result;
   std::vector<Times> times;
   for (int i = 0; i < kTimings; ++i) {
@@ -165,8 +164,8 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
     std::vector<std::vector<std::vector<double>>> tables(
         columns, std::vector<std::vector<double>>(kImages, std::vector<double>(kBatches, 0.0)));
     for (int b = 0; b < kBatches; ++b) {
-      const GradientLedger ledger = renderer.gradient_ledger(
-          kTerms[t], adjoints, stream_of(problem, pass_of(kTerms[t]), b), {0, samples[1 + t]});
+      const GradientLedger ledger =
+          renderer.gradient_ledger(kTerms[t], adjoints, stream_of(problem, pass_of(kTerms[t]), b), {0, samples[1 + t]});
       for (std::size_t i = 0; i < ledger.by_bounces.size(); ++i) {
         const std::size_t column = i / kImages % columns;
         tables[column][i % kImages][b] += unit[column] * ledger.by_bounces[i];

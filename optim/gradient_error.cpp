@@ -87,8 +87,7 @@ SquaredNorm squared_norm(std::span<const WeightedRepeats> groups) {
   }
   double along = 0, square_trace = 0;  // d'Cd, tr(C^2)
   for (std::size_t g = 0; g < differences.size(); ++g) {
-    for (const auto& u : differences[g])
-      along += square(dot(total, u)) / static_cast<double>(differences[g].size());
+    for (const auto& u : differences[g]) along += square(dot(total, u)) / static_cast<double>(differences[g].size());
     for (std::size_t h = 0; h < differences.size(); ++h) {
       if (g == h && differences[g].size() < kFewestDifferences) {
         square_trace += square(noises[g]);  // the most that it can be
@@ -126,8 +125,7 @@ MethodError method_error(const std::vector<Rung>& rungs, const Repeats& referenc
     log_time.push_back(std::log(time));
     log_deviation.push_back(0.5 * std::log(variance.value));
   }
-  result.slope =
-      log_time.size() > 1 ? slope_of(log_time, log_deviation) : std::numeric_limits<double>::quiet_NaN();
+  result.slope = log_time.size() > 1 ? slope_of(log_time, log_deviation) : std::numeric_limits<double>::quiet_NaN();
 
   // All samples alike: a rung counts by its repeats times their samples.
   double samples = 0;
@@ -136,8 +134,7 @@ MethodError method_error(const std::vector<Rung>& rungs, const Repeats& referenc
     samples += rungs[r].factor * static_cast<double>(rungs[r].repeats.size());
   std::vector<WeightedRepeats> groups{{&reference, -1}};
   for (std::size_t r = first; r < rungs.size(); ++r)
-    groups.push_back(
-        {&rungs[r].repeats, rungs[r].factor * static_cast<double>(rungs[r].repeats.size()) / samples});
+    groups.push_back({&rungs[r].repeats, rungs[r].factor * static_cast<double>(rungs[r].repeats.size()) / samples});
   result.bias2 = squared_norm(groups);
   for (double* x : {&result.bias2.value, &result.bias2.standard_error, &result.bias2.error_if_zero})
     *x *= scale / norm2;

@@ -1,13 +1,13 @@
 #include "optim/inspection.h"
 
-#include "core/math/cpu_time.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <stdexcept>
+
+#include "core/math/cpu_time.h"
 
 namespace isochron {
 namespace {
@@ -72,8 +72,7 @@ class ShareCollector {
       std::vector<std::vector<double>> projections;
       for (const Gradient& g : gradients_) {
         std::vector<double> row((g.*part).size() / columns, 0.0);
-        for (std::size_t i = 0; i < (g.*part).size(); ++i)
-          row[i / columns] += (g.*part)[i] * mean[i % columns];
+        for (std::size_t i = 0; i < (g.*part).size(); ++i) row[i / columns] += (g.*part)[i] * mean[i % columns];
         projections.push_back(std::move(row));
       }
       return statistics(projections, square);
@@ -119,8 +118,7 @@ Stream inspection_stream(const Problem& problem, Pass pass, int index) {
   return problem.stream(pass, kInspection + static_cast<std::uint32_t>(index));
 }
 
-std::vector<InspectedPoint> points_to_inspect(const Parameters& parameters,
-                                              const std::vector<double>& start) {
+std::vector<InspectedPoint> points_to_inspect(const Parameters& parameters, const std::vector<double>& start) {
   std::vector<InspectedPoint> points{{"start", start}};
   if (!parameters.target_known()) return points;
   const auto on_the_way = [&](const char* name, double share) {
@@ -138,8 +136,7 @@ int full_bounces(const Experiment& experiment) {
   return experiment.target.images.empty() ? std::max(own, experiment.target.max_bounces) : own;
 }
 
-PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds,
-                              const Poll& poll) {
+PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds, const Poll& poll) {
   const Experiment& experiment = problem.experiment();
   const Parameters& parameters = problem.parameters();
   const int gates = problem.gates().size(), columns = parameters.size(), most = full_bounces(experiment);
@@ -217,10 +214,8 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
           sorted.by_bounces.push_back(unit[c] * g.by_bounces[g.index(b, c)]);
           if (sorted.by_bounces.back() != 0) result.found[t] = true;
         }
-      for (std::size_t i = 0; i < g.by_gate.size(); ++i)
-        sorted.by_gate.push_back(unit[i % columns] * g.by_gate[i]);
-      for (std::size_t i = 0; i < g.by_shape.size(); ++i)
-        sorted.by_shape.push_back(unit[i % columns] * g.by_shape[i]);
+      for (std::size_t i = 0; i < g.by_gate.size(); ++i) sorted.by_gate.push_back(unit[i % columns] * g.by_gate[i]);
+      for (std::size_t i = 0; i < g.by_shape.size(); ++i) sorted.by_shape.push_back(unit[i % columns] * g.by_shape[i]);
       poll();
     }
     if (!std::all_of(limits.begin(), limits.end(), [](double x) { return std::isfinite(x); }))

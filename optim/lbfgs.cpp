@@ -87,8 +87,7 @@ class ScaledLoss : public ceres::FirstOrderFunction {
     return value < lower || value > upper || (value == lower && slope > 0) || (value == upper && slope < 0);
   }
 
-  static constexpr double kReach =
-      10;  ///< of an iteration, in first steps: a curvature made of noise leads anywhere
+  static constexpr double kReach = 10;  ///< of an iteration, in first steps: a curvature made of noise leads anywhere
   const Objective& objective_;
   std::vector<double> lower_, upper_;
   std::vector<double> start_;
@@ -103,11 +102,10 @@ class ScaledLoss : public ceres::FirstOrderFunction {
 
 class Lbfgs : public Optimizer {
  public:
-  Lbfgs(double first_step, int inner_iterations)
-      : first_step_(first_step), inner_iterations_(inner_iterations) {}
+  Lbfgs(double first_step, int inner_iterations) : first_step_(first_step), inner_iterations_(inner_iterations) {}
 
-  std::vector<double> step(const Objective& objective, const Evaluation& now,
-                           const std::vector<double>& theta, std::uint32_t iteration, double rate) override {
+  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+                           std::uint32_t iteration, double rate) override {
     auto* loss = new ScaledLoss(objective, now, theta, iteration, first_step_, gradient_size(now.gradient));
     const ceres::GradientProblem problem(loss);  // owns it
     if (!loss->can_move()) return theta;
@@ -116,8 +114,7 @@ class Lbfgs : public Optimizer {
     options.line_search_type = ceres::WOLFE;
     options.max_num_iterations = inner_iterations_;
     options.max_num_line_search_step_size_iterations = kMostTrials;
-    options.max_num_line_search_direction_restarts =
-        0;  // what no line search finds here, the next iteration may
+    options.max_num_line_search_direction_restarts = 0;  // what no line search finds here, the next iteration may
     options.function_tolerance = options.parameter_tolerance = options.gradient_tolerance = 0;
     options.logging_type = ceres::SILENT;
     std::vector<double> u(theta.size(), 0.0);

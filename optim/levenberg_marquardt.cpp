@@ -51,8 +51,8 @@ class CondensedLoss : public ceres::CostFunction {
   std::vector<double> point(const double* u) const {
     std::vector<double> theta = start_;
     for (std::size_t i = 0; i < theta.size(); ++i)
-      theta[i] = std::clamp(theta[i] + u[i] / model_.scale[static_cast<Eigen::Index>(i)],
-                            objective_.lower()[i], objective_.upper()[i]);
+      theta[i] = std::clamp(theta[i] + u[i] / model_.scale[static_cast<Eigen::Index>(i)], objective_.lower()[i],
+                            objective_.upper()[i]);
     return theta;
   }
   void rethrow() const { guarded_.rethrow(); }
@@ -85,8 +85,8 @@ class LevenbergMarquardt : public Optimizer {
     return objective.linearise(theta, iteration);
   }
 
-  std::vector<double> step(const Objective& objective, const Evaluation& now,
-                           const std::vector<double>& theta, std::uint32_t iteration, double rate) override {
+  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+                           std::uint32_t iteration, double rate) override {
     // Unknowns on a bound and drawn outwards stay there; else their part of the step would spoil that of the
     // others.
     std::vector<int> fixed;

@@ -21,8 +21,7 @@ std::string header(const Parameters& parameters) {
     if (block.count > kMostColumns) {
       text += fmt::format(",{}.norm", block.name);
     } else {
-      for (int i = 0; i < block.count; ++i)
-        text += fmt::format(",{}", parameters.component_names()[block.begin + i]);
+      for (int i = 0; i < block.count; ++i) text += fmt::format(",{}", parameters.component_names()[block.begin + i]);
     }
   }
   return text + "\n";
@@ -30,8 +29,7 @@ std::string header(const Parameters& parameters) {
 
 }  // namespace
 
-Log::Log(const std::string& file, const Parameters& parameters, int next)
-    : name_(file), parameters_(parameters) {
+Log::Log(const std::string& file, const Parameters& parameters, int next) : name_(file), parameters_(parameters) {
   std::string kept = header(parameters);
   if (const auto old = read_file(file)) {
     std::istringstream lines(*old);
@@ -47,8 +45,8 @@ Log::Log(const std::string& file, const Parameters& parameters, int next)
 
 void Log::append(const LogRow& row, const std::vector<double>& theta) {
   const auto number = [](double value) { return std::isfinite(value) ? exact(value) : std::string(); };
-  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss), number(row.image_rmse),
-                                 number(row.param_rmse), number(row.gradient_norm));
+  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss),
+                                 number(row.image_rmse), number(row.param_rmse), number(row.gradient_norm));
   for (const Parameters::Block& block : parameters_.blocks()) {
     if (block.count > kMostColumns) {
       double sum = 0;

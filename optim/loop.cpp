@@ -25,8 +25,8 @@ const char* name(FinalChoice choice) {
   return kNames[static_cast<int>(choice)];
 }
 
-LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_window,
-                    const LoopOptions& options, Checkpoint& state) {
+LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_window, const LoopOptions& options,
+                    Checkpoint& state) {
   if (!state.optimizer.empty()) optimizer.restore(state.optimizer);
   for (;;) {
     const auto iteration = static_cast<std::uint32_t>(state.iteration);
@@ -35,13 +35,12 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
     options.row(now, state.theta, false);
 
     const bool finite = std::isfinite(now.loss) && all_finite(now.gradient);
-    const bool agrees =
-        options.converged_rmse > 0 && std::sqrt(now.mean_squared_error) <= options.converged_rmse;
+    const bool agrees = options.converged_rmse > 0 && std::sqrt(now.mean_squared_error) <= options.converged_rmse;
     Safeguard safeguard(stop_window, state.safeguard);
     const Verdict verdict = safeguard.observe(now.loss, finite, state.theta);
     const bool last = state.iteration >= options.iterations;
-    const bool diverged = verdict == Verdict::give_up ||
-                          (last && (!finite || now.loss > kDivergedLossRatio * state.loss_initial));
+    const bool diverged =
+        verdict == Verdict::give_up || (last && (!finite || now.loss > kDivergedLossRatio * state.loss_initial));
     if (agrees || diverged || verdict == Verdict::settled || last) {
       LoopResult result;
       std::vector<double> chosen = state.theta;
@@ -54,8 +53,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
         result = {RunStatus::converged, FinalChoice::average};
         chosen = safeguard.settled_theta();
       }
-      if (chosen != state.theta)
-        options.row(optimizer.evaluate(objective, chosen, iteration + 1), chosen, true);
+      if (chosen != state.theta) options.row(optimizer.evaluate(objective, chosen, iteration + 1), chosen, true);
       state.safeguard = safeguard.state();
       state.theta = chosen;
       return result;
@@ -66,9 +64,9 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
       optimizer.reset();
       next = safeguard.state().best_theta;
       if (options.warning)
-        options.warning(fmt::format(
-            "iteration {}: {}; going on from the best parameters with {} of the rate", state.iteration,
-            finite ? "the loss has risen" : "loss or gradient is not finite", safeguard.state().rate));
+        options.warning(fmt::format("iteration {}: {}; going on from the best parameters with {} of the rate",
+                                    state.iteration, finite ? "the loss has risen" : "loss or gradient is not finite",
+                                    safeguard.state().rate));
     } else {
       next = optimizer.step(objective, now, state.theta, iteration, safeguard.state().rate);
     }

@@ -27,11 +27,10 @@ inline constexpr double kDivergedLossRatio = 10;
 
 struct LoopOptions {
   int iterations = 100;
-  double converged_rmse =
-      0;  ///< ends the loop once the image's root mean square error is at most this; 0: never
+  double converged_rmse = 0;  ///< ends the loop once the image's root mean square error is at most this; 0: never
   /// After every evaluation, before the step; `closing`: of the final parameters.
   std::function<void(const Evaluation& now, const std::vector<double>& theta, bool closing)> row;
-  std::function<void()> save;  ///< after every step, with the state ready for a checkpoint
+  std::function<void()> save;                       ///< after every step, with the state ready for a checkpoint
   std::function<void(const std::string&)> warning;  ///< one line
 };
 
@@ -42,7 +41,7 @@ struct LoopResult {
 
 /// Goes on from `state`, whose theta lies within the bounds, and keeps it up to date; at the end its theta
 /// holds the final parameters. What the objective throws leaves the state as it was before the iteration.
-LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_window,
-                    const LoopOptions& options, Checkpoint& state);
+LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_window, const LoopOptions& options,
+                    Checkpoint& state);
 
 }  // namespace isochron

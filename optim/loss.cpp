@@ -20,8 +20,7 @@ double RobustLoss::weight(double r) const {
 double mean_loss(const GatedImage& image, const GatedImage& target, const RobustLoss& rho) {
   double sum = 0;
   for (std::size_t i = 0; i < image.data.size(); ++i) sum += rho.value(image.data[i] - target.data[i]);
-  return std::isfinite(sum) ? sum / static_cast<double>(image.data.size())
-                            : std::numeric_limits<double>::quiet_NaN();
+  return std::isfinite(sum) ? sum / static_cast<double>(image.data.size()) : std::numeric_limits<double>::quiet_NaN();
 }
 
 GatedImage loss_adjoint(const GatedImage& image, const GatedImage& target, const RobustLoss& rho) {

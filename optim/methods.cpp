@@ -68,8 +68,8 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
                          e.estimator.max_bounces = kFewBounces;
                        }});
   else
-    notes.push_back(fmt::format("max_bounces is {}: no method with {} bounces",
-                                experiment.estimator.max_bounces, kFewBounces));
+    notes.push_back(
+        fmt::format("max_bounces is {}: no method with {} bounces", experiment.estimator.max_bounces, kFewBounces));
   methods.push_back({"paper",
                      [](Experiment& e) {
                        set_automatic(e);
@@ -122,8 +122,8 @@ void MethodRun::set_factor(double factor) {
   const auto scaled = [&](int n) {
     return n == 0 ? 0 : static_cast<int>(std::clamp(std::round(factor * n), 1.0, std::ldexp(1.0, 30)));
   };
-  problem_.set_samples({scaled(samples_.primal), scaled(samples_.interior), scaled(samples_.visibility),
-                        scaled(samples_.path_length)});
+  problem_.set_samples(
+      {scaled(samples_.primal), scaled(samples_.interior), scaled(samples_.visibility), scaled(samples_.path_length)});
 }
 
 template <class F>
@@ -137,8 +137,7 @@ GatedImage MethodRun::gate_by_gate(const Scene& scene, const TangentBasis* basis
     const Renderer renderer(scene, gate, problem_.estimator(problem_.experiment().samples.visibility), basis);
     const GatedImage image = render(renderer, iteration * count + static_cast<std::uint32_t>(g));
     for (int pixel = 0; pixel < all.pixels(); ++pixel)
-      for (int c = 0; c < all.channels; ++c)
-        all.data[all.index(pixel, g) + c] = image.data[image.index(pixel, 0) + c];
+      for (int c = 0; c < all.channels; ++c) all.data[all.index(pixel, g) + c] = image.data[image.index(pixel, 0) + c];
     poll();
   }
   return all;
@@ -180,10 +179,9 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
     poll();
   } else {
     const Scene scene = problem_.parameters().apply(theta);
-    image =
-        gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number) {
-          return renderer.render(problem_.stream(Pass::primal, number), {0, primal});
-        });
+    image = gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number) {
+      return renderer.render(problem_.stream(Pass::primal, number), {0, primal});
+    });
   }
   const GatedImage adjoint = loss_adjoint(image, target, problem_.robust_loss(target));
   std::vector<double> penalty(theta.size(), 0.0);
@@ -210,8 +208,8 @@ int SampleTrial::last_within(double seconds, int repeats) const {
   return step;
 }
 
-SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target,
-                        int repeats, double core_seconds, const Poll& poll) {
+SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,
+                        double core_seconds, const Poll& poll) {
   constexpr std::uint32_t kTrialIteration = 0x80000000u;
   constexpr int kMostSteps = 24;
   SampleTrial trial{std::exp2(std::ceil(std::log2(run.least_factor()))), {}};

@@ -70,8 +70,8 @@ class MethodRun {
                         const Poll& poll) const;
   /// `render(renderer, stream)` of every gate by itself, put together.
   template <class F>
-  GatedImage gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration,
-                          const Poll& poll, F&& render) const;
+  GatedImage gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
+                          F&& render) const;
 
   Method::Gradient kind_;
   Problem problem_;
@@ -90,7 +90,7 @@ struct SampleTrial {
 
 /// Goes on up to where `repeats` of the next step would take more than `core_seconds`. Takes other random
 /// numbers than iterations below 2^31.
-SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target,
-                        int repeats, double core_seconds, const Poll& poll);
+SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,
+                        double core_seconds, const Poll& poll);
 
 }  // namespace isochron

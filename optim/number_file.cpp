@@ -32,8 +32,7 @@ std::vector<std::vector<double>> read_number_file(const std::string& file, int c
     }
     if (row.empty()) continue;
     if (columns > 0 && static_cast<int>(row.size()) != columns)
-      throw InputError(
-          fmt::format("{}:{}:1: {} numbers in this row (allowed: {})", file, number, row.size(), columns));
+      throw InputError(fmt::format("{}:{}:1: {} numbers in this row (allowed: {})", file, number, row.size(), columns));
     rows.push_back(std::move(row));
   }
   return rows;

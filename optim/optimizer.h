@@ -25,9 +25,8 @@ class Optimizer {
   }
   /// Where one iteration leads from theta, within the bounds. `now` is evaluate(objective, theta, iteration);
   /// its loss and gradient are finite. Every step is shortened by `rate`, in (0, 1].
-  virtual std::vector<double> step(const Objective& objective, const Evaluation& now,
-                                   const std::vector<double>& theta, std::uint32_t iteration,
-                                   double rate) = 0;
+  virtual std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+                                   std::uint32_t iteration, double rate) = 0;
   /// Forgets what it learnt, after a step was rejected.
   virtual void reset() = 0;
   virtual OptimizerState state() const = 0;

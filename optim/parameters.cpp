@@ -59,9 +59,8 @@ int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, st
     const Vec3 &lo = selection.min, &hi = selection.max;
     for (int v = 0; v < shape.vertex_count; ++v) {
       const Vec3& p = scene.positions[shape.first_vertex + v];
-      const bool inside =
-          selection.kind == Selection::Kind::all ||
-          (p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y && p.z >= lo.z && p.z <= hi.z);
+      const bool inside = selection.kind == Selection::Kind::all ||
+                          (p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y && p.z >= lo.z && p.z <= hi.z);
       if (inside) slot[v] = count++;
     }
   }
@@ -75,8 +74,7 @@ void check_material(const ParameterSpec& spec, MaterialType type) {
   };
   if (spec.type == ParameterType::roughness && type == MaterialType::diffuse) reject("diffuse", "roughness");
   if (spec.type == ParameterType::ior && type != MaterialType::rough_dielectric) reject("no dielectric", "ior");
-  if (spec.type == ParameterType::albedo && type == MaterialType::rough_dielectric)
-    reject("a dielectric", "albedo");
+  if (spec.type == ParameterType::albedo && type == MaterialType::rough_dielectric) reject("a dielectric", "albedo");
 }
 
 }  // namespace
@@ -110,8 +108,7 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
       const int index = spec.type == ParameterType::emission ? shape : material;
       for (const MaterialValue& other : material_values_)
         if (other.type == spec.type && other.index == index)
-          spec.fail("type",
-                    fmt::format("another parameter sets the same {} already", isochron::name(spec.type)));
+          spec.fail("type", fmt::format("another parameter sets the same {} already", isochron::name(spec.type)));
       material_values_.push_back({spec.type, index, first, count});
     }
     bind_values(spec, count);
@@ -178,8 +175,7 @@ void Parameters::bind_values(const ParameterSpec& spec, int count) {
                 fmt::format("lower below upper, within {} to {}", lowest, highest));
     const auto check = [&](double value, const char* key) {
       if (value < lower_[i] || value > upper_[i])
-        spec.fail(key, fmt::format("{} is out of bounds", value),
-                  fmt::format("{} to {}", lower_[i], upper_[i]));
+        spec.fail(key, fmt::format("{} is out of bounds", value), fmt::format("{} to {}", lower_[i], upper_[i]));
     };
     check(initial_[i], "initial");
     check(target_[i], "target");  // NaN, where unknown, passes
@@ -194,8 +190,7 @@ Parameters::VertexField Parameters::vertex_field(const Block& block) const {
       if (motion.direction_kind == VertexDirection::fixed) field.unit = length(motion.direction);
       field.vertices.resize(block.count / field.stride);
       for (std::size_t v = 0; v < motion.slot.size(); ++v)
-        if (motion.slot[v] >= 0)
-          field.vertices[motion.slot[v]] = scene_.shapes[s].first_vertex + static_cast<int>(v);
+        if (motion.slot[v] >= 0) field.vertices[motion.slot[v]] = scene_.shapes[s].first_vertex + static_cast<int>(v);
       return field;
     }
   throw std::logic_error("not a parameter of vertices: " + block.name);
@@ -214,8 +209,7 @@ bool Parameters::target_known() const {
   return std::none_of(target_.begin(), target_.end(), [](double value) { return std::isnan(value); });
 }
 
-Vec3 Parameters::move(int shape_index, int v, const std::vector<double>& theta,
-                      std::vector<Moved>* tangent) const {
+Vec3 Parameters::move(int shape_index, int v, const std::vector<double>& theta, std::vector<Moved>* tangent) const {
   Vec3 p = scene_.positions[scene_.shapes[shape_index].first_vertex + v];
   for (const Motion& motion : motions_[shape_index]) {
     const int slot = motion.slot[v];
@@ -230,8 +224,7 @@ Vec3 Parameters::move(int shape_index, int v, const std::vector<double>& theta,
       const double radians = theta[motion.first_component] * kDegree;
       p = motion.pivot + rotate(p - motion.pivot, motion.direction, radians);
       if (tangent) {
-        for (Moved& earlier : *tangent)
-          earlier.velocity = rotate(earlier.velocity, motion.direction, radians);
+        for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, motion.direction, radians);
         tangent->push_back({motion.first_component, kDegree * cross(motion.direction, p - motion.pivot)});
       }
     } else if (motion.direction_kind == VertexDirection::free) {
@@ -317,8 +310,7 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
     begin = end + 1;
     if (first && item == "initial") continue;
     if (first && item == "target") {
-      if (!target_known())
-        throw InputError("--at target: the experiment gives no target values for its parameters");
+      if (!target_known()) throw InputError("--at target: the experiment gives no target values for its parameters");
       theta = target_;
       continue;
     }
@@ -336,8 +328,7 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
       if (block.name == key) from = block.begin, count = block.count;
     const auto component = std::find(component_names_.begin(), component_names_.end(), key);
     if (component != component_names_.end()) from = static_cast<int>(component - component_names_.begin());
-    if (from < 0)
-      throw InputError(fmt::format("--at {}: no such parameter; allowed: {}", key, names_of(blocks_)));
+    if (from < 0) throw InputError(fmt::format("--at {}: no such parameter; allowed: {}", key, names_of(blocks_)));
     for (int i = from; i < from + count; ++i) {
       if (value < lower_[i] || value > upper_[i])
         throw InputError(

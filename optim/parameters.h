@@ -39,8 +39,8 @@ class Parameters {
   struct VertexField {
     std::string name;
     int begin;
-    int stride;   ///< 3 for free vertices, else 1
-    double unit;  ///< length of the offset per unit of an unknown
+    int stride;                 ///< 3 for free vertices, else 1
+    double unit;                ///< length of the offset per unit of an unknown
     std::vector<int> vertices;  ///< in Scene::positions
   };
   VertexField vertex_field(const Block& block) const;

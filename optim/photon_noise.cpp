@@ -54,8 +54,7 @@ void add_photon_noise(GatedImage& image, double photons, const Stream& stream) {
           value = 0;
           continue;
         }
-        Rng rng(stream, static_cast<std::uint64_t>(pixel),
-                static_cast<std::uint32_t>(g * image.channels + c));
+        Rng rng(stream, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(g * image.channels + c));
         value = poisson(photons * (value / brightest), rng) * (brightest / photons);
       }
 }

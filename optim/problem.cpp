@@ -57,8 +57,7 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
   for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
     const ParameterSpec& spec = experiment_.parameters[i];
     const Parameters::Block& block = parameters_->blocks()[i];
-    if (spec.diffusion > 0)
-      preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
+    if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
     if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
   }
   if (!warning) return;
@@ -96,17 +95,14 @@ GatedImage Problem::read_target(const std::string& file) const {
   const Camera& camera = scene_.camera;
   const auto require = [&](bool equal, const std::string& found, const std::string& wanted) {
     if (!equal)
-      throw InputError(
-          fmt::format("{}: {} in the target images (the experiment has {})", file, found, wanted));
+      throw InputError(fmt::format("{}: {} in the target images (the experiment has {})", file, found, wanted));
   };
   require(image.width == camera.width && image.height == camera.height,
           fmt::format("{} x {} pixels", image.width, image.height),
           fmt::format("{} x {}", camera.width, camera.height));
-  require(image.gates == gates_.size(), fmt::format("{} gates", image.gates),
-          fmt::format("{}", gates_.size()));
+  require(image.gates == gates_.size(), fmt::format("{} gates", image.gates), fmt::format("{}", gates_.size()));
   const int channels = scene_.grey ? 1 : 3;
-  require(image.channels == channels,
-          image.channels == 1 ? "one grey channel (Y)" : "three channels (R, G, B)",
+  require(image.channels == channels, image.channels == 1 ? "one grey channel (Y)" : "three channels (R, G, B)",
           channels == 1 ? "one grey channel, Y" : "three channels, R, G and B");
   return image;
 }
@@ -128,8 +124,7 @@ GatedImage Problem::make_target(const Poll& poll) const {
     poll();
   }
   GatedImage image = mean.mean();
-  if (target.photons > 0)
-    add_photon_noise(image, target.photons, {target.seed, 0, pass_number(Pass::photon_noise)});
+  if (target.photons > 0) add_photon_noise(image, target.photons, {target.seed, 0, pass_number(Pass::photon_noise)});
   return image;
 }
 
@@ -138,8 +133,7 @@ RobustLoss Problem::robust_loss(const GatedImage& target) const {
   return scale > 0 ? RobustLoss{experiment_.loss.kind, scale} : RobustLoss{};
 }
 
-double Problem::loss(const GatedImage& image, const GatedImage& target,
-                     const std::vector<double>& theta) const {
+double Problem::loss(const GatedImage& image, const GatedImage& target, const std::vector<double>& theta) const {
   const double of_image = mean_loss(image, target, robust_loss(target));
   return penalty_.empty() ? of_image : of_image + mean_square(target) * penalty_.value(theta);
 }
@@ -151,8 +145,8 @@ EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) con
   return options;
 }
 
-Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target,
-                             std::uint32_t iteration, const Poll& poll, Share share) const {
+Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
+                             const Poll& poll, Share share) const {
   const SampleSpec& samples = experiment_.samples;
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);

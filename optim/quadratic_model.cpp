@@ -18,16 +18,15 @@ QuadraticModel quadratic_model(const Evaluation& at) {
   Eigen::VectorXd width = bound.diagonal().cwiseMax(0.0).cwiseSqrt();
   for (Eigen::Index i = 0; i < n; ++i)
     if (!(width[i] > 0)) width[i] = 1;
-  const Eigen::MatrixXd relative =
-      width.cwiseInverse().asDiagonal() * unbiased * width.cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd relative = width.cwiseInverse().asDiagonal() * unbiased * width.cwiseInverse().asDiagonal();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(relative);
   Eigen::VectorXd values = eigen.eigenvalues();  // in rising order
   const double largest = std::max(-values[0], values[n - 1]);
   const double least = largest > 0 ? std::max(-values[0], kLeastRatio * largest) : 1;
   values = values.cwiseMax(least);
-  Eigen::MatrixXd curvature =
-      width.asDiagonal() * (eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose()) *
-      width.asDiagonal();
+  Eigen::MatrixXd curvature = width.asDiagonal() *
+                              (eigen.eigenvectors() * values.asDiagonal() * eigen.eigenvectors().transpose()) *
+                              width.asDiagonal();
 
   QuadraticModel model;
   const double unit = 2 * at.loss;

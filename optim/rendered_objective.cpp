@@ -23,9 +23,7 @@ constexpr double kSquareMatrices = 8;
 void add_half(const Problem& problem, const std::vector<double>& theta, std::uint32_t iteration, int half,
               const Poll& poll, JacobianHalves& jacobian) {
   const SampleSpec& samples = problem.experiment().samples;
-  const auto half_of = [&](int count) {
-    return SampleRange{half * ((count + 1) / 2), (half + 1) * ((count + 1) / 2)};
-  };
+  const auto half_of = [&](int count) { return SampleRange{half * ((count + 1) / 2), (half + 1) * ((count + 1) / 2)}; };
   const auto add = [&](int column, const GatedImage& image) {
     double* entry = jacobian.half[half].data() + jacobian.residuals * static_cast<std::size_t>(column);
     for (double value : image.data) *entry++ += value;
@@ -48,8 +46,7 @@ void add_half(const Problem& problem, const std::vector<double>& theta, std::uin
     const Renderer renderer(scene, problem.gates(), problem.estimator(samples.visibility), &basis);
     for (Term term : kTerms) {
       if (samples.term(term) == 0) continue;
-      const auto images =
-          renderer.derive(term, problem.stream(pass_of(term), iteration), half_of(samples.term(term)));
+      const auto images = renderer.derive(term, problem.stream(pass_of(term), iteration), half_of(samples.term(term)));
       for (int i = 0; i < basis.columns; ++i) add(first + i, images[i]);
       poll();
     }
@@ -61,8 +58,7 @@ void add_half(const Problem& problem, const std::vector<double>& theta, std::uin
 void require_jacobian_fits(const Problem& problem) {
   if (problem.experiment().optimizer.method != OptimizerMethod::levenberg_marquardt) return;
   const Camera& camera = problem.scene().camera;
-  const double residuals =
-      1.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
+  const double residuals = 1.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
   const double unknowns = problem.parameters().size();
   const double bytes = 8 * (2 * residuals * unknowns + kSquareMatrices * unknowns * unknowns);
   if (bytes > kMostLinearisationBytes)
@@ -73,8 +69,8 @@ void require_jacobian_fits(const Problem& problem) {
 }
 
 double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {
-  const GatedImage image = problem_.render(theta, problem_.stream(Pass::primal, iteration),
-                                           {0, problem_.experiment().samples.primal});
+  const GatedImage image =
+      problem_.render(theta, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
   poll_();
   return problem_.loss(image, target_, theta);
 }
@@ -86,8 +82,8 @@ Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::ui
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
   const RobustLoss robust = problem_.robust_loss(target_);
   Evaluation result;
-  result.image = problem_.render(theta, problem_.stream(Pass::primal, iteration),
-                                 {0, problem_.experiment().samples.primal});
+  result.image =
+      problem_.render(theta, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
   poll_();
   result.loss = problem_.loss(result.image, target_, theta);
   result.mean_squared_error = mean_loss(result.image, target_);

@@ -79,12 +79,9 @@ class Run {
     loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_));
     loop.warning = options_.warning;
     loop.row = [&](const Evaluation& now, const std::vector<double>& theta, bool closing) {
-      last_ = {state_.iteration + (closing ? 1 : 0),
-               state_.seconds + seconds_since(iteration_start),
-               now.loss,
-               std::sqrt(now.mean_squared_error),
-               parameters_.distance_to_target(theta),
-               norm(now.gradient)};
+      last_ = {
+          state_.iteration + (closing ? 1 : 0), state_.seconds + seconds_since(iteration_start), now.loss,
+          std::sqrt(now.mean_squared_error),    parameters_.distance_to_target(theta),           norm(now.gradient)};
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image);
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
@@ -111,8 +108,8 @@ class Run {
     if (!options_.progress) return;
     const int iterations = problem_.experiment().optimizer.iterations;
     const double each = seconds / (state_.iteration - first + 1);
-    options_.progress({state_.iteration, iterations, last_.loss, last_.param_rmse, each,
-                       each * (iterations - state_.iteration)});
+    options_.progress(
+        {state_.iteration, iterations, last_.loss, last_.param_rmse, each, each * (iterations - state_.iteration)});
   }
 
   const Problem& problem_;

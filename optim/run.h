@@ -24,8 +24,8 @@ struct Progress {
 
 struct RunOptions {
   std::string folder;
-  bool force = false;          ///< overwrite a run that the folder holds (else it is moved aside)
-  std::function<bool()> stop;  ///< asked between passes; true: leave a checkpoint and return
+  bool force = false;                               ///< overwrite a run that the folder holds (else it is moved aside)
+  std::function<bool()> stop;                       ///< asked between passes; true: leave a checkpoint and return
   std::function<void(const Progress&)> progress;    ///< after every row of the log
   std::function<void(const std::string&)> warning;  ///< one line
 };

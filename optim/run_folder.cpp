@@ -13,8 +13,8 @@ namespace {
 /// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run.
 void clear_run(const std::string& folder) {
   for (const char* file :
-       {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml",
-        "target.exr", "initial.exr", "final.exr", "target.png", "initial.png", "final.png", "rmse.png"})
+       {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml", "target.exr",
+        "initial.exr", "final.exr", "target.png", "initial.png", "final.png", "rmse.png"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
 }
 
@@ -37,8 +37,7 @@ std::string set_aside(const std::string& folder) {
 
 }  // namespace
 
-void prepare_run_folder(const std::string& folder, bool force,
-                        const std::function<void(const std::string&)>& warning) {
+void prepare_run_folder(const std::string& folder, bool force, const std::function<void(const std::string&)>& warning) {
   make_output_folder(folder);
   if (!std::filesystem::exists(folder + "/experiment.yaml")) return;
   if (force) {

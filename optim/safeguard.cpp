@@ -1,9 +1,9 @@
 #include "optim/safeguard.h"
 
-#include "optim/vector_math.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "optim/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -64,8 +64,7 @@ bool Safeguard::settles(const std::vector<double>& theta) {
   state_.block.push_back(state_.recent.back());
   if (static_cast<int>(state_.block.size()) < window_ || state_.block_before.empty()) return false;
   const double decrease = mean(state_.block_before) - mean(state_.block);
-  return decrease < std::sqrt(squared_error(state_.block_before) + squared_error(state_.block)) ||
-         decrease <= 0;
+  return decrease < std::sqrt(squared_error(state_.block_before) + squared_error(state_.block)) || decrease <= 0;
 }
 
 Verdict Safeguard::reject() {

@@ -13,8 +13,8 @@ double total_cost(const PerPass& cost, const PerPass& n) {
 }
 
 /// Given the image's samples, the others follow in closed form from the time that is left.
-PerPass split_the_rest(const GradientVariance& v, const PerPass& cost, const std::array<bool, 3>& kept,
-                       double image, double left) {
+PerPass split_the_rest(const GradientVariance& v, const PerPass& cost, const std::array<bool, 3>& kept, double image,
+                       double left) {
   PerPass n{image, 0, 0, 0};
   PerPass root{};
   double sum = 0;

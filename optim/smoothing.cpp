@@ -59,8 +59,7 @@ void Preconditioner::add_diffusion(const Scene& scene, const Parameters::VertexF
   diffusion->stride = field.stride;
   diffusion->count = count;
   diffusion->factors.compute(matrix);
-  if (diffusion->factors.info() != Eigen::Success)
-    throw std::logic_error("diffusion: the matrix is not definite");
+  if (diffusion->factors.info() != Eigen::Success) throw std::logic_error("diffusion: the matrix is not definite");
   impl_->diffusions.push_back(std::move(diffusion));
   impl_->blocks.push_back({field.name, field.begin, field.stride * count});
 }
@@ -79,8 +78,7 @@ void PairPenalty::add_slopes(const Scene& scene, const Parameters::VertexField& 
   const auto edges = edges_of(scene, field);
   for (const auto& [a, b] : edges) {
     const Vec3 along = scene.positions[field.vertices[a]] - scene.positions[field.vertices[b]];
-    const double w =
-        weight * field.unit * field.unit / (dot(along, along) * static_cast<double>(edges.size()));
+    const double w = weight * field.unit * field.unit / (dot(along, along) * static_cast<double>(edges.size()));
     for (int axis = 0; axis < field.stride; ++axis)
       pairs_.push_back({field.begin + field.stride * a + axis, field.begin + field.stride * b + axis, w});
   }
@@ -92,8 +90,7 @@ double PairPenalty::value(const std::vector<double>& theta) const {
   return sum;
 }
 
-void PairPenalty::add_gradient(const std::vector<double>& theta, double scale,
-                               std::vector<double>& gradient) const {
+void PairPenalty::add_gradient(const std::vector<double>& theta, double scale, std::vector<double>& gradient) const {
   for (const Pair& p : pairs_) {
     const double slope = 2 * scale * p.weight * (theta[p.a] - theta[p.b]);
     gradient[p.a] += slope;

@@ -99,15 +99,14 @@ std::string race_csv(const Race& race) {
 }
 
 std::string race_table(const Race& race) {
-  std::string text = fmt::format("{:<20}  {:>16}  {:>22}  {:>24}\n", "method",
-                                 fmt::format("runs below {:.3g} %", 100 * race.error), "core-seconds, median",
-                                 "error at the end");
+  std::string text =
+      fmt::format("{:<20}  {:>16}  {:>22}  {:>24}\n", "method", fmt::format("runs below {:.3g} %", 100 * race.error),
+                  "core-seconds, median", "error at the end");
   for (std::size_t begin = 0, end = 0; begin < race.runs.size(); begin = end) {
     std::vector<double> times, errors;
     for (; end < race.runs.size() && race.runs[end].method == race.runs[begin].method; ++end) {
       const RaceRun& run = race.runs[end];
-      if (const int first = arrival(run, race.error); first >= 0)
-        times.push_back(run.points[first].core_seconds);
+      if (const int first = arrival(run, race.error); first >= 0) times.push_back(run.points[first].core_seconds);
       errors.push_back(100 * run.points.back().error);
     }
     const auto [least, most] = std::minmax_element(errors.begin(), errors.end());

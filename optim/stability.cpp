@@ -58,8 +58,8 @@ double reconstruct(const Problem& problem, const GatedImage& target, int iterati
   return parameters.distance_to_target(state.theta) / before;
 }
 
-StabilityCell map_cell(MethodRun& run, const GatedImage& target, const Reference& reference,
-                       double core_seconds, const StabilityOptions& options) {
+StabilityCell map_cell(MethodRun& run, const GatedImage& target, const Reference& reference, double core_seconds,
+                       const StabilityOptions& options) {
   const std::vector<double> theta = run.problem().parameters().initial();
   const SampleTrial trial = try_samples(run, theta, target, 1, core_seconds, options.poll);
   const int step = trial.last_within(core_seconds, 1);
@@ -71,8 +71,7 @@ StabilityCell map_cell(MethodRun& run, const GatedImage& target, const Reference
     run.set_factor(cell.factor);
     double time = std::numeric_limits<double>::infinity();
     for (std::uint32_t i = 0; i < 2; ++i)
-      time =
-          std::min(time, run.gradient(theta, target, kEstimates + 2 * round + i, options.poll).core_seconds);
+      time = std::min(time, run.gradient(theta, target, kEstimates + 2 * round + i, options.poll).core_seconds);
     cell.factor = std::max(run.least_factor(), cell.factor * std::clamp(core_seconds / time, 0.25, 4.0));
   }
   run.set_factor(cell.factor);
@@ -117,8 +116,7 @@ Direction direction(const Repeats& estimates, const Reference& reference) {
   result.cosine.standard_error =
       std::sqrt(std::max(0.0, squares - result.cosine.value * result.cosine.value) / (n - 1));
   const Measured& square = reference.norm2;
-  const double norm2 =
-      resolved(reference) ? square.value : std::max(0.0, square.value) + 2 * square.standard_error;
+  const double norm2 = resolved(reference) ? square.value : std::max(0.0, square.value) + 2 * square.standard_error;
   result.variance = total_variance(estimates);
   const WeightedRepeats groups[] = {{&estimates, 1}, {&reference.repeats, -1}};
   result.bias2 = squared_norm(groups);
@@ -172,15 +170,14 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     map.notes.push_back(fmt::format("{} unknowns: no finite differences", theta.size()));
   }
   const double of_width = options.core_seconds / static_cast<double>(options.widths.size());
-  const double of_gradient = (1 - kReferenceShare - kTargetShare) * of_width /
-                             static_cast<double>(methods.size()) / (kEstimates + options.iterations);
+  const double of_gradient = (1 - kReferenceShare - kTargetShare) * of_width / static_cast<double>(methods.size()) /
+                             (kEstimates + options.iterations);
   for (double width : options.widths) {
     options.progress(fmt::format("width {:.3g}", width));
     Experiment narrow = experiment;
     narrow.gates = with_relative_width(experiment.gates, width);
     const GatedImage target = quick_target(narrow, kTargetShare * of_width, options.poll);
-    const Reference reference =
-        make_reference(narrow, theta, target, kReferenceShare * of_width, options.poll);
+    const Reference reference = make_reference(narrow, theta, target, kReferenceShare * of_width, options.poll);
     // All take the time that the slowest needs for its least number of samples, if that is more.
     std::deque<MethodRun> runs;
     double time = of_gradient;
@@ -205,10 +202,9 @@ std::string stability_csv(const Stability& map) {
       "error_ratio,reference_error,failure\n";
   for (const StabilityCell& c : map.cells) {
     const Direction& d = c.direction;
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", c.width, c.method, c.factor,
-                        c.core_seconds, d.positive, d.cosine.value, d.cosine.standard_error, d.zero,
-                        d.variance.value, d.bias2.value, d.bias2.standard_error, c.error_ratio,
-                        c.reference_error, name(c.failure));
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", c.width, c.method, c.factor, c.core_seconds,
+                        d.positive, d.cosine.value, d.cosine.standard_error, d.zero, d.variance.value, d.bias2.value,
+                        d.bias2.standard_error, c.error_ratio, c.reference_error, name(c.failure));
   }
   return text;
 }
@@ -224,10 +220,9 @@ std::string stability_table(const Stability& map) {
     const bool first = i == 0 || map.cells[i - 1].width != c.width;
     const bool last = i + 1 == map.cells.size() || map.cells[i + 1].width != c.width;
     if (first) text += fmt::format("{:<9.3g}", c.width);
-    text += fmt::format(
-        "  {:<{}}",
-        fmt::format("{:.0f} % {:.3g} {}", 100 * c.direction.positive, c.error_ratio, name(c.failure)),
-        kWidth);
+    text += fmt::format("  {:<{}}",
+                        fmt::format("{:.0f} % {:.3g} {}", 100 * c.direction.positive, c.error_ratio, name(c.failure)),
+                        kWidth);
     if (last) text += "\n";
   }
   text += fmt::format(

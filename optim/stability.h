@@ -55,8 +55,7 @@ struct StabilityCell {
   double factor = 0;        ///< samples, in units of the experiment's
   double core_seconds = 0;  ///< of a gradient
   Direction direction;
-  double error_ratio =
-      0;  ///< parameters' RMS error at the end over that at the start; NaN without target values
+  double error_ratio = 0;  ///< parameters' RMS error at the end over that at the start; NaN without target values
   Failure failure = Failure::none;
   double reference_error = 0;
 };

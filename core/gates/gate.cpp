@@ -55,8 +55,7 @@ void GateShape::set_gaussian(double sigma, double cut) {
   exponent_ = -0.5 * std::numbers::log2e / sigma / sigma;
   slope_factor_ = -1 / sigma / sigma;
   const double smooth = -std::expm1(-0.5 * reach * reach);
-  segments_.push_back(
-      {peak_ * smooth, {Side::Form::rayleigh, -sigma, smooth}, {Side::Form::rayleigh, sigma, smooth}});
+  segments_.push_back({peak_ * smooth, {Side::Form::rayleigh, -sigma, smooth}, {Side::Form::rayleigh, sigma, smooth}});
 }
 
 GateShape GateShape::gaussian(double sigma) {
@@ -83,9 +82,8 @@ GateShape GateShape::truncated_gaussian(double sigma, double half_width) {
     shape.outside_ = 0.5 * std::erfc(c * std::sqrt(0.5));
     shape.mass_ = std::erf(c * std::sqrt(0.5));
     shape.width_ = sigma * std::sqrt(truncated_variance(c));
-    shape.segments_.push_back({shape.peak_ * std::exp(-0.5 * c * c),
-                               {Side::Form::atom, -half_width, 0},
-                               {Side::Form::atom, half_width, 0}});
+    shape.segments_.push_back(
+        {shape.peak_ * std::exp(-0.5 * c * c), {Side::Form::atom, -half_width, 0}, {Side::Form::atom, half_width, 0}});
   }
   shape.finish_parts();
   return shape;
@@ -99,8 +97,7 @@ GateShape GateShape::boxcar(double width) {
   shape.upper_ = 0.5 * width;
   shape.width_ = width / std::sqrt(12.0);
   shape.peak_ = 1 / width;
-  shape.segments_.push_back(
-      {shape.peak_, {Side::Form::atom, shape.lower_, 0}, {Side::Form::atom, shape.upper_, 0}});
+  shape.segments_.push_back({shape.peak_, {Side::Form::atom, shape.lower_, 0}, {Side::Form::atom, shape.upper_, 0}});
   shape.finish_parts();
   return shape;
 }
@@ -173,10 +170,7 @@ void GateShape::finish_parts() {
 }
 
 GateSet::GateSet(GateShape shape, std::vector<double> centers)
-    : shape_(std::move(shape)),
-      centers_(std::move(centers)),
-      sorted_(centers_.size()),
-      order_(centers_.size()) {
+    : shape_(std::move(shape)), centers_(std::move(centers)), sorted_(centers_.size()), order_(centers_.size()) {
   if (centers_.empty()) throw InputError("a gate needs at least one centre");
   for (const double c : centers_) {
     if (!std::isfinite(c)) throw InputError("gate centres must be finite");

@@ -45,9 +45,7 @@ class GateShape {
   GateKind kind() const { return kind_; }
   bool is_steady() const { return kind_ == GateKind::steady; }
   /// Gaussian inside the support: the two kinds for which `gaussian_value` holds.
-  bool is_gaussian_inside() const {
-    return kind_ == GateKind::gaussian || kind_ == GateKind::truncated_gaussian;
-  }
+  bool is_gaussian_inside() const { return kind_ == GateKind::gaussian || kind_ == GateKind::truncated_gaussian; }
   /// Support [lower, upper] beyond which the value is zero (gaussian: below double rounding of its peak).
   double lower() const { return lower_; }
   double upper() const { return upper_; }
@@ -117,12 +115,10 @@ class GateShape {
 
   /// Interval [i, i+1] of the table that holds x in [lower, upper]; never one of zero length.
   int table_interval(double x) const {
-    const int bucket =
-        std::min(static_cast<int>((x - lower_) * bucket_scale_), static_cast<int>(guide_.size()) - 2);
+    const int bucket = std::min(static_cast<int>((x - lower_) * bucket_scale_), static_cast<int>(guide_.size()) - 2);
     // The guide narrows the search to the knots of one bucket: one or two for evenly spaced tables.
     const auto first = offsets_.begin();
-    const int i =
-        static_cast<int>(std::upper_bound(first + guide_[bucket], first + guide_[bucket + 1], x) - first);
+    const int i = static_cast<int>(std::upper_bound(first + guide_[bucket], first + guide_[bucket + 1], x) - first);
     return std::min(i - 1, last_interval_);
   }
 
@@ -133,7 +129,7 @@ class GateShape {
   double outside_ = 0;                                  ///< gaussian kinds: mass cut off on either side
   std::vector<double> offsets_, values_, cumulative_;   ///< table: knots, values, integral up to the knot
   std::vector<double> slopes_;                          ///< of the interval after the knot; zero at a jump
-  std::vector<int> guide_;  ///< bucket -> number of knots in the buckets before it
+  std::vector<int> guide_;                              ///< bucket -> number of knots in the buckets before it
   double bucket_scale_ = 0;
   int last_interval_ = 0;
   std::vector<Segment> segments_;

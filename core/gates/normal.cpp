@@ -43,8 +43,7 @@ double normal_quantile_lower(double tail, double from_half) {
   const double x = approximate_quantile(tail, from_half);
   // One Halley step on the side where the residual keeps its relative accuracy.
   const double scaled = x * std::sqrt(0.5);
-  const double residual =
-      tail < kCentralFrom ? 0.5 * std::erfc(-scaled) - tail : 0.5 * std::erf(scaled) - from_half;
+  const double residual = tail < kCentralFrom ? 0.5 * std::erfc(-scaled) - tail : 0.5 * std::erf(scaled) - from_half;
   const double step = residual * std::sqrt(kTwoPi) * std::exp(0.5 * x * x);
   return x - step / (1 + 0.5 * x * step);
 }

@@ -24,8 +24,7 @@ inline double fast_exp2(double y) {
   p = p * r + 2.4022650695910071233e-1;
   p = p * r + 6.9314718055994530942e-1;
   p = p * r + 1.0;
-  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(p) +
-                               (std::bit_cast<std::uint64_t>(shifted) << 52));
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(p) + (std::bit_cast<std::uint64_t>(shifted) << 52));
 }
 
 /// The x at which the standard normal's distribution function is P, given twice over so that neither the

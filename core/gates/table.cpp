@@ -29,8 +29,7 @@ GateShape GateShape::tabulated(std::vector<double> offsets, std::vector<double> 
   shape.kind_ = GateKind::tabulated;
   // Of several points at one offset only the first and the last matter: the limits from either side.
   for (std::size_t i = 0; i < offsets.size(); ++i) {
-    const bool inside =
-        i > 0 && i + 1 < offsets.size() && offsets[i] == offsets[i - 1] && offsets[i] == offsets[i + 1];
+    const bool inside = i > 0 && i + 1 < offsets.size() && offsets[i] == offsets[i - 1] && offsets[i] == offsets[i + 1];
     if (inside) continue;
     shape.offsets_.push_back(offsets[i]);
     shape.values_.push_back(values[i]);
@@ -62,20 +61,17 @@ void GateShape::index_table() {
   cumulative_.assign(n, 0.0);
   const auto integrate = [this, n] {
     for (int i = 0; i + 1 < n; ++i) {
-      cumulative_[i + 1] =
-          cumulative_[i] + 0.5 * (values_[i] + values_[i + 1]) * (offsets_[i + 1] - offsets_[i]);
+      cumulative_[i + 1] = cumulative_[i] + 0.5 * (values_[i] + values_[i + 1]) * (offsets_[i + 1] - offsets_[i]);
     }
     return cumulative_.back();
   };
   const double area = integrate();
-  if (!(area > 0 && std::isfinite(area)))
-    throw InputError("a gate's table must enclose a positive, finite area");
+  if (!(area > 0 && std::isfinite(area))) throw InputError("a gate's table must enclose a positive, finite area");
   for (double& v : values_) v /= area;
   integrate();
   slopes_.assign(n, 0.0);
   for (int i = 0; i <= last_interval_; ++i) {
-    if (offsets_[i] < offsets_[i + 1])
-      slopes_[i] = (values_[i + 1] - values_[i]) / (offsets_[i + 1] - offsets_[i]);
+    if (offsets_[i] < offsets_[i + 1]) slopes_[i] = (values_[i + 1] - values_[i]) / (offsets_[i + 1] - offsets_[i]);
   }
 
   // Mean and variance by Simpson's rule, exact for the cubics at hand; lengths relative to the middle.
@@ -86,8 +82,7 @@ void GateShape::index_table() {
     for (int i = 0; i + 1 < n; ++i) {
       const double a = offsets_[i], b = offsets_[i + 1];
       sum += (b - a) / 6 *
-             (f(a, values_[i]) + f(b, values_[i + 1]) +
-              4 * f(a + 0.5 * (b - a), 0.5 * (values_[i] + values_[i + 1])));
+             (f(a, values_[i]) + f(b, values_[i + 1]) + 4 * f(a + 0.5 * (b - a), 0.5 * (values_[i] + values_[i + 1])));
     }
     return sum;
   };
@@ -132,8 +127,7 @@ void GateShape::couple_quantiles(const std::vector<Piece>& plus, const std::vect
   double mass = 0, minus_mass = 0;
   const std::vector<double> plus_ends = fractions(plus, mass), minus_ends = fractions(minus, minus_mass);
   // Breakpoints of the two sides that are equal but for rounding count as one.
-  const double tolerance =
-      4 * std::numeric_limits<double>::epsilon() * static_cast<double>(plus.size() + minus.size());
+  const double tolerance = 4 * std::numeric_limits<double>::epsilon() * static_cast<double>(plus.size() + minus.size());
 
   const auto stretch = [](const Side& side, double start, double end, double from, double to) {
     if (side.form != Side::Form::uniform) return side;

@@ -78,8 +78,7 @@ double EllipseArcs::angle(double u) const {
   return start[i] + rest;
 }
 
-bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2,
-                  EllipseArcs& arcs) {
+bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs) {
   arcs.count = 0;
   arcs.total_span = 0;
   if (!ellipsoid.valid()) return false;
@@ -132,11 +131,9 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   const Vec2 p0{dot(w0, x_axis), dot(w0, y_axis)};
   if (p0.y >= radius) return false;
   // The third vertex' height from the triangle's area: a dot product would lose the digits of a sliver.
-  const Vec2 to_third{dot(d2, x_axis),
-                      mapped_length * inverse_major * inverse_minor * inverse_minor * inverse_length};
+  const Vec2 to_third{dot(d2, x_axis), mapped_length * inverse_major * inverse_minor * inverse_minor * inverse_length};
   const Vec2 vertices[3] = {p0, {p0.x + edge1_length, p0.y}, {p0.x + to_third.x, p0.y + to_third.y}};
-  const Vec2 directions[3] = {
-      {edge1_length, 0}, {to_third.x - edge1_length, to_third.y}, {-to_third.x, -to_third.y}};
+  const Vec2 directions[3] = {{edge1_length, 0}, {to_third.x - edge1_length, to_third.y}, {-to_third.x, -to_third.y}};
 
   EdgeCrossing edges[3];
   for (int i = 0; i < 3; ++i) {
@@ -144,13 +141,12 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
     EdgeCrossing& edge = edges[i];
     edge.direction = directions[i];
     edge.height = cross(vertices[i], directions[i]);
-    const double half_squared =
-        radius_squared * dot(directions[i], directions[i]) - edge.height * edge.height;
+    const double half_squared = radius_squared * dot(directions[i], directions[i]) - edge.height * edge.height;
     if (half_squared <= 0 && edge.height < 0) return false;
     // Both edges at a vertex read the same inside flag, so starts and ends of arcs alternate whatever the
     // round-off.
-    const bool dips_in = !inside[i] && !inside[j] && half_squared > 0 &&
-                         dot(vertices[i], directions[i]) < 0 && dot(vertices[j], directions[i]) > 0;
+    const bool dips_in = !inside[i] && !inside[j] && half_squared > 0 && dot(vertices[i], directions[i]) < 0 &&
+                         dot(vertices[j], directions[i]) > 0;
     edge.arc_starts = !inside[j] && (inside[i] || dips_in);
     edge.arc_ends = !inside[i] && (inside[j] || dips_in);
     if (edge.arc_starts || edge.arc_ends) edge.half = std::sqrt(std::max(half_squared, 0.0));
@@ -179,8 +175,7 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   return true;
 }
 
-double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi,
-                                 const Vec3& n) {
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n) {
   // With p = q - centre, the surface is Q(p) = p.Kp = 1 and u_a + u_b = 2 major minor^2 Kp / (|q-a| |q-b|).
   // The arcs' centre is K-conjugate to the plane, so only the part v = e1 cos + e2 sin of p has an in-plane
   // gradient; it is conjugate to w = dq/dphi, and v.Kv = r^2 with r the circle's radius gives |P_T Kv| = r^2

@@ -38,13 +38,11 @@ struct EllipseArcs {
 
 /// Intersects the ellipsoid with triangle (v0, v1, v2). False when they do not meet in an arc of positive
 /// length, when the triangle has no area, and when a coordinate is not finite.
-bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2,
-                  EllipseArcs& arcs);
+bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs);
 
 /// dA / (dphi dtau) at q(phi): |dq/dphi| / |P_T (u_a + u_b)|, in length units, with n the triangle's unit
 /// normal. Stays bounded where the ellipse shrinks to a point: it equals |q-a| |q-b| / sqrt(tau^2 - |P_T
 /// (b-a)|^2).
-double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi,
-                                 const Vec3& n);
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n);
 
 }  // namespace isochron

@@ -37,9 +37,7 @@ struct QuadraticForm {
     k = inverse_minor2 - 1 / (e.major * e.major);
   }
   /// From |r|^2 and (r.u)^2, or with products of two points the bilinear form.
-  double operator()(double squared, double axial_squared) const {
-    return squared * inverse_minor2 - axial_squared * k;
-  }
+  double operator()(double squared, double axial_squared) const { return squared * inverse_minor2 - axial_squared * k; }
 };
 
 }  // namespace
@@ -47,8 +45,8 @@ struct QuadraticForm {
 struct EllipsoidBvh::Shell {
   Vec3 center, axis;
   QuadraticForm high, low;
-  double inside;    ///< Q_high of points that may be inside the outer ellipsoid is at most this
-  double outside;   ///< Q_low of points that may be outside the inner ellipsoid is at least this
+  double inside;   ///< Q_high of points that may be inside the outer ellipsoid is at most this
+  double outside;  ///< Q_low of points that may be outside the inner ellipsoid is at least this
   /// Where Q_low exceeds the first and Q_high is below the second, points are strictly between the two ellipsoids.
   double between_low, between_high;
   Ellipsoid outer;  ///< the outer ellipsoid, grown by the round-off of positions
@@ -60,8 +58,7 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
   const QuadraticForm high = shell.high, low = shell.low;
   Wide lowest_bound, lowest_vertex, highest_vertex, lowest_of_low, highest_of_high;
   for (int i = 0; i < kWidth; ++i) {
-    const Vec3 r0 = block.vertex[0].get(i) - c, r1 = block.vertex[1].get(i) - c,
-               r2 = block.vertex[2].get(i) - c;
+    const Vec3 r0 = block.vertex[0].get(i) - c, r1 = block.vertex[1].get(i) - c, r2 = block.vertex[2].get(i) - c;
     const double x0 = dot(r0, u), x1 = dot(r1, u), x2 = dot(r2, u);
     const double s0 = dot(r0, r0), s1 = dot(r1, r1), s2 = dot(r2, r2);
     const double s01 = dot(r0, r1), s12 = dot(r1, r2), s20 = dot(r2, r0);
@@ -89,16 +86,15 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
   for (int i = 0; i < kWidth; ++i) {
     reported[i] = (lowest_bound.lane[i] <= shell.inside) & (highest_vertex.lane[i] >= shell.outside);
     if constexpr (kSurfaces)
-      reported[i] &=
-          !((lowest_of_low.lane[i] > shell.between_low) & (highest_of_high.lane[i] < shell.between_high));
+      reported[i] &= !((lowest_of_low.lane[i] > shell.between_low) & (highest_of_high.lane[i] < shell.between_high));
     uncertain += reported[i] & (lowest_vertex.lane[i] > shell.inside);
   }
   for (int i = 0; uncertain > 0; ++i) {
     if (!reported[i] || !(lowest_vertex.lane[i] > shell.inside)) continue;
     // No vertex inside the outer ellipsoid: they cross only if the triangle's plane or edges reach into it.
     EllipseArcs arcs;
-    reported[i] = clip_ellipse(shell.outer, block.vertex[0].get(i), block.vertex[1].get(i),
-                               block.vertex[2].get(i), arcs);
+    reported[i] =
+        clip_ellipse(shell.outer, block.vertex[0].get(i), block.vertex[1].get(i), block.vertex[2].get(i), arcs);
     --uncertain;
   }
   int found[kWidth], count = 0;
@@ -121,8 +117,7 @@ int EllipsoidBvh::Impl::test_node(const Node& node, const Shell& shell, int* lan
     // |h|^2 / minor^2.
     const auto slope = [&](const QuadraticForm& form) {
       const Vec3 half_gradient = r * form.inverse_minor2 - u * (x * form.k);
-      return 2 * (std::abs(half_gradient.x) * h.x + std::abs(half_gradient.y) * h.y +
-                  std::abs(half_gradient.z) * h.z);
+      return 2 * (std::abs(half_gradient.x) * h.x + std::abs(half_gradient.y) * h.y + std::abs(half_gradient.z) * h.z);
     };
     const double slope_high = slope(high), slope_low = slope(low), farthest = squared + dot(h, h);
     lowest.lane[i] = high(squared, x * x) - slope_high;
@@ -232,8 +227,8 @@ int thin(Entry* entries, int n, int kept, double u) {
 }  // namespace
 
 template <bool kSurfaces>
-void EllipsoidBvh::Impl::visit_some(const Shell& shell, const Focus& a, const Focus& b, double u,
-                                    std::vector<int>& ids, std::vector<double>& inverse_probability) const {
+void EllipsoidBvh::Impl::visit_some(const Shell& shell, const Focus& a, const Focus& b, double u, std::vector<int>& ids,
+                                    std::vector<double>& inverse_probability) const {
   Entry entries[kWidth * (kKept + 1)], next[kWidth * (kKept + 1)];
   int size = 1;
   entries[0] = {0, 1, 1};
@@ -269,14 +264,13 @@ void EllipsoidBvh::Impl::visit_some(const Shell& shell, const Focus& a, const Fo
   }
 }
 
-int EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
-                        std::vector<int>& ids) const {
+int EllipsoidBvh::query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const {
   const auto shell = make_shell(a, b, tau_low, tau_high);
   return shell ? impl_->visit<false>(*shell, ids) : 0;
 }
 
 int EllipsoidBvh::query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high,
-                                  std::vector<int>& ids) const {
+                                 std::vector<int>& ids) const {
   const auto shell = make_shell(a, b, tau_low, tau_high);
   if (!shell) return 0;
   // Nothing is between equal lengths, and of a coarse mesh's triangles few are: the simpler tests do.
@@ -313,9 +307,7 @@ std::optional<EllipsoidBvh::Shell> EllipsoidBvh::make_shell(const Vec3& a, const
   const double reach = length(middle - outer.center) + radius + outer.major;
   const double magnitude = reach + length(middle) + radius + length(a) + length(b);
   const double round_off = 64 * std::numeric_limits<double>::epsilon();
-  const auto slack = [&](const QuadraticForm& form) {
-    return 4 * round_off * reach * magnitude * form.inverse_minor2;
-  };
+  const auto slack = [&](const QuadraticForm& form) { return 4 * round_off * reach * magnitude * form.inverse_minor2; };
   shell.inside = 1 + slack(shell.high);
   shell.outside = inner.valid() ? 1 - slack(shell.low) : -kInfinity;
   shell.between_low = inner.valid() ? 1 + slack(shell.low) : -kInfinity;

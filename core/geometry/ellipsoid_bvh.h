@@ -43,8 +43,8 @@ class EllipsoidBvh {
   /// A random choice of the triangles of `query_surfaces` between the foci's cones, where a fine mesh has many: as many
   /// as make up a few leaves, at a cost that grows with the hierarchy's depth alone. Appends to `ids` and, of the same
   /// length, one over each triangle's probability, which favours what is near the foci. `u`: uniform in (0, 1).
-  void sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u,
-                       std::vector<int>& ids, std::vector<double>& inverse_probability) const;
+  void sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u, std::vector<int>& ids,
+                       std::vector<double>& inverse_probability) const;
 
  private:
   struct Shell;

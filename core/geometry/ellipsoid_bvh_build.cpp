@@ -59,9 +59,8 @@ EllipsoidBvh::Impl::Item* EllipsoidBvh::Impl::split(const Range& range) {
     }
   }
   if (best_axis < 0) return range.first + (range.second - range.first) / 2;  // all centres coincide
-  return std::stable_partition(range.first, range.second, [&](const Item& item) {
-    return bin_of(item, best_axis, best_scale) < best_bin;
-  });
+  return std::stable_partition(range.first, range.second,
+                               [&](const Item& item) { return bin_of(item, best_axis, best_scale) < best_bin; });
 }
 
 int EllipsoidBvh::Impl::make_block(const std::vector<Input>& triangles, const Range& range) {
@@ -70,8 +69,7 @@ int EllipsoidBvh::Impl::make_block(const std::vector<Input>& triangles, const Ra
   for (int lane = 0; lane < kWidth; ++lane) {
     const bool used = lane < range.second - range.first;
     const Input* input = used ? &triangles[static_cast<std::size_t>(range.first[lane].index)] : nullptr;
-    for (std::size_t v = 0; v < 3; ++v)
-      block.vertex[v].set(lane, used ? input->vertex[v] : Vec3{nan, nan, nan});
+    for (std::size_t v = 0; v < 3; ++v) block.vertex[v].set(lane, used ? input->vertex[v] : Vec3{nan, nan, nan});
     block.id[lane] = used ? input->id : -1;
   }
   blocks.push_back(block);
@@ -109,8 +107,7 @@ int EllipsoidBvh::Impl::make_node(const std::vector<Input>& triangles, const Ran
       // Round-off in the centre is covered by the query's slack; the box must only not shrink by itself.
       for (int k = 0; k < 3; ++k) half[k] = std::max(half[k], center[k] - box.low[k]);
       const bool leaf = children[i].second - children[i].first <= kWidth;
-      node.child[lane] =
-          leaf ? make_block(triangles, children[i]) : make_node(triangles, children[i], depth + 1);
+      node.child[lane] = leaf ? make_block(triangles, children[i]) : make_node(triangles, children[i], depth + 1);
     }
     node.center.set(lane, center);
     node.half.set(lane, half);
@@ -125,9 +122,7 @@ EllipsoidBvh& EllipsoidBvh::operator=(EllipsoidBvh&&) noexcept = default;
 EllipsoidBvh::~EllipsoidBvh() = default;
 
 EllipsoidBvh::EllipsoidBvh(const std::vector<Input>& triangles) {
-  const auto finite = [](const Vec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-  };
+  const auto finite = [](const Vec3& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); };
   std::vector<Impl::Item> items;
   items.reserve(triangles.size());
   Bounds bounds;

@@ -75,9 +75,8 @@ std::optional<ChannelName> parse_channel(std::string_view name) {
   std::from_chars(name.data() + kPrefix.size(), name.data() + name.size() - 2, gate);
   // Writing it again catches everything but the one way to name a gate.
   if (gate < 0 || gate_channel(gate, letter) != name) return {};
-  return std::string_view("RGBY").find(letter) == std::string_view::npos
-             ? std::nullopt
-             : std::optional(ChannelName{gate, letter});
+  return std::string_view("RGBY").find(letter) == std::string_view::npos ? std::nullopt
+                                                                         : std::optional(ChannelName{gate, letter});
 }
 
 /// Checks that the channels are those of whole gates without a gap; sets `gates` and `channels`.
@@ -113,8 +112,7 @@ GatedImage read_planes(const std::string& file) {
   stream.str(read_checked_exr(file));
   Imf::InputFile input(stream);
   const auto& window = input.header().dataWindow();
-  if (window != input.header().displayWindow())
-    fail(file, "is cropped (data window and display window differ)");
+  if (window != input.header().displayWindow()) fail(file, "is cropped (data window and display window differ)");
   GatedImage image;
   check_channels(file, input.header().channels(), image);
   image.width = window.max.x - window.min.x + 1;
@@ -126,8 +124,8 @@ GatedImage read_planes(const std::string& file) {
   for (std::size_t p = 0; p < planes; ++p) {
     const int gate = static_cast<int>(p) / image.channels, channel = static_cast<int>(p) % image.channels;
     // One row for all scanlines (no stride in y); pixels beside each other as in the image.
-    char* base = reinterpret_cast<char*>(row.data() + p) -
-                 sizeof(float) * planes * static_cast<std::ptrdiff_t>(window.min.x);
+    char* base =
+        reinterpret_cast<char*>(row.data() + p) - sizeof(float) * planes * static_cast<std::ptrdiff_t>(window.min.x);
     buffer.insert(gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[channel]),
                   Imf::Slice(Imf::FLOAT, base, sizeof(float) * planes, 0));
   }

@@ -81,8 +81,7 @@ std::string read_checked_exr(const std::string& file) {
       if (required.name == name) known = &required;
     if (known == nullptr) {
       if (!type.empty()) contents[static_cast<std::size_t>(type.data() - contents.data())] = '\1';
-    } else if (known->type != type ||
-               (known->size != 0 ? value.size() != known->size : !is_list_of_channels(value))) {
+    } else if (known->type != type || (known->size != 0 ? value.size() != known->size : !is_list_of_channels(value))) {
       throw std::runtime_error("its attribute " + std::string(name) + " is damaged");
     }
   }

@@ -12,8 +12,7 @@ struct GatedImage {
 
   GatedImage() = default;
   GatedImage(int w, int h, int g, int c)
-      : width(w), height(h), gates(g), channels(c),
-        data(static_cast<std::size_t>(w) * h * g * c, 0.0) {}
+      : width(w), height(h), gates(g), channels(c), data(static_cast<std::size_t>(w) * h * g * c, 0.0) {}
   int pixels() const { return width * height; }
   std::size_t index(int pixel, int gate, int channel = 0) const {
     return (static_cast<std::size_t>(pixel) * gates + gate) * channels + channel;

@@ -5,7 +5,9 @@
 namespace isochron::detail {
 namespace {
 
-double square(double x) { return x * x; }
+double square(double x) {
+  return x * x;
+}
 
 /// Fresnel's reflectance of a smooth face between the side `front` of a dielectric and the other, unpolarised.
 struct Fresnel {
@@ -49,9 +51,7 @@ struct Masking {
         size(std::abs(cosine)),
         root(smith_root(alpha * alpha, size)),
         denominator(size + root) {}
-  double by_cosine() const {
-    return std::copysign(1 + (1 - alpha) * (1 + alpha) * size / root, cosine) / denominator;
-  }
+  double by_cosine() const { return std::copysign(1 + (1 - alpha) * (1 + alpha) * size / root, cosine) / denominator; }
   double by_alpha() const { return alpha * (1 - size) * (1 + size) / (root * denominator); }
 
   double alpha, cosine, size, root, denominator;
@@ -74,18 +74,21 @@ struct Refraction {
     excess = std::max(q - p * p, 0.0);  // round-off may take it below zero
     t = a2 * p * p + excess;
     if (!(p > 0 && outside > 0 && inside > 0 && t > 0)) return;
-    value = 2 * ior * a2 * kInvPi * square(outside * inside / (contrast * (ior + 1) * t)) *
-            (1 + 1 / (cos_io * cos_io));
+    value = 2 * ior * a2 * kInvPi * square(outside * inside / (contrast * (ior + 1) * t)) * (1 + 1 / (cos_io * cos_io));
   }
   double ior, sign, cosine;
   double cos_in, p, outside, inside, excess, t;
   double value = 0;  ///< transmittance D (H.w_out) (-H.w_in) / q^2
 };
 
-double index_of_side(const Material& material, double cosine) { return cosine > 0 ? 1 : material.ior; }
+double index_of_side(const Material& material, double cosine) {
+  return cosine > 0 ? 1 : material.ior;
+}
 
 /// Cosine of incidence on the half vector of a reflection.
-double incidence(double cos_io) { return std::sqrt(0.5 * (1 + cos_io)); }
+double incidence(double cos_io) {
+  return std::sqrt(0.5 * (1 + cos_io));
+}
 
 }  // namespace
 
@@ -137,8 +140,8 @@ LobeDerivative dielectric_lobe_derivative(const Material& material, double cos_i
   const double ior = r.ior, by_p = 4 * b2 * r.p * r.sign / r.t;  // sign: d p / d cosine, of the outside, is -sign
   result.d_cos_i -= by_p * index_of_side(material, cos_i);
   result.d_cos_o -= by_p * index_of_side(material, cos_o);
-  result.d_cos_io = 2 * r.sign * (1 / r.inside - ior / r.outside) - 2 / (cos_io * (1 + cos_io * cos_io)) -
-                    4 * ior / r.t;
+  result.d_cos_io =
+      2 * r.sign * (1 / r.inside - ior / r.outside) - 2 / (cos_io * (1 + cos_io * cos_io)) - 4 * ior / r.t;
   result.d_roughness += 2 * (r.excess - a2 * r.p * r.p) / (alpha * r.t);
   result.d_ior = (cos_o > 0 ? 1 : 3) / ior + 2 * r.sign * (1 / r.inside - cos_io / r.outside) -
                  4 * ior / ((ior - 1) * (ior + 1)) - 4 * (ior + cos_io) / r.t + by_p * r.cos_in;

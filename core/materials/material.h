@@ -94,8 +94,7 @@ std::optional<DirectionSample> dielectric_sample(const Material& material, const
 /// Lobe value in 1/sr, without cosine and albedo; zero where nothing is scattered (below the surface). For
 /// `two_sided` materials a pair of negative cosines counts as a pair of positive ones.
 inline double lobe(const Material& material, double cos_i, double cos_o, double cos_io) {
-  if (material.type == MaterialType::rough_dielectric)
-    return detail::dielectric_lobe(material, cos_i, cos_o, cos_io);
+  if (material.type == MaterialType::rough_dielectric) return detail::dielectric_lobe(material, cos_i, cos_o, cos_io);
   if (!detail::face_forward(material, cos_i, cos_o)) return 0;
   if (material.type == MaterialType::diffuse) return kInvPi;
   const double a2 = material.roughness * material.roughness;
@@ -112,8 +111,7 @@ LobeDerivative lobe_derivative(const Material& material, double cos_i, double co
 /// Density per solid angle with which `sample_direction` draws w_i given w_o. Integrates to less than one
 /// where some draws end below the surface and are dropped. With cos_i and cos_o exchanged: the density of w_o given w_i.
 inline double direction_pdf(const Material& material, double cos_i, double cos_o, double cos_io) {
-  if (material.type == MaterialType::rough_dielectric)
-    return detail::dielectric_pdf(material, cos_i, cos_o, cos_io);
+  if (material.type == MaterialType::rough_dielectric) return detail::dielectric_pdf(material, cos_i, cos_o, cos_io);
   if (!detail::face_forward(material, cos_i, cos_o)) return 0;
   if (material.type == MaterialType::diffuse) return cos_i * kInvPi;
   // Visible normals: D G1(w_o) / (4 cos_o), G1 = 2 cos_o / (cos_o + root_o).

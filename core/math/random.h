@@ -60,8 +60,8 @@ class Rng {
   /// Uniform in the open interval (0, 1), with 32 random bits.
   double uniform() {
     if (used_ == 4) {
-      block_ = counter_[0] < point_blocks_ ? scrambled_sobol(scramble_key_, point_, counter_[0])
-                                           : philox(counter_, key_);
+      block_ =
+          counter_[0] < point_blocks_ ? scrambled_sobol(scramble_key_, point_, counter_[0]) : philox(counter_, key_);
       ++counter_[0];
       used_ = 0;
     }

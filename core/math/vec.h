@@ -10,9 +10,18 @@ struct Vec3T {
   T x{}, y{}, z{};
   constexpr T& operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
   constexpr const T& operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
-  constexpr Vec3T& operator+=(const Vec3T& b) { x += b.x, y += b.y, z += b.z; return *this; }
-  constexpr Vec3T& operator-=(const Vec3T& b) { x -= b.x, y -= b.y, z -= b.z; return *this; }
-  constexpr Vec3T& operator*=(const T& s) { x *= s, y *= s, z *= s; return *this; }
+  constexpr Vec3T& operator+=(const Vec3T& b) {
+    x += b.x, y += b.y, z += b.z;
+    return *this;
+  }
+  constexpr Vec3T& operator-=(const Vec3T& b) {
+    x -= b.x, y -= b.y, z -= b.z;
+    return *this;
+  }
+  constexpr Vec3T& operator*=(const T& s) {
+    x *= s, y *= s, z *= s;
+    return *this;
+  }
   friend constexpr Vec3T operator+(const Vec3T& a, const Vec3T& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
   friend constexpr Vec3T operator-(const Vec3T& a, const Vec3T& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
   friend constexpr Vec3T operator-(const Vec3T& a) { return {-a.x, -a.y, -a.z}; }
@@ -63,9 +72,18 @@ struct Rgb {
   constexpr explicit Rgb(double grey) : r(grey), g(grey), b(grey) {}
   constexpr double& operator[](int i) { return i == 0 ? r : i == 1 ? g : b; }
   constexpr double operator[](int i) const { return i == 0 ? r : i == 1 ? g : b; }
-  constexpr Rgb& operator+=(const Rgb& c) { r += c.r, g += c.g, b += c.b; return *this; }
-  constexpr Rgb& operator*=(const Rgb& c) { r *= c.r, g *= c.g, b *= c.b; return *this; }
-  constexpr Rgb& operator*=(double s) { r *= s, g *= s, b *= s; return *this; }
+  constexpr Rgb& operator+=(const Rgb& c) {
+    r += c.r, g += c.g, b += c.b;
+    return *this;
+  }
+  constexpr Rgb& operator*=(const Rgb& c) {
+    r *= c.r, g *= c.g, b *= c.b;
+    return *this;
+  }
+  constexpr Rgb& operator*=(double s) {
+    r *= s, g *= s, b *= s;
+    return *this;
+  }
   friend constexpr Rgb operator+(Rgb a, const Rgb& c) { return a += c; }
   friend constexpr Rgb operator*(Rgb a, const Rgb& c) { return a *= c; }
   friend constexpr Rgb operator*(Rgb a, double s) { return a *= s; }

@@ -7,11 +7,11 @@ namespace isochron {
 /// An edge at the current parameters.
 struct BoundaryEdge {
   int vertex[2];
-  int face[2];       ///< face[1] is -1 on an open border
+  int face[2];  ///< face[1] is -1 on an open border
   Vec3 origin, end;
-  Vec3 tangent;      ///< unit, from origin to end
+  Vec3 tangent;  ///< unit, from origin to end
   double length = 0;
-  Vec3 inward[2];    ///< unit, in the plane of face i, perpendicular to the edge, pointing into the face
+  Vec3 inward[2];      ///< unit, in the plane of face i, perpendicular to the edge, pointing into the face
   double opening = 0;  ///< angle between the two inward directions; 0 on an open border
   int faces() const { return face[1] < 0 ? 1 : 2; }
   Vec3 point(double s) const { return origin + (end - origin) * s; }
@@ -27,9 +27,9 @@ class BoundaryEdges {
 
   struct Sample {
     const BoundaryEdge* edge = nullptr;
-    double s = 0;    ///< fraction along the edge
+    double s = 0;  ///< fraction along the edge
     Vec3 y;
-    double pdf = 0;  ///< per length
+    double pdf = 0;               ///< per length
     double begin = 0, share = 0;  ///< the edge takes the numbers from `begin` to `begin` + `share`
     /// The number that gives this point.
     double x() const { return begin + s * share; }

@@ -67,8 +67,7 @@ double Warp::sample(double u) const {
   return std::clamp(x, 0x1p-53, 1 - 0x1p-53);
 }
 
-BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records,
-                             const std::array<double, kTechniques>& cost)
+BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records, const std::array<double, kTechniques>& cost)
     : BoundaryGuide() {
   std::vector<std::vector<GuideRecord>> of_table(kTables), of_technique(kTechniques);
   for (const GuideRecord& r : records) {

@@ -40,8 +40,7 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
   };
   bool open = false, flat = true;
   for (const Edge& edge : scene.edges) {
-    const bool moves[2] = {moving.triangle[edge.face[0]] != 0,
-                           edge.face[1] >= 0 && moving.triangle[edge.face[1]]};
+    const bool moves[2] = {moving.triangle[edge.face[0]] != 0, edge.face[1] >= 0 && moving.triangle[edge.face[1]]};
     if (!moves[0] && !moves[1]) continue;
     if (!moves[0] || !moves[1]) {
       open = true;
@@ -60,8 +59,7 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
 
 }  // namespace
 
-CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const MovingParts& moving,
-                       double radius)
+CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const MovingParts& moving, double radius)
     : position_(camera.position), forward_(camera.forward), radius_(radius * camera.pixel_size()) {
   if (!(radius > 0) || !moving.geometry) return;
   Bounds moved;
@@ -74,8 +72,7 @@ CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const Movi
                       camera.forward.y > 0 ? moved.high.y : moved.low.y,
                       camera.forward.z > 0 ? moved.high.z : moved.low.z};
   const double depth = std::max(0.0, dot(camera.forward, farthest - camera.position));
-  const double margin =
-      radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
+  const double margin = radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
   near_ = moved.grown(margin);
   possible_ = !sees_nothing_of_itself(scene, moving);
   for (std::size_t t = 0; t < scene.triangles.size() && !possible_; ++t)
@@ -92,14 +89,13 @@ CameraFlow::Follow CameraFlow::follow(const Vec3& x1, const Vec3& x2) const {
   return {(1 - ratio) * (1 - ratio), gradient * (-2 * (1 - ratio))};
 }
 
-void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g,
-                    LocalDifferential& out) {
+void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g, LocalDifferential& out) {
   const Vec3 ray = x1.p - scene.camera.position;
   add_material_flow(scene, x1, x1.n * (dot(ray, g) / dot(x1.n, ray)), out);
 }
 
-void add_following_flow(const PreparedScene& scene, const SurfacePoint& x1, const SurfacePoint& x2,
-                        const Vec3& g, LocalDifferential& out) {
+void add_following_flow(const PreparedScene& scene, const SurfacePoint& x1, const SurfacePoint& x2, const Vec3& g,
+                        LocalDifferential& out) {
   const double weight = scene.camera_flow.follow(x1.p, x2.p).weight;
   if (weight == 0) return;
   const Vec3 along = (g - x1.n * dot(g, x1.n)) * weight;

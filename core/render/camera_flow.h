@@ -49,11 +49,10 @@ class CameraFlow {
 };
 
 /// Adds g . (velocity of x1 along its pixel ray) to `out`.
-void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g,
-                    LocalDifferential& out);
+void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g, LocalDifferential& out);
 
 /// Adds g . (velocity of x1 - pixel flow), which is w P (velocity of x2 - pixel flow), to `out`.
-void add_following_flow(const PreparedScene& scene, const SurfacePoint& x1, const SurfacePoint& x2,
-                        const Vec3& g, LocalDifferential& out);
+void add_following_flow(const PreparedScene& scene, const SurfacePoint& x1, const SurfacePoint& x2, const Vec3& g,
+                        LocalDifferential& out);
 
 }  // namespace isochron

@@ -360,7 +360,7 @@ class EllipsoidalConnections {
   }
 
   /// Share of a contribution found by `technique`, over the connections' share of the samples.
-  double mis_weight(const Target& target, int i, int pixel, double ArcDensities::* technique) const {
+  double mis_weight(const Target& target, int i, int pixel, double ArcDensities::*technique) const {
     // No other technique finds lengths at a jump, and these serve one gate.
     const bool jump = target.jump[i];
     const Path& path = worker_.path;
@@ -384,7 +384,7 @@ class EllipsoidalConnections {
   }
 
   /// The worker's path is complete and as long as side i of the target says.
-  void deliver(const Target& target, int i, int pixel, const Rgb& unweighted, double ArcDensities::* technique) {
+  void deliver(const Target& target, int i, int pixel, const Rgb& unweighted, double ArcDensities::*technique) {
     if constexpr (!kGathers)
       if (!worker_.matters(worker_.path)) return;
     const Rgb value = unweighted * (mis_weight(target, i, pixel, technique) * target.scale);

@@ -77,8 +77,8 @@ class GradientLedgerSink {
  public:
   static constexpr bool kDifferential = true;
   /// `adjoints`: [pixel][gate][channel][adjoint].
-  GradientLedgerSink(const PreparedScene& scene, const GateSet& gates, const TangentBasis& basis,
-                     int channels, std::span<const double> adjoints, GradientLedger& ledger)
+  GradientLedgerSink(const PreparedScene& scene, const GateSet& gates, const TangentBasis& basis, int channels,
+                     std::span<const double> adjoints, GradientLedger& ledger)
       : origin_(scene),
         gates_(gates),
         rates_(scene.layout, basis),
@@ -91,17 +91,15 @@ class GradientLedgerSink {
   void bind(const LocalDifferential& differential) { rates_.bind(differential); }
 
   void add(int pixel, const Rgb& value, double length, GateWeights use) {
-    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-      put(pixel, g, value, w * use.value, slope * use.slope);
-    });
+    gates_.for_each_derivative(
+        length, [&](int g, double w, double slope) { put(pixel, g, value, w * use.value, slope * use.slope); });
   }
   void add_length_rate(int pixel, int gate, const Rgb& value) { put(pixel, gate, value, 0, 1); }
 
  private:
   void put(int pixel, int gate, const Rgb& value, double w, double slope) {
     const int count = ledger_.adjoints;
-    const double* adjoint =
-        &adjoints_[(static_cast<std::size_t>(pixel) * gates_.size() + gate) * channels_ * count];
+    const double* adjoint = &adjoints_[(static_cast<std::size_t>(pixel) * gates_.size() + gate) * channels_ * count];
     for (int c = 0; c < channels_; ++c, adjoint += count)
       for (int column : rates_.touched()) {
         const double derivative = value[c] * (w * rates_[column].log_f[c] + slope * rates_[column].length);

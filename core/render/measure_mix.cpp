@@ -13,11 +13,10 @@ struct Doubtful {
 constexpr Doubtful kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr double kShares[] = {0, 0.3, 1};
-constexpr int kSamples[] = {16, 8,
-                            4};  ///< per pixel and batch at most, of each share: for about the same work
+constexpr int kSamples[] = {16, 8, 4};  ///< per pixel and batch at most, of each share: for about the same work
 constexpr int kMostBatches = 12, kFewestBatches = 4;
-constexpr int kPixels = 4096;  ///< at most: where pixels are larger, connections from the camera look better
-constexpr int kBlocks = 4;     ///< across the image
+constexpr int kPixels = 4096;      ///< at most: where pixels are larger, connections from the camera look better
+constexpr int kBlocks = 4;         ///< across the image
 constexpr double kPaths = 300000;  ///< of standard sampling, about
 /// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
 /// can lose where it is not the best is more than what it can win.
@@ -60,8 +59,7 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
 
 /// Sums over square blocks of pixels.
 GatedImage blocks_of(const GatedImage& image, int size) {
-  GatedImage sums((image.width + size - 1) / size, (image.height + size - 1) / size, image.gates,
-                  image.channels);
+  GatedImage sums((image.width + size - 1) / size, (image.height + size - 1) / size, image.gates, image.channels);
   for (int pixel = 0; pixel < image.pixels(); ++pixel) {
     const int block = pixel / image.width / size * sums.width + pixel % image.width / size;
     for (int g = 0; g < image.gates; ++g)
@@ -99,8 +97,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   const Scene small = reduced(scene);
   const double samples = kPaths / (small.camera.width * small.camera.height);
   const int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
-  const auto choose = [&](const Doubtful& widths, int block, const TangentBasis* moving,
-                          auto&& estimate) -> double {
+  const auto choose = [&](const Doubtful& widths, int block, const TangentBasis* moving, auto&& estimate) -> double {
     if (width < widths.from) return 1;
     if (width > widths.to) return 0;
     double cost[3];
@@ -110,10 +107,10 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
       trial.numbers = Numbers::independent;
       const Renderer renderer(small, gates, trial, moving);
-      cost[i] = variance_and_work(
-          renderer, block, batches,
-          std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
-          [&](SampleRange range) { return estimate(renderer, range); });
+      cost[i] =
+          variance_and_work(renderer, block, batches,
+                            std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
+                            [&](SampleRange range) { return estimate(renderer, range); });
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
@@ -122,8 +119,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     return kShares[cost[1] < kClearlyBetter[gradients] * cost[alone] ? 1 : alone];
   };
   SamplingMix best;
-  best.image = choose(kImage, 1, nullptr,
-                      [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
+  best.image =
+      choose(kImage, 1, nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
   const int block = purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);

@@ -18,8 +18,8 @@ Vec3 through_normalize(const Vec3& g, const Vec3& w, double distance) {
 }
 
 /// Adds the scattering lobe's part at vertex x between its neighbours; returns the lobe's derivative.
-LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s,
-                        Accumulated& before, Accumulated& here, Accumulated& after) {
+LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s, Accumulated& before,
+                        Accumulated& here, Accumulated& after) {
   const LobeDerivative lobe = lobe_derivative(material, s.cos_i, s.cos_o, s.cos_io);
   const Vec3 to_after = through_normalize(x.n * lobe.d_cos_i + s.w_o * lobe.d_cos_io, s.w_i, s.distance_i);
   const Vec3 to_before = through_normalize(x.n * lobe.d_cos_o + s.w_i * lobe.d_cos_io, s.w_o, s.distance_o);
@@ -67,8 +67,7 @@ void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumu
     if (!scene.moving.vertex[v]) continue;
     VertexGradient entry{v, g.position * x.b[i], g.length * x.b[i]};
     if (!length_only) {
-      const Vec3 opposite =
-          scene.scene.positions[vertex[(i + 1) % 3]] - scene.scene.positions[vertex[(i + 2) % 3]];
+      const Vec3 opposite = scene.scene.positions[vertex[(i + 1) % 3]] - scene.scene.positions[vertex[(i + 2) % 3]];
       entry.log_f += cross(opposite, through_cross);
     }
     out.vertices.push_back(entry);
@@ -110,14 +109,12 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
       if (material.type != MaterialType::diffuse) {
         const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
         const LobeDerivative lobe = add_lobe(material, x[k], s, g[k - 1], g[k], g[k + 1]);
-        if (scene.moving.roughness[m])
-          out.scalars.push_back({scene.layout.roughness(m), -1, lobe.d_roughness});
+        if (scene.moving.roughness[m]) out.scalars.push_back({scene.layout.roughness(m), -1, lobe.d_roughness});
         if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, lobe.d_ior});
       }
       if (scene.moving.albedo[m])
         for (int c = 0; c < 3; ++c)
-          if (material.albedo[c] > 0)
-            out.scalars.push_back({scene.layout.albedo(m, c), c, 1 / material.albedo[c]});
+          if (material.albedo[c] > 0) out.scalars.push_back({scene.layout.albedo(m, c), c, 1 / material.albedo[c]});
     }
     const int s = scene.scene.triangles[x[count - 1].triangle].shape;
     if (scene.moving.emission[s])
@@ -131,8 +128,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
   for (int k = 1; k < count; ++k) to_triangle(scene, x[k], g[k], k > 1, length_only, out);
 }
 
-void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g,
-                       LocalDifferential& out) {
+void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
   if (!scene.moving.triangle[x.triangle]) return;
   const auto& vertex = scene.scene.triangles[x.triangle].vertex;
   for (int i = 0; i < 3; ++i)

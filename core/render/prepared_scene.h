@@ -72,9 +72,9 @@ class PreparedScene {
   MovingParts moving;
   CameraFlow camera_flow;
   RayCaster caster;
-  std::vector<Vec3> normal;         ///< per triangle, unit
-  std::vector<double> area;         ///< per triangle
-  std::vector<int> emitters;        ///< triangles that emit
+  std::vector<Vec3> normal;   ///< per triangle, unit
+  std::vector<double> area;   ///< per triangle
+  std::vector<int> emitters;  ///< triangles that emit
   EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
 
   const Shape& shape_of(int triangle) const { return scene.shapes[records_[triangle].shape]; }

@@ -13,8 +13,8 @@ namespace isochron {
 /// (in the image, across the edge): on the edge's face that is in front on that side, else on whatever lies
 /// beyond.
 template <class Sink>
-std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge& edge, const Vec3& y,
-                                        const Vec3& d, const Vec3& side) {
+std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge& edge, const Vec3& y, const Vec3& d,
+                                        const Vec3& side) {
   const PreparedScene& scene = worker.scene;
   int front = -1;
   double front_slope = 0;
@@ -24,8 +24,7 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
     // A face seen edge-on takes no part of the image: what lies behind it is seen beside the edge.
     if (!(across > 0) || std::abs(dot(scene.normal[edge.face[i]], d)) <= kCoplanarAngle) continue;
     const double slope = dot(edge.inward[i], d) / across;  // depth gained per distance beside the edge
-    if (front < 0 || slope < front_slope)
-      front = edge.face[i], front_slope = slope, into_front = edge.inward[i];
+    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope, into_front = edge.inward[i];
   }
   // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the
   // edge start within a surface, or behind one.
@@ -42,8 +41,7 @@ template <class Sink>
 class PrimaryBoundary {
  public:
   /// `narrow_gates`: use the techniques that draw lengths from the gates.
-  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide,
-                  bool narrow_gates)
+  PrimaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates)
       : worker_(worker),
         scene_(worker.scene),
         edges_(edges),
@@ -85,8 +83,7 @@ class PrimaryBoundary {
     differential.clear();
     const double share[2] = {1 - point.s, point.s};
     for (int i = 0; i < 2; ++i)
-      if (scene_.moving.vertex[edge->vertex[i]])
-        differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
+      if (scene_.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
     worker_.sink.bind(differential);
 
     const double factor =

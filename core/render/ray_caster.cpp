@@ -46,6 +46,8 @@ RayCaster::RayCaster(const Scene& scene) {
   rtcCommitScene(scene_);
 }
 
-RayCaster::~RayCaster() { rtcReleaseScene(scene_); }
+RayCaster::~RayCaster() {
+  rtcReleaseScene(scene_);
+}
 
 }  // namespace isochron

@@ -21,7 +21,7 @@ int thread_count = 0;
 /// Work is cut into strands, each worked through in order with accumulators of its own, and merged in order: results
 /// do not depend on which thread takes which strand. Their number depends on the accumulators' size alone.
 constexpr int kMostStrands = 32, kFewestStrands = 8;
-constexpr int kSharedStrands = 256;  // where strands need no accumulators of their own
+constexpr int kSharedStrands = 256;                           // where strands need no accumulators of their own
 constexpr std::size_t kStrandBudget = std::size_t{64} << 20;  // bytes, all strands together
 constexpr int kPixelsPerBlock = 8;
 
@@ -59,13 +59,18 @@ void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& s
 
 }  // namespace
 
-void set_thread_count(int threads) { thread_count = threads; }
+void set_thread_count(int threads) {
+  thread_count = threads;
+}
 
 const char* name(Term term) {
   switch (term) {
-    case Term::interior: return "interior";
-    case Term::visibility: return "visibility";
-    case Term::path_length: return "path_length";
+    case Term::interior:
+      return "interior";
+    case Term::visibility:
+      return "visibility";
+    case Term::path_length:
+      return "path_length";
   }
   return "";
 }
@@ -236,7 +241,8 @@ struct Renderer::Impl {
         if (scene.camera_flow.possible())
           run(guide.rate(BoundaryGuide::pixel_border), rng,
               [&](double share) { primary.sample_pixel_border(share * splat_scale, rng); });
-        run(guide.rate(BoundaryGuide::from_edge), rng, [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
+        run(guide.rate(BoundaryGuide::from_edge), rng,
+            [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
         run(guide.rate(BoundaryGuide::from_camera) * worker.pick.rate(pixel), rng,
             [&](double share) { secondary.sample_from_camera(pixel, share * scale, rng); });
       });
@@ -245,15 +251,22 @@ struct Renderer::Impl {
   }
 };
 
-Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
-                   const TangentBasis* basis)
+Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options, const TangentBasis* basis)
     : impl_(std::make_unique<Impl>(scene, gates, options, basis)) {}
 Renderer::~Renderer() = default;
 
-bool Renderer::has(Term term) const { return impl_->has(term); }
-const SamplingMix& Renderer::mix() const { return impl_->mix; }
-long long Renderer::rays() const { return impl_->rays; }
-double Renderer::work() const { return isochron::work(impl_->rays, impl_->arcs); }
+bool Renderer::has(Term term) const {
+  return impl_->has(term);
+}
+const SamplingMix& Renderer::mix() const {
+  return impl_->mix;
+}
+long long Renderer::rays() const {
+  return impl_->rays;
+}
+double Renderer::work() const {
+  return isochron::work(impl_->rays, impl_->arcs);
+}
 
 GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   GatedImage image = impl_->blank();

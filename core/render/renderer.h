@@ -38,12 +38,12 @@ struct SamplingMix {
 };
 
 struct EstimatorOptions {
-  int max_bounces = 8;                      ///< scattering vertices on a path, >= 0
+  int max_bounces = 8;  ///< scattering vertices on a path, >= 0
   Sampling sampling = Sampling::automatic;
-  bool antithetic = true;                   ///< coupled pairs for the gate's derivative under ellipsoidal sampling
-  ArcPick pick = ArcPick::contribution;     ///< of ellipsoidal sampling
+  bool antithetic = true;                ///< coupled pairs for the gate's derivative under ellipsoidal sampling
+  ArcPick pick = ArcPick::contribution;  ///< of ellipsoidal sampling
   Numbers numbers = Numbers::low_discrepancy;
-  std::optional<SamplingMix> mix = {};      ///< of automatic sampling, see measure_mix; none: by the gates' width alone
+  std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
   /// Within how many widths of a pixel what the camera sees follows what moves beside it, see CameraFlow; 0: not at all.
   double follow_radius = 4;
@@ -126,7 +126,9 @@ class Renderer {
 
 /// Work of so many rays, and triangles looked at for arcs, in rays: an arc takes 1.3 times as long, measured on the cube
 /// and the box.
-inline double work(long long rays, long long arcs) { return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs); }
+inline double work(long long rays, long long arcs) {
+  return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs);
+}
 
 /// Threads that renderers use; 0: all cores. Results do not depend on it.
 void set_thread_count(int threads);

@@ -181,8 +181,8 @@ class SecondaryBoundary {
     if (!techniques_.from_camera) return 0;
     double ratio = camera_over_edge_rate_ * worker_.pick.rate(pixel) * camera_warp(pixel, k).density(g.y.x()) /
                    edge_warp().density(g.y.x());
-    ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) *
-                   solid_angle_to_area(x[0].p, x[1]) / scene_.camera.pixels();
+    ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) * solid_angle_to_area(x[0].p, x[1]) /
+             scene_.camera.pixels();
     for (int j = 1; j < k; ++j)
       ratio *= Scattering(x[j - 1].p, x[j], x[j + 1].p).pdf_towards_light(scene_.material_of(x[j].triangle)) *
                solid_angle_to_area(x[j].p, x[j + 1]);
@@ -331,7 +331,8 @@ class SecondaryBoundary {
     if (!(scattered > 0) || !g.orient() || !find_light_end(g) || !differentiate(g)) return false;
     ++worker_.rays;
     if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return false;
-    const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x())) * scattered;
+    const double factor =
+        g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x())) * scattered;
     connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back(),
                             camera_over_edge(g, path.vertex, k, pixel)});
     return true;
@@ -373,7 +374,7 @@ class SecondaryBoundary {
   const BoundaryTechniques techniques_;
   const bool at_length_;
   const double camera_over_edge_rate_;  ///< how often segments are looked for from the camera, over that from an edge
-  const double aimed_share_;  ///< of the directions from an edge
+  const double aimed_share_;            ///< of the directions from an edge
   LightSide<Sink> light_side_;
   LocalDifferential camera_flow_, material_flow_;
   std::vector<SurfacePoint> walk_, camera_side_;

@@ -85,9 +85,10 @@ void sample_standard(Worker<Sink>& worker, int pixel, double scale, bool pairs, 
       if (const double share = worker.ellipsoidal_share; share > 0) {
         // This technique's share in the balance heuristic, over the share of the samples.
         weights.value = (1 - worker.techniques.ellipsoidal_weight(worker.path, pixel, share, 1)) / (1 - share);
-        weights.slope = pairs ? (1 - worker.techniques.ellipsoidal_weight(worker.path, pixel, share, worker.pair_gain)) /
-                                    (1 - share)
-                              : weights.value;
+        weights.slope =
+            pairs
+                ? (1 - worker.techniques.ellipsoidal_weight(worker.path, pixel, share, worker.pair_gain)) / (1 - share)
+                : weights.value;
       }
       worker.emit(worker.path, pixel, value * scale, worker.path.length.back(), weights);
     }

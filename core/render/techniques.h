@@ -68,9 +68,9 @@ class Techniques {
       const double area_rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
       ellipsoidal = pdf_q * pick_.length_pdf(pixel, length) / across;
       if (scene_.outside(x, q))
-        ellipsoidal += pdf_y *
-                       (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
-                       (2 * kPi * kCurves * area_rate);
+        ellipsoidal +=
+            pdf_y * (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
+            (2 * kPi * kCurves * area_rate);
     }
     return gain * share * ellipsoidal / (gain * share * ellipsoidal + (1 - share) * standard);
   }
@@ -82,8 +82,7 @@ class Techniques {
     const SurfacePoint& x = path.vertex[from];
     const double to_area = solid_angle_to_area(x.p, q);
     if (from == 0)
-      return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area /
-             scene_.camera.pixels();
+      return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
     const Scattering s(path.vertex[from - 1].p, x, q.p);
     return s.pdf_towards_light(scene_.material_of(x.triangle)) * to_area;
   }
@@ -93,8 +92,7 @@ class Techniques {
     const double distance = length(y.p - q.p);
     EllipseArcs arcs;
     const int t = y.triangle;
-    if (!clip_ellipse({q.p, q.p, 2 * distance}, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2),
-                      arcs))
+    if (!clip_ellipse({q.p, q.p, 2 * distance}, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
       return 0;
     return 1 / (arcs.total_span * distance);
   }

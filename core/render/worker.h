@@ -15,7 +15,7 @@ struct Worker {
   const EstimatorOptions& options;
   const GatePick& pick;
   double ellipsoidal_share = 0;  ///< of the samples; the others are standard
-  double pair_gain = 1;  ///< by how much pairs count for more than their density
+  double pair_gain = 1;          ///< by how much pairs count for more than their density
   Techniques techniques;
   Sink sink;
   Path path;

@@ -42,9 +42,8 @@ std::string coincidence_warning(const Scene& scene) {
   if (all.empty()) return {};
   std::string names;
   for (std::size_t i = 0; i < std::min(all.size(), kMostNamed); ++i)
-    names +=
-        fmt::format("{}'{}' and '{}' ({} triangle{})", i ? ", " : "", scene.shapes[all[i].shape[0]].name,
-                    scene.shapes[all[i].shape[1]].name, all[i].triangles, all[i].triangles > 1 ? "s" : "");
+    names += fmt::format("{}'{}' and '{}' ({} triangle{})", i ? ", " : "", scene.shapes[all[i].shape[0]].name,
+                         scene.shapes[all[i].shape[1]].name, all[i].triangles, all[i].triangles > 1 ? "s" : "");
   if (all.size() > kMostNamed) names += fmt::format(" and {} more pairs", all.size() - kMostNamed);
   return fmt::format(
       "shapes on the same surface: {}; light would be reflected by either or by both, so images are wrong "

@@ -22,8 +22,7 @@ std::vector<int> first_at_position(const std::vector<Vec3>& positions) {
   std::iota(order.begin(), order.end(), 0);
   // Comparing doubles takes 0 and -0 for equal, as wanted.
   const auto key = [&](int v) { return std::tie(positions[v].x, positions[v].y, positions[v].z); };
-  std::sort(order.begin(), order.end(),
-            [&](int a, int b) { return key(a) < key(b) || (key(a) == key(b) && a < b); });
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b) || (key(a) == key(b) && a < b); });
   std::vector<int> first(positions.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool repeated = i > 0 && key(order[i]) == key(order[i - 1]);
@@ -33,8 +32,7 @@ std::vector<int> first_at_position(const std::vector<Vec3>& positions) {
 }
 
 /// Marks repetitions of earlier faces.
-std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces,
-                                 const std::vector<Vec3>& positions) {
+std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces, const std::vector<Vec3>& positions) {
   struct Key {
     std::array<int, 3> corners;  // ascending
     int face;
@@ -48,9 +46,8 @@ std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces,
     if (!even) std::swap(c[1], c[2]);
     keys[f] = {c, static_cast<int>(f), even};
   }
-  std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
-    return std::tie(a.corners, a.face) < std::tie(b.corners, b.face);
-  });
+  std::sort(keys.begin(), keys.end(),
+            [](const Key& a, const Key& b) { return std::tie(a.corners, a.face) < std::tie(b.corners, b.face); });
   std::vector<bool> repeated(faces.size(), false);
   for (std::size_t i = 1; i < keys.size(); ++i) {
     if (keys[i].corners != keys[i - 1].corners) continue;
@@ -109,8 +106,7 @@ std::vector<Edge> build_edges(const Mesh& mesh) {
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
     for (int k = 0; k < 3; ++k) {
       const auto [low, high] = std::minmax({mesh.faces[f][k], mesh.faces[f][(k + 1) % 3]});
-      sides.push_back(
-          {static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint64_t>(high), static_cast<int>(f)});
+      sides.push_back({static_cast<std::uint64_t>(low) << 32 | static_cast<std::uint64_t>(high), static_cast<int>(f)});
     }
   }
   std::sort(sides.begin(), sides.end(),
@@ -120,8 +116,7 @@ std::vector<Edge> build_edges(const Mesh& mesh) {
   edges.reserve(sides.size() / 2);
   for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
     while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
-    const int low = static_cast<int>(sides[i].edge >> 32),
-              high = static_cast<int>(sides[i].edge & 0xffffffffu);
+    const int low = static_cast<int>(sides[i].edge >> 32), high = static_cast<int>(sides[i].edge & 0xffffffffu);
     if (end - i > 2)
       throw InputError(fmt::format("the edge from {} to {} has {} faces (at most two are allowed)",
                                    show(mesh.positions[low]), show(mesh.positions[high]), end - i));

@@ -33,8 +33,8 @@ CheckedMeshFile check_obj(const std::string& file, const std::string& contents) 
         const std::string_view digits = word.substr(0, word.find('/'));
         const long long index = MeshText::try_integer(digits).value_or(0);
         if (index == 0 || index < -vertices || index > MeshText::kMostItems)
-          text.fail(fmt::format("{} is not a vertex of a face (an index from 1, or from -1 down to -{})",
-                                quote(word), vertices));
+          text.fail(fmt::format("{} is not a vertex of a face (an index from 1, or from -1 down to -{})", quote(word),
+                                vertices));
         text.rewrite(word, digits);
         if (index > highest) highest = index, highest_line = text.line();
         corners.push_back(static_cast<int>(index > 0 ? index - 1 : vertices + index));
@@ -56,8 +56,7 @@ CheckedMeshFile check_off(const std::string& file, const std::string& contents) 
   const std::string_view header = text.word(), rest = text.word();
   if (header != "OFF" && header != "COFF" && header != "NOFF" && header != "CNOFF" && header != "STOFF")
     text.fail("does not begin with OFF");
-  if (!rest.empty())
-    text.fail(fmt::format("{} after OFF (only text files in three dimensions are read)", quote(rest)));
+  if (!rest.empty()) text.fail(fmt::format("{} after OFF (only text files in three dimensions are read)", quote(rest)));
   text.require_next();
   const long long vertices = text.count(), faces = text.count();
   text.copy = fmt::format("OFF\n{} {} 0", vertices, faces);
@@ -85,8 +84,7 @@ CheckedMeshFile check_stl(const std::string& file, std::string contents) {
       std::memcpy(points, contents.data() + kHeader + f * kFacet + kNormal, sizeof points);
       for (const Point& p : points) {
         if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
-          throw InputError(
-              fmt::format("{}: facet {} has a coordinate that is not a finite number", file, f + 1));
+          throw InputError(fmt::format("{}: facet {} has a coordinate that is not a finite number", file, f + 1));
       }
       triangles += is_triangle(points);
     }

@@ -39,9 +39,8 @@ struct Header {
 };
 
 Scalar find_scalar(const MeshText& text, std::string_view word) {
-  constexpr std::string_view kNames[] = {"char",  "uchar",  "short",   "ushort", "int",   "uint",
-                                         "float", "double", "int8",    "uint8",  "int16", "uint16",
-                                         "int32", "uint32", "float32", "float64"};
+  constexpr std::string_view kNames[] = {"char", "uchar", "short", "ushort", "int",   "uint",   "float",   "double",
+                                         "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"};
   const auto found = std::find(std::begin(kNames), std::end(kNames), word);
   if (found == std::end(kNames)) text.fail(fmt::format("{} is not a type of PLY", quote(word)));
   return static_cast<Scalar>((found - std::begin(kNames)) % std::size(kSize));
@@ -78,8 +77,7 @@ Header read_header(MeshText& text) {
     if (keyword == "end_header") break;
     if (keyword == "format") {
       header.format = text.word();
-      if (header.format != "ascii" && header.format != "binary_little_endian" &&
-          header.format != "binary_big_endian")
+      if (header.format != "ascii" && header.format != "binary_little_endian" && header.format != "binary_big_endian")
         text.fail(fmt::format("{} is not a format of PLY", quote(header.format)));
     } else if (keyword == "element") {
       const std::string name(text.word());
@@ -95,8 +93,7 @@ Header read_header(MeshText& text) {
   if (header.format.empty()) text.fail("the header states no format");
   if (!known.contains("x") || !known.contains("y") || !known.contains("z"))
     text.fail("the header has no element vertex with properties x, y and z");
-  if (!known.contains("vertex_indices"))
-    text.fail("has no faces (an element face with property vertex_indices)");
+  if (!known.contains("vertex_indices")) text.fail("has no faces (an element face with property vertex_indices)");
   const char* const format = header.format == "ascii" ? "ascii" : "binary_little_endian";
   header.kept = fmt::format("ply\nformat {} 1.0\n{}end_header\n", format, header.kept);
   return header;
@@ -202,21 +199,18 @@ CheckedMeshFile check_binary(const std::string& file, const Header& header, std:
         } else if (!property.list) {
           const float value = static_cast<float>(bytes.number(property.type));
           if (!std::isfinite(value))
-            throw InputError(
-                fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, i));
+            throw InputError(fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, i));
           append(found.contents, value);
         } else {
           corners.clear();
           for (double left = bytes.list_size(property.count); left > 0; --left) {
             const double index = bytes.number(property.type);
             if (!(index >= 0 && index < static_cast<double>(header.vertices)) || index != std::floor(index))
-              throw InputError(
-                  fmt::format("{}: there is no vertex {} (0 to {})", file, index, header.vertices - 1));
+              throw InputError(fmt::format("{}: there is no vertex {} (0 to {})", file, index, header.vertices - 1));
             corners.push_back(static_cast<int>(index));
           }
           if (corners.size() < 3)
-            throw InputError(
-                fmt::format("{}: face {} has {} vertices (at least three)", file, i, corners.size()));
+            throw InputError(fmt::format("{}: face {} has {} vertices (at least three)", file, i, corners.size()));
           append(found.contents, static_cast<std::int32_t>(corners.size()));
           for (const int corner : corners) append(found.contents, static_cast<std::int32_t>(corner));
           fan.clear();
@@ -234,8 +228,7 @@ CheckedMeshFile check_binary(const std::string& file, const Header& header, std:
 CheckedMeshFile check_ply(const std::string& file, const std::string& contents) {
   MeshText text(file, contents, '\0');
   Header header = read_header(text);
-  return header.format == "ascii" ? check_text(text, std::move(header))
-                                  : check_binary(file, header, text.rest());
+  return header.format == "ascii" ? check_text(text, std::move(header)) : check_binary(file, header, text.rest());
 }
 
 }  // namespace isochron

@@ -73,8 +73,8 @@ Mesh read_mesh(const std::string& file) {
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   if (extension != ".obj" && extension != ".off" && extension != ".ply" && extension != ".stl")
-    throw InputError(fmt::format("{}: {} is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file,
-                                 quote(extension)));
+    throw InputError(
+        fmt::format("{}: {} is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file, quote(extension)));
   CheckedMeshFile checked = check_mesh_file(file, extension, read_file(file));
   if (checked.triangles == 0) throw InputError(file + ": has no faces");
 
@@ -92,9 +92,8 @@ Mesh read_mesh(const std::string& file) {
       checked.triangles != importer.triangles.size()) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-    throw InputError(
-        fmt::format("{}: cannot be read as {}: OpenMesh finds {} vertices and {} triangles there", file,
-                    extension.substr(1), vertices.n_vertices(), importer.triangles.size()));
+    throw InputError(fmt::format("{}: cannot be read as {}: OpenMesh finds {} vertices and {} triangles there", file,
+                                 extension.substr(1), vertices.n_vertices(), importer.triangles.size()));
   }
 
   Mesh mesh;
@@ -103,15 +102,13 @@ Mesh read_mesh(const std::string& file) {
   for (const OpenMesh::VertexHandle v : vertices.vertices()) {
     const OpenMesh::Vec3f& p = vertices.point(v);
     if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
-      throw InputError(
-          fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, v.idx()));
+      throw InputError(fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, v.idx()));
     mesh.positions.push_back({p[0], p[1], p[2]});
   }
   for (const auto& face : mesh.faces) {
     for (const int v : face) {
       if (v < 0 || v >= static_cast<int>(mesh.positions.size()))
-        throw InputError(
-            fmt::format("{}: there is no vertex {} (0 to {})", file, v, mesh.positions.size() - 1));
+        throw InputError(fmt::format("{}: there is no vertex {} (0 to {})", file, v, mesh.positions.size() - 1));
     }
   }
   return mesh;

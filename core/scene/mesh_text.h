@@ -54,8 +54,7 @@ class MeshText {
     const std::string_view text = word();
     char* end = nullptr;  // a word ends before a space, a comment or the string's final zero
     const float value = text.empty() ? NAN : std::strtof(text.data(), &end);
-    if (!std::isfinite(value) || end != text.data() + text.size() ||
-        text.find_first_of("xX") != std::string_view::npos)
+    if (!std::isfinite(value) || end != text.data() + text.size() || text.find_first_of("xX") != std::string_view::npos)
       fail(fmt::format("{} is not a finite number", quote(text)));
     return value;
   }
@@ -84,8 +83,7 @@ class MeshText {
     std::vector<int> corners;
     for (long long left = integer(); left > 0; --left) {
       const long long index = integer();
-      if (index < 0 || index >= vertices)
-        fail(fmt::format("there is no vertex {} (0 to {})", index, vertices - 1));
+      if (index < 0 || index >= vertices) fail(fmt::format("there is no vertex {} (0 to {})", index, vertices - 1));
       corners.push_back(static_cast<int>(index));
     }
     return corners;

@@ -37,8 +37,7 @@ Camera read_camera(const YamlValue& value) {
 
   if (camera.look_at == camera.position) look_at.fail("is the camera's position", "a point away from it");
   if (!std::isnormal(length_squared(camera.look_at - camera.position)))
-    look_at.fail("lies too near the camera's position or too far away",
-                 "a distance whose square a double can hold");
+    look_at.fail("lies too near the camera's position or too far away", "a distance whose square a double can hold");
   // What is left of the cross product of two parallel vectors is round-off of this relative size.
   constexpr double kParallel = 16 * std::numeric_limits<double>::epsilon();
   const Vec3 forward = unit(camera.look_at - camera.position);
@@ -55,8 +54,7 @@ Material read_material(const std::string& name, const YamlValue& value, bool& gr
   const YamlValue type = map.require("type");
   material.type = static_cast<MaterialType>(type.choice({"diffuse", "rough_conductor", "rough_dielectric"}));
   if (material.type == MaterialType::diffuse) material.albedo = map.require("albedo").color(unit, grey);
-  if (material.type == MaterialType::rough_conductor)
-    material.albedo = map.require("reflectance").color(unit, grey);
+  if (material.type == MaterialType::rough_conductor) material.albedo = map.require("reflectance").color(unit, grey);
   if (material.type != MaterialType::diffuse)
     material.roughness = map.require("roughness").number({.low = 0, .high = 1, .low_open = true});
   if (material.type == MaterialType::rough_dielectric) {
@@ -97,8 +95,7 @@ void transform_mesh(const YamlValue& value, Mesh& mesh) {
   const double cosine = std::cos(angle), sine = std::sin(angle);
   for (Vec3& p : mesh.positions) {
     const Vec3 q = p * scale;
-    const Vec3 rotated =
-        angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
+    const Vec3 rotated = angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
     p = rotated + translation;
   }
 }
@@ -124,9 +121,10 @@ void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
   for (const Edge& edge : edges) {
     const auto complain = [&](const char* what) {
       const Vec3 &a = mesh.positions[edge.vertex[0]], &b = mesh.positions[edge.vertex[1]];
-      throw InputError(fmt::format("a rough_dielectric needs a closed surface; {} ({:.6g}, {:.6g}, {:.6g}) to "
-                                   "({:.6g}, {:.6g}, {:.6g})",
-                                   what, a.x, a.y, a.z, b.x, b.y, b.z));
+      throw InputError(
+          fmt::format("a rough_dielectric needs a closed surface; {} ({:.6g}, {:.6g}, {:.6g}) to "
+                      "({:.6g}, {:.6g}, {:.6g})",
+                      what, a.x, a.y, a.z, b.x, b.y, b.z));
     };
     if (edge.face[1] < 0) complain("this one ends at the edge from");
     if (runs_along(edge.face[0], edge) == runs_along(edge.face[1], edge))
@@ -134,8 +132,8 @@ void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
   }
 }
 
-Mesh read_shape_mesh(const YamlValue& file, const std::string& path,
-                     const std::optional<YamlValue>& transform, bool solid, std::vector<Edge>& edges) {
+Mesh read_shape_mesh(const YamlValue& file, const std::string& path, const std::optional<YamlValue>& transform,
+                     bool solid, std::vector<Edge>& edges) {
   Mesh mesh;
   try {
     const Mesh raw = read_mesh(path);
@@ -159,8 +157,7 @@ void read_shape(const YamlValue& value, Scene& scene) {
   Shape shape;
   const YamlValue name = map.require("name");
   shape.name = name.text();
-  if (scene.find_shape(shape.name) >= 0)
-    name.fail("'" + shape.name + "' is an earlier shape's name", "names differ");
+  if (scene.find_shape(shape.name) >= 0) name.fail("'" + shape.name + "' is an earlier shape's name", "names differ");
 
   const YamlValue file = map.require("file");
   shape.file = (std::filesystem::path(value.file()).parent_path() / file.text()).lexically_normal().string();
@@ -180,10 +177,8 @@ void read_shape(const YamlValue& value, Scene& scene) {
 
   std::vector<Edge> edges;
   const Mesh mesh = read_shape_mesh(file, shape.file, transform, dielectric, edges);
-  constexpr std::size_t kMost =
-      std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
-  if (scene.positions.size() + mesh.positions.size() > kMost ||
-      scene.triangles.size() + mesh.faces.size() > kMost)
+  constexpr std::size_t kMost = std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
+  if (scene.positions.size() + mesh.positions.size() > kMost || scene.triangles.size() + mesh.faces.size() > kMost)
     file.fail("the scene has too many vertices or triangles", fmt::format("at most {} of each", kMost));
 
   shape.first_vertex = static_cast<int>(scene.positions.size());

@@ -28,8 +28,7 @@ struct YamlValue::Document {
   std::string source(const std::string& key) const {
     for (auto path = overridden.rbegin(); path != overridden.rend(); ++path) {
       const bool below = key.size() > path->size() && (key[path->size()] == '.' || key[path->size()] == '[');
-      if (key.compare(0, path->size(), *path) == 0 && (key.size() == path->size() || below))
-        return "--set " + *path;
+      if (key.compare(0, path->size(), *path) == 0 && (key.size() == path->size() || below)) return "--set " + *path;
     }
     return file;
   }
@@ -38,9 +37,8 @@ struct YamlValue::Document {
 namespace {
 
 std::string join(const std::vector<std::string>& words) {
-  return std::accumulate(
-      words.begin(), words.end(), std::string(),
-      [](const std::string& a, const std::string& b) { return a.empty() ? b : a + ", " + b; });
+  return std::accumulate(words.begin(), words.end(), std::string(),
+                         [](const std::string& a, const std::string& b) { return a.empty() ? b : a + ", " + b; });
 }
 
 std::string describe(const YAML::Node& node) {
@@ -97,11 +95,9 @@ struct DocumentStart final : YAML::EventHandler {
   void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
   void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
   void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
   void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {
-  }
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
   void OnMapEnd() override {}
 };
 
@@ -114,8 +110,7 @@ YAML::Node parse_document(const std::string& source, const std::string& text) {
     DocumentStart document;
     if (!parser.HandleNextDocument(document)) throw InputError(source + ":1:1: syntax: is empty");
     if (parser.HandleNextDocument(document))
-      throw InputError(place(source, document.mark) +
-                       ": syntax: a second document begins (one per file is allowed)");
+      throw InputError(place(source, document.mark) + ": syntax: a second document begins (one per file is allowed)");
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
     throw InputError(place(source, error.mark) + ": syntax: " + one_line(error.msg));
@@ -124,8 +119,7 @@ YAML::Node parse_document(const std::string& source, const std::string& text) {
 
 std::string read_text(const std::string& file) {
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored))
-    throw InputError(file + ":1:1: file: is a folder (a YAML file)");
+  if (std::filesystem::is_directory(file, ignored)) throw InputError(file + ":1:1: file: is a folder (a YAML file)");
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   if (!stream) throw InputError(file + ":1:1: file: cannot be opened: " + std::strerror(errno));
@@ -186,8 +180,7 @@ void apply_override(YAML::Node node, const std::string& text, std::vector<std::s
       next.reset(node[*step.index]);
     } else {
       if (!node.IsMap())
-        throw InputError(
-            fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
+        throw InputError(fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
       if (last) {
         node[step.key] = value;
       } else if (!std::as_const(node)[step.key].IsDefined() && !steps[i + 1].index) {
@@ -331,12 +324,10 @@ YamlMap YamlValue::map() const {
       YamlValue(document_, pair.first, key_).fail(describe(pair.first) + " is used as a key", "a word");
     const std::string name = pair.first.Scalar();
     const std::string path = child(key_, name);
-    YamlMap::Entry entry{name, YamlValue(document_, pair.first, path),
-                         YamlValue(document_, pair.second, path)};
+    YamlMap::Entry entry{name, YamlValue(document_, pair.first, path), YamlValue(document_, pair.second, path)};
     for (const YamlMap::Entry& earlier : map.entries_) {
       if (earlier.name == name)
-        entry.key.fail(
-            fmt::format("stands here twice, first on line {}", earlier.key.node_->Mark().line + 1));
+        entry.key.fail(fmt::format("stands here twice, first on line {}", earlier.key.node_->Mark().line + 1));
     }
     map.entries_.push_back(std::move(entry));
   }

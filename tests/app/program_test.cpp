@@ -45,8 +45,7 @@ class Program : public testing::Test {
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, folder_.file("stderr").c_str(),
                                      O_WRONLY | O_CREAT | O_TRUNC, 0600);
     pid_t child = 0;
-    if (posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ) != 0)
-      ADD_FAILURE() << "cannot start";
+    if (posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ) != 0) ADD_FAILURE() << "cannot start";
     posix_spawn_file_actions_destroy(&actions);
     int status = 0;
     while (signal != 0 && waitpid(child, &status, WNOHANG) == 0) {
@@ -61,8 +60,8 @@ class Program : public testing::Test {
   }
 
   std::vector<std::string> run_command(const std::string& out, std::vector<std::string> more = {}) const {
-    std::vector<std::string> arguments = {
-        "run", folder_.file("tiny.yaml"), "-o", folder_.file(out), "--no-plots", "--quiet"};
+    std::vector<std::string> arguments = {"run",    folder_.file("tiny.yaml"), "-o", folder_.file(out), "--no-plots",
+                                          "--quiet"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return arguments;
   }
@@ -140,8 +139,8 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
 }
 
 TEST_F(Program, HelpShowsExamples) {
-  for (const char* command : {"run", "resume", "render", "derive", "gradient", "check",
-                              "inspect", "chart", "stability"}) {
+  for (const char* command :
+       {"run", "resume", "render", "derive", "gradient", "check", "inspect", "chart", "stability"}) {
     EXPECT_EQ(run({command, "--help"}).status, 0);
     EXPECT_NE(folder_.read("stdout").find(std::string("  isochron ") + command), std::string::npos);
   }
@@ -169,8 +168,7 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error,kurtosis\nheight,0,", 0), 0u);
   EXPECT_NE(gradient.find("\npower,10,"), std::string::npos);
   const std::string cost = folder_.read("out/gradient.yaml");
-  for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"})
-    EXPECT_NE(cost.find(key), std::string::npos);
+  for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"}) EXPECT_NE(cost.find(key), std::string::npos);
 }
 
 TEST_F(Program, CheckAgreesWithFiniteDifferences) {
@@ -219,8 +217,8 @@ TEST_F(Program, ChartComparesTheMethods) {
                         "components,unknowns\nreference,,32,",
                         0),
             0u);
-  for (const char* method : {"standard", "ellipsoidal_uncoupled", "ellipsoidal_coupled", "auto",
-                             "finite_difference_0.05", "paper"}) {
+  for (const char* method :
+       {"standard", "ellipsoidal_uncoupled", "ellipsoidal_coupled", "auto", "finite_difference_0.05", "paper"}) {
     EXPECT_NE(chart.find(std::string("\n") + method + ","), std::string::npos) << method;
     EXPECT_NE(table.find(std::string("\n") + method + ","), std::string::npos) << method;
   }
@@ -272,8 +270,7 @@ TEST_F(Program, GatesThatNoPathReaches) {
     };
     const std::string out = folder_.file(sampling);
     EXPECT_EQ(run(with({"render", file, "-o", out, "--no-plots"})).status, 0);
-    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")),
-              "gate,mean,standard_error\n0,0,0\n1,0,0\n");
+    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")), "gate,mean,standard_error\n0,0,0\n1,0,0\n");
     const Result derive = run(with({"derive", file, "-o", out, "--no-plots", "--quiet"}));
     EXPECT_EQ(derive.status, 0);
     EXPECT_EQ(derive.errors, "");
@@ -292,8 +289,7 @@ TEST_F(Program, GatesThatNoPathReaches) {
     EXPECT_EQ(fitted.status, 0);
     EXPECT_NE(fitted.errors.find("no light reaches the gates"), std::string::npos) << fitted.errors;
     const std::string summary = folder_.read(folder + "/summary.yaml");
-    for (const char* line :
-         {"status: iterations_reached\n", "loss_final: 0\n", "height: 0.2\n", "power: 8\n"})
+    for (const char* line : {"status: iterations_reached\n", "loss_final: 0\n", "height: 0.2\n", "power: 8\n"})
       EXPECT_NE(summary.find(line), std::string::npos) << line << summary;
     EXPECT_EQ(folder_.read(folder + "/log.csv").find("nan"), std::string::npos);
   }
@@ -322,8 +318,8 @@ TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
   const Result lit = run(run_command("a"));
   ASSERT_EQ(lit.status, 0);
   EXPECT_EQ(lit.errors, "");
-  for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml",
-                           "target.exr", "initial.exr", "final.exr", "summary.yaml"})
+  for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml", "target.exr",
+                           "initial.exr", "final.exr", "summary.yaml"})
     EXPECT_TRUE(folder_.has(std::string("a/") + name)) << name;
   EXPECT_EQ(rows("a"), 7);
   const std::string first = log("a");
@@ -413,9 +409,9 @@ TEST_F(Program, DamagedCheckpointFallsBack) {
 TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
   // The square of the images overflows.
   write_exr(folder_.file("black.exr"), GatedImage(8, 8, 2, 1));
-  const Result result = run(
-      run_command("out", {"--set", "target={images: black.exr}", "--set", "optimizer.iterations=20", "--set",
-                          "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
+  const Result result =
+      run(run_command("out", {"--set", "target={images: black.exr}", "--set", "optimizer.iterations=20", "--set",
+                              "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
   EXPECT_EQ(result.status, 1);
   const std::string summary = folder_.read("out/summary.yaml");
   EXPECT_NE(summary.find("status: diverged\niterations: 4\n"), std::string::npos) << summary;

@@ -96,8 +96,7 @@ void BM_ClipEllipse(benchmark::State& state) {
   for (const Query& q : random_queries(triangles, 1))
     for (const EllipsoidBvh::Input& t : triangles) {
       const Ellipsoid e(q.a, q.b, q.tau);
-      if (state.range(0) == 1 || clip_ellipse(e, t.vertex[0], t.vertex[1], t.vertex[2], arcs))
-        cases.push_back({e, &t});
+      if (state.range(0) == 1 || clip_ellipse(e, t.vertex[0], t.vertex[1], t.vertex[2], arcs)) cases.push_back({e, &t});
     }
   std::shuffle(cases.begin(), cases.end(), std::mt19937_64(2));
   constexpr std::size_t kCases = 4096;  // stays in the cache

@@ -54,8 +54,7 @@ inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const Ga
   for (int i = 0; i < scene.camera.pixels() * samples; ++i) {
     const int pixel = i / samples;
     Rng rng(Stream{.seed = 3}, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(i % samples));
-    const double u = pixel % scene.camera.width + rng.uniform(),
-                 v = pixel / scene.camera.width + rng.uniform();
+    const double u = pixel % scene.camera.width + rng.uniform(), v = pixel / scene.camera.width + rng.uniform();
     const Vec3 direction = scene.camera.direction(u, v);
     recorder.record(scene.camera.position, direction, std::numeric_limits<float>::infinity());
     const auto hit = scene.trace_camera(direction);

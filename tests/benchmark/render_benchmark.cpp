@@ -48,8 +48,7 @@ void BM_RayCaster(benchmark::State& state, Kind kind) {
   };
   std::vector<Ray> rays;
   for (const RecordedRay& r : rays_of(prepared, kind))
-    rays.push_back(
-        {{r.origin[0], r.origin[1], r.origin[2]}, {r.direction[0], r.direction[1], r.direction[2]}});
+    rays.push_back({{r.origin[0], r.origin[1], r.origin[2]}, {r.direction[0], r.direction[1], r.direction[2]}});
   for (auto _ : state) {
     int met = 0;
     for (const Ray& r : rays)
@@ -73,8 +72,8 @@ struct Tracer {
 std::vector<SurfacePoint> first_points(const PreparedScene& prepared) {
   std::vector<SurfacePoint> points;
   for (int pixel = 0; pixel < prepared.camera.pixels(); ++pixel)
-    if (const auto hit = prepared.trace_camera(prepared.camera.direction(
-            pixel % prepared.camera.width + 0.5, pixel / prepared.camera.width + 0.5)))
+    if (const auto hit = prepared.trace_camera(
+            prepared.camera.direction(pixel % prepared.camera.width + 0.5, pixel / prepared.camera.width + 0.5)))
       points.push_back(*hit);
   return points;
 }
@@ -117,8 +116,7 @@ class FourVertices {
       double pdf;
       const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
       const SurfacePoint y = prepared.sample_emitter(u0, u1, u2, pdf);
-      const auto& between =
-          points[static_cast<std::size_t>(rng.uniform() * static_cast<double>(points.size()))];
+      const auto& between = points[static_cast<std::size_t>(rng.uniform() * static_cast<double>(points.size()))];
       if (prepared.moving.triangle[x.triangle] || prepared.moving.triangle[between.triangle])
         paths.push_back({eye_, x, between, y});
     }
@@ -162,8 +160,7 @@ void BM_AdjointScatter(benchmark::State& state) {
   std::size_t i = 0;
   for (auto _ : state) {
     sink.bind(differentials[i]);
-    sink.add(static_cast<int>(i), Rgb(1.0),
-             5 + 4 * static_cast<double>(i) / static_cast<double>(four.paths.size()),
+    sink.add(static_cast<int>(i), Rgb(1.0), 5 + 4 * static_cast<double>(i) / static_cast<double>(four.paths.size()),
              GateWeights{});
     i = (i + 1) % four.paths.size();
   }
@@ -174,8 +171,7 @@ BENCHMARK(BM_AdjointScatter)->ArgName("large")->Arg(0)->Arg(1);
 /// Values of all gates at a random length; the argument is their number.
 void BM_Gates(benchmark::State& state) {
   std::vector<double> centers;
-  for (int g = 0; g < state.range(0); ++g)
-    centers.push_back(5 + 5.0 * g / static_cast<double>(state.range(0)));
+  for (int g = 0; g < state.range(0); ++g) centers.push_back(5 + 5.0 * g / static_cast<double>(state.range(0)));
   const GateSet gates(GateShape::gaussian(0.25 / static_cast<double>(state.range(0))), centers);
   Rng rng(Stream{.seed = 1}, 0, 0);
   std::vector<double> lengths(4096);
@@ -209,8 +205,8 @@ void BM_CameraPath(benchmark::State& state, Pass pass, Sampling sampling) {
     if (pass == Pass::primal)
       benchmark::DoNotOptimize(renderer.render({.seed = 1}, range).data.data());
     else
-      renderer.add_gradient(pass == Pass::interior ? Term::interior : Term::visibility, adjoint,
-                            {.seed = 1, .pass = 1}, range, gradient);
+      renderer.add_gradient(pass == Pass::interior ? Term::interior : Term::visibility, adjoint, {.seed = 1, .pass = 1},
+                            range, gradient);
   }
   set_thread_count(0);
   benchmark::DoNotOptimize(gradient.data());
@@ -218,10 +214,7 @@ void BM_CameraPath(benchmark::State& state, Pass pass, Sampling sampling) {
       benchmark::Counter(static_cast<double>(state.iterations()) * scene.camera.width * scene.camera.height,
                          benchmark::Counter::kIsRate | benchmark::Counter::kInvert);
 }
-BENCHMARK_CAPTURE(BM_CameraPath, primal_standard, Pass::primal, Sampling::standard)
-    ->ArgName("large")
-    ->Arg(0)
-    ->Arg(1);
+BENCHMARK_CAPTURE(BM_CameraPath, primal_standard, Pass::primal, Sampling::standard)->ArgName("large")->Arg(0)->Arg(1);
 BENCHMARK_CAPTURE(BM_CameraPath, primal_ellipsoidal, Pass::primal, Sampling::ellipsoidal)
     ->ArgName("large")
     ->Arg(0)
@@ -234,10 +227,7 @@ BENCHMARK_CAPTURE(BM_CameraPath, interior_ellipsoidal, Pass::interior, Sampling:
     ->ArgName("large")
     ->Arg(0)
     ->Arg(1);
-BENCHMARK_CAPTURE(BM_CameraPath, visibility, Pass::visibility, Sampling::standard)
-    ->ArgName("large")
-    ->Arg(0)
-    ->Arg(1);
+BENCHMARK_CAPTURE(BM_CameraPath, visibility, Pass::visibility, Sampling::standard)->ArgName("large")->Arg(0)->Arg(1);
 
 }  // namespace
 }  // namespace isochron::benchmarks

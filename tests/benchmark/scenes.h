@@ -31,8 +31,7 @@ inline Mesh bumpy_ball(const Vec3& center, double radius) {
         center + r * Vec3{std::sin(theta) * std::cos(phi), std::cos(theta), std::sin(theta) * std::sin(phi)});
   };
   for (int ring = 0; ring < kRings; ++ring)
-    for (int column = 0; column < kColumns; ++column)
-      add(kPi * (ring + 1) / (kRings + 1), kTwoPi * column / kColumns);
+    for (int column = 0; column < kColumns; ++column) add(kPi * (ring + 1) / (kRings + 1), kTwoPi * column / kColumns);
   const int north = kRings * kColumns, south = north + 1;
   add(0, 0);
   add(kPi, 0);
@@ -94,16 +93,14 @@ inline Scene subdivided(const Scene& scene, int levels) {
     for (int level = 0; level < levels; ++level) {
       std::map<std::pair<int, int>, int> middles;
       const auto middle = [&](int a, int b) {
-        const auto [place, fresh] =
-            middles.try_emplace(std::minmax(a, b), static_cast<int>(mesh.positions.size()));
+        const auto [place, fresh] = middles.try_emplace(std::minmax(a, b), static_cast<int>(mesh.positions.size()));
         if (fresh) mesh.positions.push_back((mesh.positions[a] + mesh.positions[b]) * 0.5);
         return place->second;
       };
       std::vector<std::array<int, 3>> faces;
       for (const auto& f : mesh.faces) {
         const int m[3] = {middle(f[0], f[1]), middle(f[1], f[2]), middle(f[2], f[0])};
-        faces.insert(faces.end(),
-                     {{f[0], m[0], m[2]}, {m[0], f[1], m[1]}, {m[2], m[1], f[2]}, {m[0], m[1], m[2]}});
+        faces.insert(faces.end(), {{f[0], m[0], m[2]}, {m[0], f[1], m[1]}, {m[2], m[1], f[2]}, {m[0], m[1], m[2]}});
       }
       mesh.faces = std::move(faces);
     }

@@ -19,8 +19,7 @@ inline void check_scene(const Scene& scene) {
   for (const Vec3& p : scene.positions) require(is_finite(p), "positions are finite");
   for (const Triangle& t : scene.triangles) {
     const Vec3& a = scene.positions.at(t.vertex[0]);
-    const Vec3 normal =
-        normalize(cross(scene.positions.at(t.vertex[1]) - a, scene.positions.at(t.vertex[2]) - a));
+    const Vec3 normal = normalize(cross(scene.positions.at(t.vertex[1]) - a, scene.positions.at(t.vertex[2]) - a));
     require(is_finite(normal), "triangles have normals");
   }
   for (const Shape& s : scene.shapes) scene.materials.at(s.material);

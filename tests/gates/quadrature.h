@@ -32,10 +32,9 @@ inline std::vector<std::pair<std::string, GateShape>> finite_gates() {
 /// tables' knots.
 template <class F>
 double integrate(const GateShape& gate, F&& f, double to = std::numeric_limits<double>::infinity()) {
-  constexpr double kNode[5] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831,
-                               0.9061798459386640};
-  constexpr double kWeight[5] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889,
-                                 0.4786286704993665, 0.2369268850561891};
+  constexpr double kNode[5] = {-0.9061798459386640, -0.5384693101056831, 0, 0.5384693101056831, 0.9061798459386640};
+  constexpr double kWeight[5] = {0.2369268850561891, 0.4786286704993665, 0.5688888888888889, 0.4786286704993665,
+                                 0.2369268850561891};
   const double last = std::min(gate.upper(), to);
   std::vector<double> ends{gate.lower(), last};
   if (gate.kind() == GateKind::tabulated) {

@@ -16,11 +16,10 @@ struct TestFunction {
   std::function<double(double)> h, slope;
 };
 
-const std::vector<TestFunction> kFunctions{{"x", [](double x) { return x; }, [](double) { return 1.0; }},
-                                           {"x^2 + 3 x^3", [](double x) { return x * x + 3 * x * x * x; },
-                                            [](double x) { return 2 * x + 9 * x * x; }},
-                                           {"sin(2 x + 1)", [](double x) { return std::sin(2 * x + 1); },
-                                            [](double x) { return 2 * std::cos(2 * x + 1); }}};
+const std::vector<TestFunction> kFunctions{
+    {"x", [](double x) { return x; }, [](double) { return 1.0; }},
+    {"x^2 + 3 x^3", [](double x) { return x * x + 3 * x * x * x; }, [](double x) { return 2 * x + 9 * x * x; }},
+    {"sin(2 x + 1)", [](double x) { return std::sin(2 * x + 1); }, [](double x) { return 2 * std::cos(2 * x + 1); }}};
 
 /// Expectation over u by the midpoint rule: u -> sample is piecewise smooth, with square roots at the ends.
 template <class F>
@@ -56,8 +55,7 @@ TEST(SamplePair, AtomsCompleteTheSmoothDerivative) {
       const double smooth = integrate(gate, [&](double x) { return t.h(x) * gate.derivative(x); });
       // The narrow gate's two halves are 1e3 times larger than their sum, hence the scale.
       const double scale = 1 + gate.pair_mass(PairPart::atoms);
-      EXPECT_NEAR(smooth + pair_term(gate, PairPart::atoms, t), expected, 2e-5 * scale)
-          << name << ", h = " << t.name;
+      EXPECT_NEAR(smooth + pair_term(gate, PairPart::atoms, t), expected, 2e-5 * scale) << name << ", h = " << t.name;
     }
   }
 }
@@ -111,9 +109,8 @@ TEST(SamplePair, MassesInClosedForm) {
   expect(GateShape::tabulated({-0.5, 0.1, 0.5}, {3, 3, 3}), 0, 1, 1);
   expect(GateShape::tabulated({0, 0, 1}, {0, 1, 0}), 2, 0, 2);  // an atom against a slope
   // What has no continuous part must not ask for a pass over it, however the rounding falls.
-  EXPECT_EQ(GateShape::tabulated({0, 0.3, 0.3, 0.9, 0.9, 1}, {0.1, 0.1, 0.7, 0.7, 0.2, 0.2})
-                .pair_mass(PairPart::smooth),
-            0);
+  EXPECT_EQ(
+      GateShape::tabulated({0, 0.3, 0.3, 0.9, 0.9, 1}, {0.1, 0.1, 0.7, 0.7, 0.2, 0.2}).pair_mass(PairPart::smooth), 0);
 }
 
 TEST(SamplePair, OrientationAndCoupling) {
@@ -187,8 +184,7 @@ TEST(Sample, TruncatedGaussianInClosedForm) {
       const long double x = gate.sample(u) / 0.3L;
       const long double half = std::sqrt(0.5L);
       const long double expected = (2 * static_cast<long double>(u) - 1) * std::erf(c * half);
-      EXPECT_NEAR(static_cast<double>((std::erf(x * half) - expected) / std::erf(c * half)), 0, 1e-14)
-          << c << ' ' << u;
+      EXPECT_NEAR(static_cast<double>((std::erf(x * half) - expected) / std::erf(c * half)), 0, 1e-14) << c << ' ' << u;
     }
   }
 }

@@ -17,16 +17,14 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 long double normal_density(long double x, long double sigma) {
-  return std::exp(-0.5L * (x / sigma) * (x / sigma)) /
-         (sigma * std::sqrt(2 * 3.14159265358979323846264338327950288L));
+  return std::exp(-0.5L * (x / sigma) * (x / sigma)) / (sigma * std::sqrt(2 * 3.14159265358979323846264338327950288L));
 }
 
 TEST(FastExp2, MatchesLibrary) {
   double worst = 0;
   for (int i = 0; i <= 200000; ++i) {
     const double y = -54.0 * i / 200000;
-    worst = std::max(
-        worst, std::abs(static_cast<double>(fast_exp2(y) / std::exp2(static_cast<long double>(y)) - 1)));
+    worst = std::max(worst, std::abs(static_cast<double>(fast_exp2(y) / std::exp2(static_cast<long double>(y)) - 1)));
   }
   EXPECT_LT(worst, 1e-14);
   EXPECT_EQ(fast_exp2(0), 1);
@@ -39,8 +37,7 @@ TEST(NormalQuantile, InvertsTheDistribution) {
   for (double p = 1e-17; p < 0.5; p *= 1.1) {
     const long double x = normal_quantile_lower(p, p - 0.5);
     const long double density = normal_density(x, 1), got = 0.5L * std::erfc(-x * std::sqrt(0.5L));
-    EXPECT_NEAR(static_cast<double>((got - p) / density), 0, 2e-15 * static_cast<double>(1 + std::abs(x)))
-        << p;
+    EXPECT_NEAR(static_cast<double>((got - p) / density), 0, 2e-15 * static_cast<double>(1 + std::abs(x))) << p;
   }
   // Near the median `from_half` alone carries the digits: x = sqrt(2 pi) (P - 1/2).
   EXPECT_NEAR(normal_quantile_lower(0.5, -1e-20) / (-1e-20 * std::sqrt(kTwoPi)), 1, 1e-15);
@@ -144,8 +141,7 @@ TEST(GateShape, ValueIntegratesToMassAndWidth) {
     const double mass = integrate(gate, [&](double x) { return gate.value(x); });
     EXPECT_NEAR(mass, gate.mass(), 1e-12) << name;
     const double mean = integrate(gate, [&](double x) { return x * gate.value(x); }) / mass;
-    const double variance =
-        integrate(gate, [&](double x) { return (x - mean) * (x - mean) * gate.value(x); }) / mass;
+    const double variance = integrate(gate, [&](double x) { return (x - mean) * (x - mean) * gate.value(x); }) / mass;
     EXPECT_NEAR(gate.width() / std::sqrt(variance), 1, 1e-10) << name;
     EXPECT_LT(gate.width(), scale) << name;
   }

@@ -85,8 +85,7 @@ TEST(AreaPerAngleAndLength, SweepsTheTriangleOnce) {
         breaks.push_back(s(v[i]));
         breaks.push_back(segment_minimum([&](double x) { return s(v[i] + (v[(i + 1) % 3] - v[i]) * x); }));
       }
-      breaks.push_back(
-          std::sqrt(length_squared(b - a) + std::max(0.0, 4 * dot(n, a - t.v0) * dot(n, b - t.v0))));
+      breaks.push_back(std::sqrt(length_squared(b - a) + std::max(0.0, 4 * dot(n, a - t.v0) * dot(n, b - t.v0))));
       std::sort(breaks.begin(), breaks.end());
       double area = 0;
       const int outer = 200, inner = 64;

@@ -41,16 +41,14 @@ Triangles rippled_sphere(int rings, double radius) {
   const auto point = [&](int i, int j) {
     const double theta = kPi * i / rings, phi = kPi * j / rings;
     const double r = radius * (1 + 0.05 * std::sin(9 * theta) * std::cos(7 * phi));
-    return Vec3{r * std::sin(theta) * std::cos(phi), r * std::sin(theta) * std::sin(phi),
-                r * std::cos(theta)};
+    return Vec3{r * std::sin(theta) * std::cos(phi), r * std::sin(theta) * std::sin(phi), r * std::cos(theta)};
   };
   Triangles triangles;
   for (int i = 0; i < rings; ++i)
     for (int j = 0; j < 2 * rings; ++j) {
       const int id = static_cast<int>(triangles.size());
       if (i > 0) triangles.push_back({{point(i, j), point(i + 1, j), point(i, j + 1)}, id});
-      if (i + 1 < rings)
-        triangles.push_back({{point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)}, id + 1});
+      if (i + 1 < rings) triangles.push_back({{point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)}, id + 1});
     }
   return triangles;
 }
@@ -65,8 +63,8 @@ struct Tally {
 /// inner ellipsoid (lengths are convex: at a vertex) and into the outer one (at a vertex, or in an arc). The query
 /// for the two surfaces must find those with arcs at either end, nothing that the whole query does not, and it is
 /// to leave out those that lie strictly between.
-void compare(const Triangles& triangles, const EllipsoidBvh& bvh, const Vec3& a, const Vec3& b,
-             double tau_low, double tau_high, Tally& tally) {
+void compare(const Triangles& triangles, const EllipsoidBvh& bvh, const Vec3& a, const Vec3& b, double tau_low,
+             double tau_high, Tally& tally) {
   std::vector<int> ids;
   bvh.query(a, b, tau_low, tau_high, ids);
   const std::set<int> found(ids.begin(), ids.end());
@@ -122,7 +120,7 @@ TEST(EllipsoidBvh, FindsWhatAScanFinds) {
   EXPECT_GT(tally.crossing, 20000);
   EXPECT_GT(tally.between, 1000);
   EXPECT_LT(tally.between_reported, tally.between / 20);  // bounds of large triangles are not tight
-  EXPECT_LT(tally.extra, tally.crossing / 1000);  // round-off: lengths that pass through a vertex
+  EXPECT_LT(tally.extra, tally.crossing / 1000);          // round-off: lengths that pass through a vertex
 }
 
 TEST(EllipsoidBvh, FindsWhatAScanFindsOnAMesh) {

@@ -105,8 +105,7 @@ TEST(ClipEllipse, ArcsStartAndEndOnEdges) {
       double best = std::numeric_limits<double>::infinity();
       int edge = -1;
       for (int i = 0; i < 3; ++i) {
-        const double h =
-            std::abs(dot(normalize(cross(area2, v[(i + 1) % 3] - v[i])), arcs.point(phi) - v[i]));
+        const double h = std::abs(dot(normalize(cross(area2, v[(i + 1) % 3] - v[i])), arcs.point(phi) - v[i]));
         if (h < best) best = h, edge = i;
       }
       // Grazing roots lose half of the digits along the ellipse but none across the edge.
@@ -161,8 +160,7 @@ TEST(ClipEllipse, NearbyInputsGiveNearbyPoints) {
 TEST(ClipEllipse, SphereOnPlane) {
   // Coinciding foci at height 3 over the plane, radius 5: a circle of radius 4 about the foot point.
   EllipseArcs arcs;
-  ASSERT_TRUE(
-      clip_ellipse(Ellipsoid({0, 0, 3}, {0, 0, 3}, 10), {-20, -10, 0}, {20, -10, 0}, {0, 30, 0}, arcs));
+  ASSERT_TRUE(clip_ellipse(Ellipsoid({0, 0, 3}, {0, 0, 3}, 10), {-20, -10, 0}, {20, -10, 0}, {0, 30, 0}, arcs));
   EXPECT_EQ(arcs.count, 1);
   EXPECT_EQ(arcs.start[0], 0);
   EXPECT_EQ(arcs.total_span, kTwoPi);
@@ -206,8 +204,7 @@ TEST(ClipEllipse, ThinEllipsoid) {
   // tau one part in 1e12 above the focal distance; a triangle across the axis sees a tiny, accurate circle.
   const double tau = 2 * (1 + 1e-12);
   const Ellipsoid e({0, 0, -1}, {0, 0, 1}, tau);
-  const long double minor =
-      std::sqrt((static_cast<long double>(tau) - 2) * (static_cast<long double>(tau) + 2)) / 2;
+  const long double minor = std::sqrt((static_cast<long double>(tau) - 2) * (static_cast<long double>(tau) + 2)) / 2;
   EllipseArcs arcs;
   ASSERT_TRUE(clip_ellipse(e, {-1, -1, 0}, {2, -1, 0}, {0, 2, 0}, arcs));
   EXPECT_EQ(arcs.total_span, kTwoPi);
@@ -224,12 +221,10 @@ TEST(ClipEllipse, RefusesWhatHasNoArc) {
   EXPECT_FALSE(clip_ellipse(e, v0, v1, v0, arcs));
   EXPECT_FALSE(clip_ellipse(e, v0, v0, v0, arcs));
   EXPECT_FALSE(clip_ellipse(e, v0, v0 + (v1 - v0) * 0.3, v1, arcs));
-  EXPECT_FALSE(
-      clip_ellipse(e, {-1.1, 0.3, 0.7}, {0.1, 0.9, 1.3}, {-0.5, 0.6, 1.0}, arcs));  // on a line, nearly
+  EXPECT_FALSE(clip_ellipse(e, {-1.1, 0.3, 0.7}, {0.1, 0.9, 1.3}, {-0.5, 0.6, 1.0}, arcs));  // on a line, nearly
   EXPECT_FALSE(clip_ellipse(Ellipsoid({0, 0, 1}, {1, 0, 1}, 1), v0, v1, v2, arcs));
-  EXPECT_FALSE(
-      clip_ellipse(Ellipsoid({0, 0, 1}, {1, 0, 1}, 2), v0, v1, v2, arcs));  // specular length sqrt(5)
-  EXPECT_FALSE(clip_ellipse(e, v0 * 0.01, v1 * 0.01, v2 * 0.01, arcs));     // wholly inside
+  EXPECT_FALSE(clip_ellipse(Ellipsoid({0, 0, 1}, {1, 0, 1}, 2), v0, v1, v2, arcs));  // specular length sqrt(5)
+  EXPECT_FALSE(clip_ellipse(e, v0 * 0.01, v1 * 0.01, v2 * 0.01, arcs));              // wholly inside
   EXPECT_FALSE(clip_ellipse(e, v0 + Vec3{9, 0, 0}, v1 + Vec3{9, 0, 0}, v2 + Vec3{9, 0, 0}, arcs));
   EXPECT_EQ(arcs.count, 0);
   EXPECT_EQ(arcs.total_span, 0);

@@ -54,8 +54,8 @@ TEST(QueryCost, GrowsWithTheCrossingTrianglesAndTheDepth) {
       pair_crossing += static_cast<double>(ids.size()) / kQueries;
     }
     const auto count = static_cast<double>(triangles.size());
-    std::printf("%8.0f triangles: crossing %7.1f visited %6.1f, two lengths: crossing %7.1f visited %6.1f\n",
-                count, crossing, visited, pair_crossing, pair_visited);
+    std::printf("%8.0f triangles: crossing %7.1f visited %6.1f, two lengths: crossing %7.1f visited %6.1f\n", count,
+                crossing, visited, pair_crossing, pair_visited);
     EXPECT_LE(visited, crossing + 3 * std::log2(count)) << count << " triangles";
     EXPECT_LE(pair_visited, pair_crossing + 6 * std::log2(count)) << count << " triangles";
     // Crossing triangles themselves grow like the square root of all: the ellipse is a curve on the mesh.

@@ -24,8 +24,7 @@ struct ReferenceEllipse {
   bool meets_plane = false;
 
   ReferenceEllipse(const Ellipsoid& e, const Triangle& t)
-      : ReferenceEllipse(extended(e.a), extended(e.b), e.tau,
-                         {extended(t.v0), extended(t.v1), extended(t.v2)}) {}
+      : ReferenceEllipse(extended(e.a), extended(e.b), e.tau, {extended(t.v0), extended(t.v1), extended(t.v2)}) {}
 
   ReferenceEllipse(const Vec3L& a, const Vec3L& b, long double tau, const Vec3L (&v)[3]) {
     const Vec3L c = (a + b) / 2.0L, f = (b - a) / 2.0L;

@@ -22,9 +22,8 @@ std::vector<EllipsoidBvh::Input> bumpy_sphere(int rows) {
   std::vector<EllipsoidBvh::Input> triangles;
   for (int i = 0; i < rows; ++i)
     for (int j = 0; j < 2 * rows; ++j)
-      for (const auto& corners :
-           {std::array{point(i, j), point(i + 1, j), point(i, j + 1)},
-            std::array{point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)}})
+      for (const auto& corners : {std::array{point(i, j), point(i + 1, j), point(i, j + 1)},
+                                  std::array{point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)}})
         triangles.push_back({corners, static_cast<int>(triangles.size())});
   return triangles;
 }
@@ -47,7 +46,10 @@ struct Setting {
 };
 /// A camera that sees a part, a lamp at grazing incidence, both lengths of a pair.
 const Setting kSettings[] = {
-    {{{3, 0.5, 0.2}, {-1, 0, 0}, 0.97, std::sqrt(1 - 0.97 * 0.97), false}, {{0, 3, 1}, {0, -1, 0}, 0, 1, true}, 5.1, 5.1},
+    {{{3, 0.5, 0.2}, {-1, 0, 0}, 0.97, std::sqrt(1 - 0.97 * 0.97), false},
+     {{0, 3, 1}, {0, -1, 0}, 0, 1, true},
+     5.1,
+     5.1},
     {{{0, 1.2, 0}, {0, -0.6, 0.8}, 0, 1, true}, {{0.5, 1.6, 0}, {0, -1, 0}, 0, 1, true}, 1.30, 1.35},
     {{{1.5, 1.5, 0}, {0, 0, 0}, 0, 1, false}, {{1.5, 1.5, 0}, {-0.6, -0.8, 0}, 0, 1, true}, 3.0, 3.0},
 };

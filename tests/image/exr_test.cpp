@@ -108,8 +108,7 @@ TEST_F(Exr, RoundTripKeepsEveryBit) {
       const GatedImage back = read_exr(path());
       ASSERT_TRUE(back.same_shape(image));
       for (std::size_t i = 0; i < image.data.size(); ++i)
-        ASSERT_EQ(std::bit_cast<std::uint64_t>(back.data[i]), std::bit_cast<std::uint64_t>(image.data[i]))
-            << i;
+        ASSERT_EQ(std::bit_cast<std::uint64_t>(back.data[i]), std::bit_cast<std::uint64_t>(image.data[i])) << i;
     }
   }
 }
@@ -173,16 +172,14 @@ TEST_F(Exr, ComponentsAreAveragesOverChannels) {
     }
   }
   EXPECT_THROW(write_exr_components(path(), {"interior"}, {interior, visibility}), std::invalid_argument);
-  EXPECT_THROW(write_exr_components(path(), {"a", "b"}, {interior, GatedImage(2, 2, 1, 3)}),
-               std::invalid_argument);
+  EXPECT_THROW(write_exr_components(path(), {"a", "b"}, {interior, GatedImage(2, 2, 1, 3)}), std::invalid_argument);
   EXPECT_THROW(write_exr(path(), GatedImage(0, 2, 1, 1)), std::invalid_argument);
   EXPECT_THROW(write_exr(path(), GatedImage(2, 2, 1, 2)), std::invalid_argument);
 }
 
 TEST_F(Exr, ReadsOtherCompressionsAndHalf) {
   using enum Imf::Compression;
-  for (const Imf::Compression compression :
-       {NO_COMPRESSION, RLE_COMPRESSION, ZIPS_COMPRESSION, PIZ_COMPRESSION}) {
+  for (const Imf::Compression compression : {NO_COMPRESSION, RLE_COMPRESSION, ZIPS_COMPRESSION, PIZ_COMPRESSION}) {
     write_raw(path(), {"gate000.Y", "gate001.Y"}, 1.5f, Imf::FLOAT, compression);
     EXPECT_EQ(read_exr(path()).data, std::vector<double>(24, 1.5));
   }
@@ -218,8 +215,8 @@ TEST_F(Exr, ReadErrorsNameTheFirstThingAmiss) {
   const std::string kinds = " is not one of a gated image (gateNNN.Y, or gateNNN.R, .G, .B)";
   write_raw(path(), {"R", "G", "B"});
   EXPECT_EQ(read_error(), ": channel 'B'" + kinds);
-  for (const std::string name : {"gate00.Y", "gate0000.Y", "gate-01.Y", "gate000.A", "gate000Y", "gate000.",
-                                 "gat000.Y", "gate0a0.Y", "gate99999999999.Y"}) {
+  for (const std::string name : {"gate00.Y", "gate0000.Y", "gate-01.Y", "gate000.A", "gate000Y", "gate000.", "gat000.Y",
+                                 "gate0a0.Y", "gate99999999999.Y"}) {
     write_raw(path(), {name});
     EXPECT_EQ(read_error(), ": channel '" + name + "'" + kinds);
   }
@@ -259,8 +256,7 @@ TEST_F(Exr, HeadersAreNotBelieved) {
   const std::string_view order = "lineOrder\0lineOrder\0\1\0\0\0"sv;
   const std::string cannot = ": cannot be read as OpenEXR: ";
   EXPECT_EQ(error_with(order, "other\0unknown\0\0\0\0\x70"s), cannot + "the header ends too early");
-  EXPECT_EQ(error_with(order, "lineOrder\0lineOrder\0\xff\xff\xff\xff"s),
-            cannot + "the header ends too early");
+  EXPECT_EQ(error_with(order, "lineOrder\0lineOrder\0\xff\xff\xff\xff"s), cannot + "the header ends too early");
   // A list of channels without its end, which OpenEXR would look for in the attributes behind.
   EXPECT_EQ(error_with("\1\0\0\0\0compression\0"sv, "\1\0\0\0x"s + "compression\0"s),
             cannot + "the header ends too early");
@@ -306,8 +302,7 @@ TEST_F(Exr, UnwritableFilesLeaveNothingBehind) {
   EXPECT_EQ(error_of([&] { write_exr(path("none/f.exr"), image); }),
             path("none/f.exr") + ": cannot be written: No such file or directory");
   folder.write("sub/keep", "x");
-  EXPECT_EQ(error_of([&] { write_exr(path("sub"), image); }),
-            path("sub") + ": cannot be written: Is a directory");
+  EXPECT_EQ(error_of([&] { write_exr(path("sub"), image); }), path("sub") + ": cannot be written: Is a directory");
   EXPECT_EQ(folder.read("sub/keep"), "x");
   EXPECT_EQ(folder.entries(), 1);
 }

@@ -13,8 +13,7 @@ inline constexpr int kSide = 16, kSamples = 60000;
 
 inline int bin(double u, double phi) {
   const double v = phi / kTwoPi - std::floor(phi / kTwoPi);
-  return std::min(static_cast<int>(u * kSide), kSide - 1) * kSide +
-         std::min(static_cast<int>(v * kSide), kSide - 1);
+  return std::min(static_cast<int>(u * kSide), kSide - 1) * kSide + std::min(static_cast<int>(v * kSide), kSide - 1);
 }
 
 /// z of the chi-square of counts (the last bin holds the empty draws) against probabilities; thin bins are

@@ -29,7 +29,9 @@ struct Cosines {
   double i, o, io;
 };
 
-Cosines cosines(const Vec3& i, const Vec3& o) { return {i.z, o.z, dot(i, o)}; }
+Cosines cosines(const Vec3& i, const Vec3& o) {
+  return {i.z, o.z, dot(i, o)};
+}
 
 Vec3 direction(double theta, double phi) {
   return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};

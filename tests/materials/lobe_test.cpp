@@ -32,8 +32,8 @@ T textbook_lobe(const T& cos_i, const T& cos_o, const T& cos_io, const T& alpha)
   const T cos_h = (cos_i + cos_o) / sqrt(T(2) + T(2) * cos_io);
   const T tan2_h = (T(1) - cos_h * cos_h) / (cos_h * cos_h);
   const T factor = T(1) + tan2_h / (alpha * alpha);
-  const T d = T(1) / (T(3.14159265358979323846264338327950288L) * alpha * alpha * cos_h * cos_h * cos_h *
-                      cos_h * factor * factor);
+  const T d = T(1) / (T(3.14159265358979323846264338327950288L) * alpha * alpha * cos_h * cos_h * cos_h * cos_h *
+                      factor * factor);
   const T g2 = T(1) / (T(1) + smith_lambda(cos_i, alpha) + smith_lambda(cos_o, alpha));
   return d * g2 / (T(4) * cos_i * cos_o);
 }
@@ -146,8 +146,7 @@ TEST(Lobe, NothingBelowTheSurface) {
   for (Material m : {Material{}, conductor(0.3)}) {
     for (const bool two_sided : {false, true}) {
       m.two_sided = two_sided;
-      for (const auto& [i, o] :
-           std::vector<std::pair<double, double>>{{-0.5, 0.5}, {0.5, -0.5}, {0, 0.5}, {0.5, 0}}) {
+      for (const auto& [i, o] : std::vector<std::pair<double, double>>{{-0.5, 0.5}, {0.5, -0.5}, {0, 0.5}, {0.5, 0}}) {
         EXPECT_EQ(lobe(m, i, o, 0.1), 0);
         EXPECT_EQ(direction_pdf(m, i, o, 0.1), 0);
         const LobeDerivative d = lobe_derivative(m, i, o, 0.1);
@@ -173,8 +172,7 @@ TEST(Lobe, OppositeDirections) {
 TEST(Lobe, TwoSidedMirrorsValueAndDerivative) {
   const Material m = conductor(0.25, true);
   const Cosines c = cosines(0.8, 0.5, 2.8);
-  const LobeDerivative front = lobe_derivative(m, c.i, c.o, c.io),
-                       back = lobe_derivative(m, -c.i, -c.o, c.io);
+  const LobeDerivative front = lobe_derivative(m, c.i, c.o, c.io), back = lobe_derivative(m, -c.i, -c.o, c.io);
   EXPECT_GT(front.value, 0);
   EXPECT_EQ(back.value, front.value);
   EXPECT_EQ(back.d_cos_i, -front.d_cos_i);

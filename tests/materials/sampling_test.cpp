@@ -54,8 +54,7 @@ TEST(SampleDirection, ConductorFollowsItsDensity) {
           if (facing <= 0) continue;
           const Vec3 i = 2 * facing * h - o;
           const double by_g_phi = 4 * facing * std::pow(h.z / g, 3) * alpha * alpha;
-          const double mass =
-              direction_pdf(m, i.z, o.z, dot(i, o)) * by_g_phi * kTwoPi / (kSide * kSide * kSub * kSub);
+          const double mass = direction_pdf(m, i.z, o.z, dot(i, o)) * by_g_phi * kTwoPi / (kSide * kSide * kSub * kSub);
           probability[bin(g, phi)] += mass;
           total += mass;
         }
@@ -90,8 +89,7 @@ TEST(SampleDirection, DiffuseFollowsTheCosine) {
   Rng rng({12, 0, 0}, 0, 0);
   for (int k = 0; k < kSamples; ++k) {
     const double u0 = rng.uniform(), u1 = rng.uniform();
-    const auto sample =
-        sample_direction(make(MaterialType::diffuse), kNormal, frame.world(tilted(1.0)), u0, u1);
+    const auto sample = sample_direction(make(MaterialType::diffuse), kNormal, frame.world(tilted(1.0)), u0, u1);
     ASSERT_TRUE(sample);
     const Vec3 i = frame.local(sample->direction);
     ++counts[bin(i.x * i.x + i.y * i.y, std::atan2(i.y, i.x))];
@@ -104,8 +102,8 @@ TEST(SampleDirection, WeightAndDensityAgreeWithTheLobe) {
   Rng rng({13, 0, 0}, 0, 0);
   for (const bool behind : {false, true}) {
     for (const double alpha : {0.0, 0.01, 0.1, 0.8}) {  // 0: diffuse
-      const Material m = alpha == 0 ? make(MaterialType::diffuse, 1, behind)
-                                    : make(MaterialType::rough_conductor, alpha, behind);
+      const Material m =
+          alpha == 0 ? make(MaterialType::diffuse, 1, behind) : make(MaterialType::rough_conductor, alpha, behind);
       for (int k = 0; k < 2000; ++k) {
         Vec3 o = tilted(1.57 * rng.uniform());
         if (behind) o.z = -o.z;
@@ -122,8 +120,7 @@ TEST(SampleDirection, WeightAndDensityAgreeWithTheLobe) {
         // w_o|^2.
         const double q = 2 + 2 * cos_io, p = cos_i + cos_o;
         const double t = alpha * alpha * p * p + std::max(q - p * p, 0.0);
-        const double tolerance =
-            16 * std::numeric_limits<double>::epsilon() * (1 + (alpha > 0 ? 2 / t + 1 / q : 0));
+        const double tolerance = 16 * std::numeric_limits<double>::epsilon() * (1 + (alpha > 0 ? 2 / t + 1 / q : 0));
         EXPECT_NEAR(sample->pdf / direction_pdf(m, cos_i, cos_o, cos_io), 1, tolerance);
         const double expected = lobe(m, cos_i, cos_o, cos_io) * std::abs(cos_i);
         EXPECT_NEAR(sample->weight * sample->pdf / expected, 1, tolerance + 8e-16 / std::abs(cos_i));
@@ -192,8 +189,7 @@ TEST(Lobe, SmoothConductorKeepsItsEnergy) {
   Rng rng({15, 0, 0}, 0, 0);
   for (int k = 0; k < 10000; ++k) {
     const double u0 = rng.uniform(), u1 = rng.uniform();
-    const auto sample =
-        sample_direction(make(MaterialType::rough_conductor, 0.01), {0, 0, 1}, tilted(0.5), u0, u1);
+    const auto sample = sample_direction(make(MaterialType::rough_conductor, 0.01), {0, 0, 1}, tilted(0.5), u0, u1);
     if (sample) sum += sample->weight;
   }
   EXPECT_NEAR(sum / 10000, 1, 2e-3);

@@ -18,8 +18,8 @@ T fresnel(const T& cos1, const T& cos2, const T& n1, const T& n2) {
 template <class T>
 T ggx(const T& cos_h, const T& alpha) {
   const T tan2 = (T(1) - cos_h * cos_h) / (cos_h * cos_h), factor = T(1) + tan2 / (alpha * alpha);
-  return T(1) / (T(3.14159265358979323846264338327950288L) * alpha * alpha * cos_h * cos_h * cos_h * cos_h * factor *
-                 factor);
+  return T(1) /
+         (T(3.14159265358979323846264338327950288L) * alpha * alpha * cos_h * cos_h * cos_h * cos_h * factor * factor);
 }
 
 template <class T>

@@ -34,7 +34,9 @@ Point scrambled(std::uint64_t key, std::uint32_t index) {
   return assemble([=](std::uint32_t b) { return scrambled_sobol(key, index, b); });
 }
 
-std::uint64_t random_key(std::uint32_t k) { return Rng({11, 0, 0}, k, 0).scramble_key(0); }
+std::uint64_t random_key(std::uint32_t k) {
+  return Rng({11, 0, 0}, k, 0).scramble_key(0);
+}
 
 /// Whether the points hold one in each of the boxes that bits_x halvings of one axis and bits_y of the other make.
 bool one_in_each(const std::vector<Point>& points, int x, int bits_x, int y, int bits_y) {
@@ -61,7 +63,9 @@ void expect_even(F&& point) {
     }
 }
 
-TEST(Sobol, OneInEachElementaryInterval) { expect_even(plain); }
+TEST(Sobol, OneInEachElementaryInterval) {
+  expect_even(plain);
+}
 
 TEST(Sobol, StillSoAfterScrambling) {
   for (std::uint32_t k = 0; k < 4; ++k)

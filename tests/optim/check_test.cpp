@@ -39,8 +39,7 @@ class CheckTiny : public testing::Test {
 TEST_F(CheckTiny, SeesAFactorOfTwoAndAMissingTerm) {
   std::vector<std::string> notes;
   const Problem problem(check_experiment(
-      load_experiment(file_, {"samples={primal: 65536, interior: 16, visibility: 0, path_length: 0}"}),
-      notes));
+      load_experiment(file_, {"samples={primal: 65536, interior: 16, visibility: 0, path_length: 0}"}), notes));
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_NE(notes[0].find("visibility"), std::string::npos);
   EXPECT_EQ(problem.experiment().samples.interior, 65536);
@@ -92,8 +91,8 @@ TEST_F(CheckTiny, TermsAndStepsFollowTheExperiment) {
   const Problem given(check_experiment(load_experiment(file_, {"gradient={step: 0.02}"}), notes));
   EXPECT_EQ(check_step(given, theta, 0), 0.02);
   EXPECT_EQ(check_step(given, theta, 1), 0.02);
-  const Problem narrow(check_experiment(
-      load_experiment(file_, {"gates.sigma=0.01", "parameters[0].direction=[0, 2, 0]"}), notes));
+  const Problem narrow(
+      check_experiment(load_experiment(file_, {"gates.sigma=0.01", "parameters[0].direction=[0, 2, 0]"}), notes));
   EXPECT_NEAR(check_step(narrow, theta, 0), 0.0025, 1e-12);
   EXPECT_THROW(check_experiment(load_experiment(file_, {"samples={primal: 1, interior: 1, visibility: 1, "
                                                         "path_length: 1}"}),

@@ -24,45 +24,36 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
   const Case cases[] = {
       {"name: tiny", "nam: tiny", "1:1: name: is missing, is 'nam' a misspelling of it?"},
       {"name: tiny", "name: a/b", "1:7: name: 'a/b' is not a usable name (letters, digits, _ and -)"},
-      {"scene.yaml", "none.yaml",
-       "2:8: scene: there is no file 'none.yaml' (a path relative to the experiment file)"},
+      {"scene.yaml", "none.yaml", "2:8: scene: there is no file 'none.yaml' (a path relative to the experiment file)"},
       {"scene.yaml", std::string(5000, 'x'), "2:8: scene: there is no file '" + std::string(40, 'x') + "...'"},
-      {"type: translation, shape: block, direction: [0, 1, 0]",
-       "type: rotation, shape: block, axis: [0, 1e200, 0]",
+      {"type: translation, shape: block, direction: [0, 1, 0]", "type: rotation, shape: block, axis: [0, 1e200, 0]",
        "6:56: parameters[0].axis: is too long or too short (a length whose square a double can hold)"},
-      {"max_bounces: 2", "max_bounces: -1",
-       "3:14: max_bounces: -1 is out of range (an integer from 0 to 10000)"},
-      {"max_bounces: 2", "max_bounces: 2.5",
-       "3:14: max_bounces: '2.5' is not an integer that fits (an integer from 0"},
+      {"max_bounces: 2", "max_bounces: -1", "3:14: max_bounces: -1 is out of range (an integer from 0 to 10000)"},
+      {"max_bounces: 2", "max_bounces: 2.5", "3:14: max_bounces: '2.5' is not an integer that fits (an integer from 0"},
       {"max_bounces", "max_bounce",
        "3:1: max_bounce: is not a known key, did you mean 'max_bounces'? (allowed: name, "},
       {"kind: gaussian", "kind: gauss", "4:15: gates.kind: 'gauss' is not known"},
       {"centers: [4.5, 5.5]", "centers: []", "4:34: gates.centers: holds no gate (at least one number)"},
-      {"centers: [4.5, 5.5]", "centers: [4.5, -1]",
-       "4:40: gates.centers[1]: -1 is out of range (a number at least 0)"},
+      {"centers: [4.5, 5.5]", "centers: [4.5, -1]", "4:40: gates.centers[1]: -1 is out of range (a number at least 0)"},
       {"centers: [4.5, 5.5]", "centers: {start: 5, stop: 4, count: 3}",
        "4:51: gates.centers.stop: 4 lies before start (at least 5)"},
-      {"centers: [4.5, 5.5]", "centers: {start: 5, stop: 6, count: 0}",
-       "4:61: gates.centers.count: 0 is out of range"},
+      {"centers: [4.5, 5.5]", "centers: {start: 5, stop: 6, count: 0}", "4:61: gates.centers.count: 0 is out of range"},
       {"centers: [4.5, 5.5]", "centers: 5",
        "4:34: gates.centers: is neither (a list of numbers, or {start, stop, count})"},
       {"sigma: 0.3", "sigma: 0", "4:53: gates.sigma: 0 is out of range (a number above 0)"},
       {"sigma: 0.3", "sigma: 0.3, width: 1", "4:58: gates.width: is not a known key"},
       {"sigma: 0.3", "sigma: 0.3, unit: ns", "4:8: gates.scene_unit_m: is missing"},
       {gates, "{kind: steady, centers: [1]}", "4:23: gates.centers: is not a known key"},
-      {gates, "{kind: boxcar, centers: [1], width: .inf}",
-       "4:44: gates.width: '.inf' is not a finite number"},
+      {gates, "{kind: boxcar, centers: [1], width: .inf}", "4:44: gates.width: '.inf' is not a finite number"},
       {gates, "{kind: truncated_gaussian, centers: [1], sigma: 1}", "4:8: gates.half_width: is missing"},
       {gates, "{kind: tabulated, centers: [1], offsets: [0, 1], values: [1]}",
        "4:65: gates.values: 1 values are given (one for each of the 2 offsets)"},
       {gates, "{kind: tabulated, centers: [1], offsets: [1, 0], values: [1, 1]}",
        "4:8: gates: the table is no gate (two rows or more, offsets in rising order, values at least 0"},
-      {gates, "{kind: tabulated, centers: [1], file: gone.txt}",
-       "4:46: gates.file: there is no file 'gone.txt'"},
+      {gates, "{kind: tabulated, centers: [1], file: gone.txt}", "4:46: gates.file: there is no file 'gone.txt'"},
       {"name: height", "name: target", "6:12: parameters[0].name: 'target' is the name of another output"},
       {"name: power", "name: height", "7:12: parameters[1].name: 'height' stands here twice"},
-      {"type: translation", "type: shift",
-       "6:26: parameters[0].type: 'shift' is not known (allowed: translation, "},
+      {"type: translation", "type: shift", "6:26: parameters[0].type: 'shift' is not known (allowed: translation, "},
       {"shape: block", "material: metal", "6:5: parameters[0].shape: is missing"},
       {"direction: [0, 1, 0]", "direction: [0, 0, 0]",
        "6:64: parameters[0].direction: the zero vector has no direction"},
@@ -71,29 +62,26 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "6:92: parameters[0].selection.box.max: is missing"},
       {"direction: [0, 1, 0]", "direction: [0, 1, 0], selection: 3",
        "6:86: parameters[0].selection: is neither (a list of vertex indices, or {box: {min, max}})"},
-      {"type: translation, shape: block, direction: [0, 1, 0]",
-       "type: vertices, shape: block, direction: inward",
+      {"type: translation, shape: block, direction: [0, 1, 0]", "type: vertices, shape: block, direction: inward",
        "6:61: parameters[0].direction: 'inward' is not known (allowed: normal, free)"},
       {"initial: 0.2", "initial: []", "6:84: parameters[0].initial: holds no number (at least one)"},
       {"initial: 0.2", "initial: [0.2, x]", "6:90: parameters[0].initial[1]: 'x' is not a finite number"},
       {"initial: 0.2", "initial: gone.txt", "6:84: parameters[0].initial: there is no file 'gone.txt'"},
       {", target: 0}", "}", "6:5: parameters[0].target: is missing"},
       {"target: 10}", "target: 10, lower: a}", "7:79: parameters[1].lower: there is no file 'a'"},
-      {"samples: 64,", "samples: 0,",
-       "8:19: target.samples: 0 is out of range (an integer from 1 to 1073741824)"},
+      {"samples: 64,", "samples: 0,", "8:19: target.samples: 0 is out of range (an integer from 1 to 1073741824)"},
       {"{samples: 64, seed: 7}", "{images: gone.exr}", "8:18: target.images: there is no file 'gone.exr'"},
       {"{samples: 64, seed: 7}", "{images: scene.yaml, seed: 7}",
        "8:30: target.seed: is not a known key (allowed: images)"},
       {"primal: 16", "primal: 0", "9:19: samples.primal: 0 is out of range"},
       {"interior: 16", "interior: -2", "9:33: samples.interior: -2 is out of range"},
-      {"path_length", "pathlength",
-       "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},
-      {"iterations: 6", "iterations: 6, inner_iterations: 3",
-       "10:63: optimizer.inner_iterations: is not a known key"},
+      {"path_length", "pathlength", "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},
+      {"iterations: 6", "iterations: 6, inner_iterations: 3", "10:63: optimizer.inner_iterations: is not a known key"},
       {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, inner_iterations: 0",
        "10:46: optimizer.inner_iterations: 0 is out of range"},
       {"iterations: 6", "decay: {start: 5}", "10:55: optimizer.decay.half_life: is missing"},
-      {"iterations: 6", "decay: {half_life: 0}", "10:67: optimizer.decay.half_life: 0 is out of range (a number above 0)"},
+      {"iterations: 6", "decay: {half_life: 0}",
+       "10:67: optimizer.decay.half_life: 0 is out of range (a number above 0)"},
       {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, decay: {half_life: 5}",
        "10:28: optimizer.decay: is not a known key"},
       {"iterations: 6", "stop: {window: 1}", "10:63: optimizer.stop.window: 1 is out of range"},
@@ -101,8 +89,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"seed: 3", "loss: {kind: absolute}",
        "11:14: loss.kind: 'absolute' is not known (allowed: squared, huber, cauchy"},
       {"seed: 3", "loss: {kind: huber, scale: 0}", "11:28: loss.scale: 0 is out of range (a number above 0)"},
-      {"method: adam", "method: sgd",
-       "10:21: optimizer.method: 'sgd' is not known (allowed: adam, lbfgs, levenberg_"},
+      {"method: adam", "method: sgd", "10:21: optimizer.method: 'sgd' is not known (allowed: adam, lbfgs, levenberg_"},
       {"learning_rate: 0.02", "learning_rate: 0",
        "10:42: optimizer.learning_rate: 0 is out of range (a number above 0)"},
       {"iterations: 6", "iterations: -1", "10:60: optimizer.iterations: -1 is out of range"},
@@ -113,10 +100,8 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"seed: 3", "gradient: {method: exact}",
        "11:20: gradient.method: 'exact' is not known (allowed: analytic, finite"},
       {"seed: 3", "gradient: {step: 0}", "11:18: gradient.step: 0 is out of range (a number above 0)"},
-      {"seed: 3", "estimator: {sampling: best}",
-       "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
-      {"seed: 3", "estimator: {antithetic: 1}",
-       "11:25: estimator.antithetic: '1' is neither (true or false)"},
+      {"seed: 3", "estimator: {sampling: best}", "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
+      {"seed: 3", "estimator: {antithetic: 1}", "11:25: estimator.antithetic: '1' is neither (true or false)"},
   };
   for (const Case& c : cases) {
     const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
@@ -131,8 +116,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
   }
   const auto table_error = [&](const std::string& table) -> std::string {
     const std::string file = folder.write(
-        "tiny.yaml",
-        replaced(tiny_experiment(), gates, "{kind: tabulated, centers: [5], file: " + table + "}"));
+        "tiny.yaml", replaced(tiny_experiment(), gates, "{kind: tabulated, centers: [5], file: " + table + "}"));
     try {
       load_experiment(file);
     } catch (const InputError& error) {
@@ -177,8 +161,7 @@ TEST(Experiment, OverridesAreCheckedLikeTheFile) {
 TEST(Experiment, DefaultsAreFilledIn) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
-  const Experiment e =
-      load_experiment(folder.write("e.yaml", "name: e\nscene: scene.yaml\ngates: {kind: steady}\n"));
+  const Experiment e = load_experiment(folder.write("e.yaml", "name: e\nscene: scene.yaml\ngates: {kind: steady}\n"));
   EXPECT_EQ(e.estimator.max_bounces, 8);
   EXPECT_EQ(e.samples.visibility, 64);
   EXPECT_EQ(e.target.samples, 4096);
@@ -215,25 +198,23 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
       "numbers: independent, guiding: false, follow_radius: 2.5}\n"
       "gradient: {method: finite_difference, step: 0.003}\nresolution: [12, 9]\n";
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
-  for (const char* other :
-       {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
-        "{kind: boxcar, centers: {start: 1, stop: 2, count: 4}, width: 0.7}",
-        "{kind: truncated_gaussian, centers: [3], sigma: 0.2, half_width: 0.6, unit: ps, "
-        "scene_unit_m: 0.33}",
-        "{kind: tabulated, centers: [3], file: table.txt}"}) {
+  for (const char* other : {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
+                            "{kind: boxcar, centers: {start: 1, stop: 2, count: 4}, width: 0.7}",
+                            "{kind: truncated_gaussian, centers: [3], sigma: 0.2, half_width: 0.6, unit: ps, "
+                            "scene_unit_m: 0.33}",
+                            "{kind: tabulated, centers: [3], file: table.txt}"}) {
     std::string text = replaced(replaced(tiny_experiment(), gates, other), "seed: 3\n", vertices);
     text = replaced(text, "seed: 7}", "seed: 7, max_bounces: 3}");
-    text = replaced(
-        text, "  - {name: power",
-        "  - {name: dent, type: vertices, shape: block, direction: normal, initial: values.txt, target: "
-        "[0, 0, 0, 0.1], lower: -1, upper: [1, 2, 3, 4]}\n"
-        "  - {name: turn, type: rotation, shape: block, axis: [0, 3, 4], pivot: [1, 0.1, 0], selection: "
-        "{box: {min: [-1, 0, -1], max: [0, 1, 0.1]}}, initial: 5, target: 0}\n"
-        "  - {name: pull, type: vertices, shape: block, direction: [1, 1, 0], selection: [2, 0], initial: "
-        "0, target: [0.1, -0.1]}\n"
-        "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
-        "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
-        "  - {name: power");
+    text = replaced(text, "  - {name: power",
+                    "  - {name: dent, type: vertices, shape: block, direction: normal, initial: values.txt, target: "
+                    "[0, 0, 0, 0.1], lower: -1, upper: [1, 2, 3, 4]}\n"
+                    "  - {name: turn, type: rotation, shape: block, axis: [0, 3, 4], pivot: [1, 0.1, 0], selection: "
+                    "{box: {min: [-1, 0, -1], max: [0, 1, 0.1]}}, initial: 5, target: 0}\n"
+                    "  - {name: pull, type: vertices, shape: block, direction: [1, 1, 0], selection: [2, 0], initial: "
+                    "0, target: [0.1, -0.1]}\n"
+                    "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
+                    "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
+                    "  - {name: power");
     text = replaced(text, "max_bounces: 3}", "max_bounces: 3, noise: {photons: 12.5}}");
     text = replaced(text, "method: adam", "method: lbfgs, inner_iterations: 3, stop: {window: 7}");
     text += "loss: {kind: cauchy, scale: 0.3}\n";
@@ -277,7 +258,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.parameters[2].selection.max, (Vec3{0, 1, 0.1}));
     EXPECT_EQ(back.parameters[3].selection.indices, (std::vector<int>{2, 0}));
     EXPECT_EQ(back.parameters[4].material, "metal");
-    const std::string decaying = replaced(text, "method: lbfgs, inner_iterations: 3", "decay: {start: 20, half_life: 12.5}");
+    const std::string decaying =
+        replaced(text, "method: lbfgs, inner_iterations: 3", "decay: {start: 20, half_life: 12.5}");
     const Experiment adam = load_experiment(folder.write("adam.yaml", decaying));
     const Experiment again = load_experiment(folder.write("runs/deep/adam.yaml", resolved_yaml(adam, out)));
     EXPECT_EQ(again.optimizer.decay.start, 20);

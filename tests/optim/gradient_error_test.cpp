@@ -25,8 +25,7 @@ class Normal {
 };
 
 /// Correlated components: each is `shared` times one normal number plus `own` times another, about `center`.
-Repeats normal_repeats(Normal& normal, int count, const std::vector<double>& center, double shared,
-                       double own) {
+Repeats normal_repeats(Normal& normal, int count, const std::vector<double>& center, double shared, double own) {
   Repeats repeats;
   for (int k = 0; k < count; ++k) {
     const double common = shared * normal();
@@ -107,19 +106,16 @@ TEST(GradientError, FalseAlarmsOfABiasAreRare) {
     constexpr int kTrials = 2000;
     for (int trial = 0; trial < kTrials; ++trial) {
       const std::vector<double> zero(unknowns, 0.0);
-      const Repeats a = normal_repeats(normal, 24, zero, 0.5, 1),
-                    b = normal_repeats(normal, 32, zero, 0.5, 1);
+      const Repeats a = normal_repeats(normal, 24, zero, 0.5, 1), b = normal_repeats(normal, 32, zero, 0.5, 1);
       const WeightedRepeats groups[] = {{&a, 1}, {&b, -1}};
       if (significant(squared_norm(groups))) ++alarms;
     }
-    EXPECT_LT(alarms, 0.04 * kTrials)
-        << unknowns;  // 2.2 %, more as the noise's size is an estimate; 3 sigma: 1 %
+    EXPECT_LT(alarms, 0.04 * kTrials) << unknowns;  // 2.2 %, more as the noise's size is an estimate; 3 sigma: 1 %
   }
 }
 
 /// Rungs of an estimator of two unknowns with total variance rate / t + excess / t^2 and a bias.
-std::vector<Rung> ladder(Normal& normal, const std::vector<double>& truth, double rate, double excess,
-                         double bias) {
+std::vector<Rung> ladder(Normal& normal, const std::vector<double>& truth, double rate, double excess, double bias) {
   std::vector<Rung> rungs;
   for (int r = 0; r < 5; ++r) {
     Rung rung;

@@ -14,8 +14,8 @@ TEST(Gradient, AgreesWithFiniteDifferences) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
-  const std::vector<std::string> samples = {
-      "samples={primal: 2048, interior: 2048, visibility: 2048, path_length: 0}", "parameters[1].initial=2"};
+  const std::vector<std::string> samples = {"samples={primal: 2048, interior: 2048, visibility: 2048, path_length: 0}",
+                                            "parameters[1].initial=2"};
   const Problem analytic(load_experiment(file, samples));
   std::vector<std::string> with_method = samples;
   with_method.push_back("gradient={method: finite_difference, step: 0.01}");
@@ -42,8 +42,7 @@ TEST(Gradient, OfAnEmissionIsKnown) {
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
   const Problem problem(load_experiment(
-      file,
-      {"samples={primal: 1024, interior: 1024, visibility: 0, path_length: 0}", "parameters[1].initial=2"}));
+      file, {"samples={primal: 1024, interior: 1024, visibility: 0, path_length: 0}", "parameters[1].initial=2"}));
   const Poll go_on = [] {};
   const GatedImage target = problem.make_target(go_on);
   const std::vector<double> theta = problem.parameters().initial();

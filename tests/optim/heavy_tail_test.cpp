@@ -52,8 +52,7 @@ TEST(HeavyTail, WarningNamesParametersAndGates) {
   EXPECT_EQ(tails.warning(), "");
   for (const int gate : {0, 1, 2, 2, 7}) tails.add("height", gate, 20);
   tails.add("width", 3, 25.25);
-  EXPECT_NE(tails.warning().find("height (gates 0-2, 7), width (gate 3): "), std::string::npos)
-      << tails.warning();
+  EXPECT_NE(tails.warning().find("height (gates 0-2, 7), width (gate 3): "), std::string::npos) << tails.warning();
   EXPECT_NE(tails.warning().find("25.2"), std::string::npos);
   HeavyTails many;
   for (int i = 0; i < 9; ++i) many.add(std::string(1, static_cast<char>(97 + i)), -1, 13);

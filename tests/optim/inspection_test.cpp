@@ -26,13 +26,12 @@ class InspectionTest : public testing::Test {
 
 TEST_F(InspectionTest, OpenSceneNeedsOneBounce) {
   // Floor and lamp alone: light that leaves the floor meets nothing but the lamp, which reflects nothing.
-  folder_.write(
-      "open.yaml",
-      "camera: {position: [0.2, 2.5, 2.5], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [8, 8]}\n"
-      "materials: {white: {type: diffuse, albedo: 0.6}, black: {type: diffuse, albedo: 0}}\n"
-      "shapes:\n"
-      "  - {name: floor, file: floor.obj, material: white}\n"
-      "  - {name: lamp, file: lamp.obj, material: black, emission: 10}\n");
+  folder_.write("open.yaml",
+                "camera: {position: [0.2, 2.5, 2.5], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [8, 8]}\n"
+                "materials: {white: {type: diffuse, albedo: 0.6}, black: {type: diffuse, albedo: 0}}\n"
+                "shapes:\n"
+                "  - {name: floor, file: floor.obj, material: white}\n"
+                "  - {name: lamp, file: lamp.obj, material: black, emission: 10}\n");
   const Inspection inspection = run({"scene=open.yaml", "max_bounces=5",
                                      "parameters=[{name: x, type: translation, shape: lamp, direction: [1, "
                                      "0, 0], initial: 0.3, target: 0}]"});
@@ -121,10 +120,9 @@ TEST_F(InspectionTest, FragmentReadsBack) {
   const Experiment before = load_experiment(file_, {"max_bounces=6"});
   const Setting setting{3, Sampling::standard, {5, 6, 7, 0}};
   const std::string fragment = advice_yaml(before, setting);
-  EXPECT_EQ(
-      fragment,
-      "max_bounces: 3\ntarget:\n  max_bounces: 6\nsamples:\n  primal: 5\n  interior: 6\n  visibility: 7\n"
-      "  path_length: 0\nestimator:\n  sampling: standard\n");
+  EXPECT_EQ(fragment,
+            "max_bounces: 3\ntarget:\n  max_bounces: 6\nsamples:\n  primal: 5\n  interior: 6\n  visibility: 7\n"
+            "  path_length: 0\nestimator:\n  sampling: standard\n");
   const std::string file =
       folder_.write("new.yaml", "name: new\nscene: scene.yaml\ngates: {kind: steady}\n" + fragment);
   const Experiment read = load_experiment(file);

@@ -1,3 +1,5 @@
+#include "optim/optimizer.h"
+
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -10,7 +12,6 @@
 #include "optim/checkpoint.h"
 #include "optim/log.h"
 #include "optim/loss.h"
-#include "optim/optimizer.h"
 #include "tests/optim/synthetic_objective.h"
 #include "tests/optim/temporary_folder.h"
 
@@ -69,8 +70,7 @@ TEST(Loss, AdjointIsTheDerivativeOfTheLoss) {
     image.data[i] = std::sin(1.0 + static_cast<double>(i));
     target.data[i] = std::cos(2.0 * static_cast<double>(i));
   }
-  for (const RobustLoss& rho :
-       {RobustLoss{}, RobustLoss{LossKind::huber, 0.5}, RobustLoss{LossKind::cauchy, 0.5}}) {
+  for (const RobustLoss& rho : {RobustLoss{}, RobustLoss{LossKind::huber, 0.5}, RobustLoss{LossKind::cauchy, 0.5}}) {
     const GatedImage adjoint = loss_adjoint(image, target, rho);
     for (std::size_t i = 0; i < image.data.size(); ++i) {
       GatedImage up = image, down = image;
@@ -141,8 +141,7 @@ TEST(Checkpoint, RoundTripIsBitExact) {
   EXPECT_EQ(bits(loaded->safeguard.best_theta), bits(saved.safeguard.best_theta));
   EXPECT_EQ(bits(loaded->safeguard.recent), bits(saved.safeguard.recent));
   EXPECT_EQ(loaded->optimizer.size(), 3u);
-  for (const auto& [key, values] : saved.optimizer)
-    EXPECT_EQ(bits(loaded->optimizer.at(key)), bits(values)) << key;
+  for (const auto& [key, values] : saved.optimizer) EXPECT_EQ(bits(loaded->optimizer.at(key)), bits(values)) << key;
   EXPECT_EQ(bits(loaded->theta), bits(saved.theta));
   EXPECT_EQ(bits({loaded->loss_initial, loaded->seconds}), bits({saved.loss_initial, saved.seconds}));
   EXPECT_TRUE(std::isnan(loaded->param_rmse_initial));
@@ -159,9 +158,9 @@ TEST(Checkpoint, FallsBackToTheOneBefore) {
   EXPECT_EQ(load_checkpoint(folder.path(), parameters, nullptr)->iteration, 18);
 
   const std::string whole = folder.read("checkpoint.yaml");
-  const std::string damages[] = {
-      whole.substr(0, whole.size() / 2), "", std::string(3, '\0'), whole.substr(0, whole.size() - 1),
-      std::string(whole).replace(whole.find("iteration: 18"), 13, "iteration: 19")};
+  const std::string damages[] = {whole.substr(0, whole.size() / 2), "", std::string(3, '\0'),
+                                 whole.substr(0, whole.size() - 1),
+                                 std::string(whole).replace(whole.find("iteration: 18"), 13, "iteration: 19")};
   for (const std::string& damaged : damages) {
     folder.write("checkpoint.yaml", damaged);
     std::string warning;

@@ -15,12 +15,11 @@ namespace {
 Scene two_shapes(bool grey) {
   Scene scene;
   scene.grey = grey;
-  scene.materials = {{.name = "white"}, {.name = "metal", .type = MaterialType::rough_conductor},
+  scene.materials = {{.name = "white"},
+                     {.name = "metal", .type = MaterialType::rough_conductor},
                      {.name = "glass", .type = MaterialType::rough_dielectric}};
-  scene.positions = {{0, 0, 0},   {1, 0, 0},  {0, 2, 0}, {0, 0, 3},
-                     {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
-  scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0},
-                     {{1, 2, 3}, 0}, {{4, 5, 6}, 1}, {{4, 6, 7}, 1}};
+  scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}, {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
+  scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0}, {{1, 2, 3}, 0}, {{4, 5, 6}, 1}, {{4, 6, 7}, 1}};
   scene.shapes = {{.name = "tetra",
                    .file = "",
                    .material = 1,
@@ -115,8 +114,7 @@ TEST(Parameters, TangentIsTheDerivativeOfApply) {
           }
           if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
         }
-        EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8)
-            << "row " << row << " column " << column;
+        EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
       }
     }
   }

@@ -12,8 +12,7 @@ namespace {
 /// Two columns; the gradient grows by `increments[limit][term]` along (0.6, 0.8) with every bounce. Noise of
 /// standard deviation `noise` sits on the increments, alternating so that means are exact for an even number
 /// of replicates.
-GradientReplicates make(const std::vector<std::array<double, 3>>& increments, double noise = 0,
-                        int replicates = 16) {
+GradientReplicates make(const std::vector<std::array<double, 3>>& increments, double noise = 0, int replicates = 16) {
   GradientReplicates result(static_cast<int>(increments.size()) - 1, 2);
   for (int r = 0; r < replicates; ++r) {
     std::vector<double> values(increments.size() * 6, 0.0);
@@ -22,8 +21,7 @@ GradientReplicates make(const std::vector<std::array<double, 3>>& increments, do
         for (int c = 0; c < 2; ++c) {
           const double before = limit ? values[GradientReplicates::index(limit - 1, t, c, 2)] : 0;
           const double n = increments[limit][t] != 0 ? noise * (r % 2 ? 1 : -1) : 0;
-          values[GradientReplicates::index(limit, t, c, 2)] =
-              before + (c ? 0.8 : 0.6) * (increments[limit][t] + n);
+          values[GradientReplicates::index(limit, t, c, 2)] = before + (c ? 0.8 : 0.6) * (increments[limit][t] + n);
         }
     result.add(values);
   }
@@ -97,8 +95,7 @@ TEST(Reduction, ExpectsBouncesBeyondToShrinkOn) {
   EXPECT_NEAR(expected_beyond(g), 1.0 / 48 / 1.3125, 1e-12);
   EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {1, 0, 0}, {0, 0, 0}})), 0);
   EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {1, 0, 0}})), 0);
-  EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {0.5, 0, 0}, {0.5, 0, 0}})),
-            std::numeric_limits<double>::infinity());
+  EXPECT_EQ(expected_beyond(make({{0, 0, 0}, {0.5, 0, 0}, {0.5, 0, 0}})), std::numeric_limits<double>::infinity());
 }
 
 TEST(Reduction, KeepsWhatNoiseLeavesOpen) {

@@ -72,7 +72,8 @@ TEST_F(Rendered, GradientsWithAndWithoutTheJacobianAgreeOnAverage) {
   const std::vector<double> theta = problem.parameters().initial();
   BatchStatistics differences;
   for (int i = 0; i < 200; ++i) {
-    const std::vector<double> with = objective.linearise(theta, i).gradient, alone = objective.evaluate(theta, i).gradient;
+    const std::vector<double> with = objective.linearise(theta, i).gradient,
+                              alone = objective.evaluate(theta, i).gradient;
     differences.add({with[0] - alone[0], with[1] - alone[1], alone[0], alone[1]}, 1);
   }
   const Statistics found = differences.result();
@@ -83,10 +84,8 @@ TEST_F(Rendered, GradientsWithAndWithoutTheJacobianAgreeOnAverage) {
 }
 
 TEST_F(Rendered, CurvatureIsUnbiased) {
-  const Problem few(
-      load_experiment(file_, {"samples={primal: 1, interior: 2, visibility: 2, path_length: 0}"}));
-  const Problem many(
-      load_experiment(file_, {"samples={primal: 1, interior: 8192, visibility: 8192, path_length: 0}"}));
+  const Problem few(load_experiment(file_, {"samples={primal: 1, interior: 2, visibility: 2, path_length: 0}"}));
+  const Problem many(load_experiment(file_, {"samples={primal: 1, interior: 8192, visibility: 8192, path_length: 0}"}));
   const GatedImage target = few.make_target(kGoOn);
   const std::vector<double> theta = few.parameters().initial();
   const Evaluation exact = RenderedObjective(many, target, kGoOn).linearise(theta, 0);
@@ -121,10 +120,10 @@ TEST_F(Rendered, SizeOfTheJacobianIsLimited) {
 }
 
 TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
-  const std::string text = replaced(
-      tiny_experiment(), "type: translation, shape: block, direction: [0, 1, 0], initial: 0.2, target: 0}",
-      "type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, smoothing: "
-      "{slopes: 3}}");
+  const std::string text =
+      replaced(tiny_experiment(), "type: translation, shape: block, direction: [0, 1, 0], initial: 0.2, target: 0}",
+               "type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, smoothing: "
+               "{slopes: 3}}");
   const std::string file = folder_.write("dent.yaml", text);
   // Standard sampling: connections would pick their gates otherwise for a gradient than for a Jacobian. Independent
   // numbers: a Jacobian's samples come in halves.
@@ -143,7 +142,9 @@ TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
   EXPECT_NEAR(a.gradient[0] - b.gradient[0], unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
   EXPECT_NEAR(a.curvature[2] - b.curvature[2], -unit * 2 / 2, 1e-12 * a.loss);
   EXPECT_EQ(a.mean_squared_error, b.mean_squared_error);
-  const auto gradient = [&](const Problem& p) { return RenderedObjective(p, target, kGoOn).evaluate(theta, 0).gradient[0]; };
+  const auto gradient = [&](const Problem& p) {
+    return RenderedObjective(p, target, kGoOn).evaluate(theta, 0).gradient[0];
+  };
   EXPECT_NEAR(gradient(with) - gradient(without), unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
 }
 
@@ -151,8 +152,7 @@ TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
   for (const char* optimizer : {"{method: adam, learning_rate: 0.05, iterations: 120}",
                                 "{method: lbfgs, learning_rate: 0.05, iterations: 12, inner_iterations: 5}",
                                 "{method: levenberg_marquardt, iterations: 12}"}) {
-    const Problem problem(
-        load_experiment(file_, {std::string("optimizer=") + optimizer, "target.samples=4096"}));
+    const Problem problem(load_experiment(file_, {std::string("optimizer=") + optimizer, "target.samples=4096"}));
     const GatedImage target = problem.make_target(kGoOn);
     const RenderedObjective objective(problem, target, kGoOn);
     const OptimizerSpec& spec = problem.experiment().optimizer;
@@ -163,8 +163,7 @@ TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
     options.iterations = spec.iterations;
     options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
     options.save = [] {};
-    EXPECT_EQ(run_loop(objective, *method, 0, options, state).status, RunStatus::iterations_reached)
-        << optimizer;
+    EXPECT_EQ(run_loop(objective, *method, 0, options, state).status, RunStatus::iterations_reached) << optimizer;
     EXPECT_NEAR(state.theta[0], 0, 0.04) << optimizer;
     EXPECT_NEAR(state.theta[1], 10, 0.5) << optimizer;
   }

@@ -17,8 +17,9 @@ class NoisyQuadratic : public Objective {
  public:
   double noise = 0.1;
   std::uint64_t seed = 1;
-  std::function<double(const std::vector<double>&, std::uint32_t, double)> inject =
-      [](auto&, auto, double loss) { return loss; };
+  std::function<double(const std::vector<double>&, std::uint32_t, double)> inject = [](auto&, auto, double loss) {
+    return loss;
+  };
   std::vector<double> low{-1e9}, high{1e9};
   const std::vector<double>& lower() const override { return low; }
   const std::vector<double>& upper() const override { return high; }
@@ -33,9 +34,7 @@ class NoisyQuadratic : public Objective {
     result.gradient = {2 * theta[0] + noise * ExponentialFit::normal(rng)};
     return result;
   }
-  Evaluation linearise(const std::vector<double>&, std::uint32_t) const override {
-    throw std::logic_error("unused");
-  }
+  Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
 };
 
 struct Outcome {
@@ -51,9 +50,7 @@ Outcome run(const NoisyQuadratic& objective, double rate, int iterations, int wi
   const auto optimizer = make_adam(rate, none);
   LoopOptions options;
   options.iterations = iterations;
-  options.row = [&](const Evaluation&, const std::vector<double>& theta, bool) {
-    outcome.rows.push_back(theta[0]);
-  };
+  options.row = [&](const Evaluation&, const std::vector<double>& theta, bool) { outcome.rows.push_back(theta[0]); };
   options.save = [] {};
   outcome.result = run_loop(objective, *optimizer, window, options, outcome.state);
   return outcome;
@@ -86,8 +83,7 @@ TEST(Safeguard, SeesARiseWithinThreeRows) {
       Rng rng({seed, i++, 0}, 0, 0);
       return guard.observe(level + ExponentialFit::normal(rng), true, {static_cast<double>(i)});
     };
-    for (int row = 0; row < 30; ++row)
-      ASSERT_EQ(next(100 - row), Verdict::go_on);  // falls by a noise's width per row
+    for (int row = 0; row < 30; ++row) ASSERT_EQ(next(100 - row), Verdict::go_on);  // falls by a noise's width per row
     const double best = guard.state().best_theta[0];
     EXPECT_GE(best, 25);
     EXPECT_EQ(next(200), Verdict::go_on);  // one wild loss, or two, is no rise
@@ -161,8 +157,7 @@ TEST(Loop, RejectsARiseAndRecoversWithHalfTheRate) {
   EXPECT_EQ(outcome.state.safeguard.rejected, 1);
   EXPECT_EQ(outcome.state.safeguard.rate, 0.5);
   // Back to the row of the lowest level, which is none of the three that failed.
-  EXPECT_NE(std::find(outcome.rows.begin(), outcome.rows.begin() + 30, outcome.rows[33]),
-            outcome.rows.begin() + 30);
+  EXPECT_NE(std::find(outcome.rows.begin(), outcome.rows.begin() + 30, outcome.rows[33]), outcome.rows.begin() + 30);
   EXPECT_NEAR(outcome.state.theta[0], 0, 0.05);
 }
 
@@ -170,9 +165,7 @@ TEST(Loop, GivesUpAndReturnsTheBest) {
   NoisyQuadratic objective;
   objective.noise = 0.01;
   // Falls until theta = 0.5; from iteration 12 on every loss is a disaster.
-  objective.inject = [](const std::vector<double>&, std::uint32_t i, double loss) {
-    return i >= 12 ? 50 + i : loss;
-  };
+  objective.inject = [](const std::vector<double>&, std::uint32_t i, double loss) { return i >= 12 ? 50 + i : loss; };
   const Outcome rising = run(objective, 0.05, 1000, 0);
   EXPECT_EQ(rising.result.status, RunStatus::diverged);
   EXPECT_EQ(rising.result.choice, FinalChoice::best);

@@ -26,8 +26,7 @@ TEST(SampleSplit, WithoutCrossTermsIsInProportionToRootVarianceOverCost) {
   const PerPass n = best_split(v, kCost, kAll, 40);
   EXPECT_NEAR(time_of(n), 40, 1e-6);
   const double unit = n[0] / std::sqrt(v.image / kCost[0]);
-  for (int t = 0; t < 3; ++t)
-    EXPECT_NEAR(n[1 + t], unit * std::sqrt(v.term[t] / kCost[1 + t]), 1e-5 * n[1 + t]);
+  for (int t = 0; t < 3; ++t) EXPECT_NEAR(n[1 + t], unit * std::sqrt(v.term[t] / kCost[1 + t]), 1e-5 * n[1 + t]);
 }
 
 TEST(SampleSplit, BeatsEverySplitOnAGrid) {

@@ -89,8 +89,7 @@ TEST_P(Solvers, DoNotDependOnTheUnits) {
 TEST_P(Solvers, StayWithinBounds) {
   ExponentialFit fit;
   fit.low = {0.5, 0.1};
-  fit.high = {1.5,
-              10};  // a = 2 is out of reach; the best b for a = 1.5 is 0.4514 (bisection of the derivative)
+  fit.high = {1.5, 10};  // a = 2 is out of reach; the best b for a = 1.5 is 0.4514 (bisection of the derivative)
   fit.inject = [&](const std::vector<double>& theta, double loss) {
     EXPECT_TRUE(theta[0] >= 0.5 && theta[0] <= 1.5 && theta[1] >= 0.1 && theta[1] <= 10);
     return loss;
@@ -140,8 +139,7 @@ TEST_P(Solvers, ResumeFromAnyIterationBitForBit) {
 TEST_P(Solvers, SurviveALossThatIsNotFinite) {
   ExponentialFit fit;
   fit.inject = [](const std::vector<double>& theta, double loss) {
-    return theta[0] > 1.9 ? std::numeric_limits<double>::quiet_NaN()
-                          : loss;  // the target lies behind the wall
+    return theta[0] > 1.9 ? std::numeric_limits<double>::quiet_NaN() : loss;  // the target lies behind the wall
   };
   Checkpoint state;
   run(fit, spec(), GetParam() == OptimizerMethod::adam ? 200 : 20, state);
@@ -178,8 +176,7 @@ TEST(QuadraticModel, RaisesWhatNoiseMadeNegative) {
   at.loss = 1e-6;
   at.gradient = {0, 0, 0};
   at.curvature_bound = {4, 0, 0, 0, 1, 0, 0, 0, 0};
-  at.curvature = {2, 0, 0, 0, -0.25,
-                  0, 0, 0, 0};  // relative to the bound: 0.5, -0.25 and an unknown without effect
+  at.curvature = {2, 0, 0, 0, -0.25, 0, 0, 0, 0};  // relative to the bound: 0.5, -0.25 and an unknown without effect
   const QuadraticModel model = quadratic_model(at);
   const Eigen::MatrixXd j = model.jacobian * model.scale.asDiagonal() * std::sqrt(2 * at.loss);
   const Eigen::MatrixXd curvature = j.transpose() * j;

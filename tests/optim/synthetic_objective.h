@@ -53,8 +53,7 @@ class ExponentialFit : public Objective {
         result.gradient[i] += (half[0][i] + half[1][i]) * r / kPoints;
         for (int j : {0, 1}) {
           result.curvature[2 * i + j] += (half[0][i] * half[1][j] + half[1][i] * half[0][j]) / kPoints;
-          result.curvature_bound[2 * i + j] +=
-              (half[0][i] + half[1][i]) * (half[0][j] + half[1][j]) / (2 * kPoints);
+          result.curvature_bound[2 * i + j] += (half[0][i] + half[1][i]) * (half[0][j] + half[1][j]) / (2 * kPoints);
         }
       }
     }

@@ -16,8 +16,7 @@ TEST(PhotonNoise, CountsFollowThePoissonLaw) {
   for (double mean : {0.02, 0.7, 5.0, 9.99, 10.01, 40.0, 3000.0}) {
     // Cells of about 1/20 of the mass each, from the running sums of exp(-m) m^k / k!.
     const double sigma = std::sqrt(mean);
-    const int first = std::max(0, static_cast<int>(mean - 9 * sigma)),
-              last = static_cast<int>(mean + 9 * sigma) + 20;
+    const int first = std::max(0, static_cast<int>(mean - 9 * sigma)), last = static_cast<int>(mean + 9 * sigma) + 20;
     std::vector<int> cell_of(last + 1);
     std::vector<double> expected(1, 0.0);
     for (int k = first; k <= last; ++k) {

@@ -8,19 +8,17 @@ namespace isochron {
 /// A floor, a raised quad and a lamp seen by 8 x 8 pixels; path lengths about 3.5 to 6.
 inline void write_tiny_scene(const TemporaryFolder& folder) {
   folder.write("floor.obj", "v -2 0 -2\nv -2 0 2\nv 2 0 2\nv 2 0 -2\nf 1 2 3 4\n");
-  folder.write("block.obj",
-               "v -0.5 0.5 -0.5\nv -0.5 0.5 0.5\nv 0.5 0.5 0.5\nv 0.5 0.5 -0.5\nf 1 2 3\nf 1 3 4\n");
+  folder.write("block.obj", "v -0.5 0.5 -0.5\nv -0.5 0.5 0.5\nv 0.5 0.5 0.5\nv 0.5 0.5 -0.5\nf 1 2 3\nf 1 3 4\n");
   folder.write("lamp.obj", "v -0.5 2 -0.5\nv 0.5 2 -0.5\nv 0.5 2 0.5\nv -0.5 2 0.5\nf 1 2 3 4\n");
-  folder.write(
-      "scene.yaml",
-      "camera: {position: [0.2, 2.5, 2.5], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [8, 8]}\n"
-      "materials:\n"
-      "  white: {type: diffuse, albedo: 0.6}\n"
-      "  metal: {type: rough_conductor, roughness: 0.3, reflectance: 0.9}\n"
-      "shapes:\n"
-      "  - {name: floor, file: floor.obj, material: white}\n"
-      "  - {name: block, file: block.obj, material: metal}\n"
-      "  - {name: lamp, file: lamp.obj, material: white, emission: 10}\n");
+  folder.write("scene.yaml",
+               "camera: {position: [0.2, 2.5, 2.5], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [8, 8]}\n"
+               "materials:\n"
+               "  white: {type: diffuse, albedo: 0.6}\n"
+               "  metal: {type: rough_conductor, roughness: 0.3, reflectance: 0.9}\n"
+               "shapes:\n"
+               "  - {name: floor, file: floor.obj, material: white}\n"
+               "  - {name: block, file: block.obj, material: metal}\n"
+               "  - {name: lamp, file: lamp.obj, material: white, emission: 10}\n");
 }
 
 /// An experiment on the tiny scene. The tests of error messages count on its lines.

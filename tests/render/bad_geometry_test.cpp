@@ -13,10 +13,11 @@ struct Everything {
   int non_zero = 0, not_finite = 0;
 };
 
-Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling,
-                          const TangentBasis& basis, int samples = 16) {
+Everything run_everything(const Scene& scene, const GateSet& gates, Sampling sampling, const TangentBasis& basis,
+                          int samples = 16) {
   EstimatorOptions options{.max_bounces = 3, .sampling = sampling};
-  if (sampling == Sampling::automatic) options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 2}, Purpose::gradients);
+  if (sampling == Sampling::automatic)
+    options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 2}, Purpose::gradients);
   const Renderer renderer(scene, gates, options, &basis);
   Everything all;
   const GatedImage image = renderer.render({1, 0, 0}, {0, samples});
@@ -116,16 +117,14 @@ TEST_P(BadGeometry, EdgeOnFacesGiveFiniteResults) {
   };
   // Exactly, as all heights of the plane are the same number.
   double top = -INFINITY;
-  for (int i = 0; i < block.vertex_count; ++i)
-    top = std::max(top, scene_.positions[block.first_vertex + i].y);
+  for (int i = 0; i < block.vertex_count; ++i) top = std::max(top, scene_.positions[block.first_vertex + i].y);
   check("the plane of the block's top", {camera.x, top, camera.z});
   check("the plane of the light", {camera.x, scene_.positions[light.first_vertex].y, camera.z});
   // An upright edge, from straight above: its direction and the ray's are the same numbers.
   int upright = 0;
   for (int i = 0; i < block.vertex_count; ++i)
     for (int j = 0; j < block.vertex_count; ++j) {
-      const Vec3 low = scene_.positions[block.first_vertex + i],
-                 high = scene_.positions[block.first_vertex + j];
+      const Vec3 low = scene_.positions[block.first_vertex + i], high = scene_.positions[block.first_vertex + j];
       if (!(low.x == high.x && low.z == high.z && low.y < high.y)) continue;
       scene_.camera.look_at = high + Vec3{0.05, 0, 0};
       check("an upright edge from above", {high.x, high.y + 0.25, high.z});
@@ -161,8 +160,8 @@ TEST_P(BadGeometry, PathsAcrossACreaseAreFinite) {
   const Material grey = diffuse(Rgb(0.7), true);
   add_shape(scene, "floor", quad({0, 0, -0.5}, {0, 0, 0.5}, {1, 0, 0.5}, {1, 0, -0.5}), grey);
   add_shape(scene, "flap", quad({0, 0, -0.5}, {0, 0, 0.5}, {0.5, 0.5, 0.5}, {0.5, 0.5, -0.5}), grey);
-  add_shape(scene, "lamp", quad({2, 1.5, -0.5}, {2, 1.5, 0.5}, {1.5, 2, 0.5}, {1.5, 2, -0.5}),
-            diffuse(Rgb(0)), Rgb(10));
+  add_shape(scene, "lamp", quad({2, 1.5, -0.5}, {2, 1.5, 0.5}, {1.5, 2, 0.5}, {1.5, 2, -0.5}), diffuse(Rgb(0)),
+            Rgb(10));
   const Vec3 away{4000, 0, 0};
   for (Vec3& p : scene.positions) p += away;
   scene.camera.position += away;

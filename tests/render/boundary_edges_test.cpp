@@ -136,11 +136,8 @@ TEST(BoundaryEdges, OccluderSideOfACube) {
     const Vec3 n_b = normalize(cross(s.edge->tangent, w));
     // A line through y grazes the cube exactly when it does not enter it; then one side of the plane holds
     // the cube.
-    const auto inside = [](const Vec3& p) {
-      return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1;
-    };
-    const Vec3 mid = s.edge->point(0.5),
-               across = normalize(w - s.edge->tangent * dot(w, s.edge->tangent)) * 1e-6;
+    const auto inside = [](const Vec3& p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) < 1; };
+    const Vec3 mid = s.edge->point(0.5), across = normalize(w - s.edge->tangent * dot(w, s.edge->tangent)) * 1e-6;
     const int side = BoundaryEdges::occluder_side(*s.edge, n_b);
     EXPECT_EQ(BoundaryEdges::occluder_side(*s.edge, -n_b), -side);
     if (inside(mid + across) || inside(mid - across)) {

@@ -112,9 +112,9 @@ TEST_P(Guided, MeansAgreeWithUnguidedOnes) {
   const Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   const bool narrow = GetParam() == Sampling::ellipsoidal;
   const GateSet gates(GateShape::gaussian(narrow ? 0.02 : 0.3), {5.0, 6.0});
-  const TangentBasis basis = make_basis(
-      scene, {translate(scene, "block", {0.3, 1, 0.2}), translate(scene, "light", {0.4, 0, 0.3}),
-              translate(scene, "panel", {-1, 0.2, 0.1})});
+  const TangentBasis basis =
+      make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2}), translate(scene, "light", {0.4, 0, 0.3}),
+                         translate(scene, "panel", {-1, 0.2, 0.1})});
   std::vector<std::vector<Estimate>> means[2];
   for (const bool guided : {false, true}) {
     EstimatorOptions options{.max_bounces = 3, .sampling = GetParam()};
@@ -135,10 +135,9 @@ TEST_P(Guided, MeansAgreeWithUnguidedOnes) {
   EXPECT_LT(variance[1], variance[0]);
 }
 
-INSTANTIATE_TEST_SUITE_P(, Guided, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
-                         [](const auto& test) {
-                           return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
-                         });
+INSTANTIATE_TEST_SUITE_P(, Guided, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
+  return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
+});
 
 }  // namespace
 }  // namespace isochron::testing

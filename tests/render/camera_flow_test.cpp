@@ -43,8 +43,7 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       for (int i = 0; i < 3; ++i) {
         const double angle = kTwoPi * i / 3 + in(-0.3, 0.3), radius = in(0.4, 0.8);
         const Vec3 flat{radius * std::cos(angle), radius * std::sin(angle), 0};
-        const Vec3 tilted =
-            k == 0 ? flat + Vec3{0, 0, 0.4 * flat.x} : Vec3{flat.z, flat.x, flat.y} + Vec3{0.3, 0, 0.5};
+        const Vec3 tilted = k == 0 ? flat + Vec3{0, 0, 0.4 * flat.x} : Vec3{flat.z, flat.x, flat.y} + Vec3{0.3, 0, 0.5};
         mesh[k].positions.push_back(tilted + Vec3{in(-0.05, 0.05), in(-0.05, 0.05), in(-0.05, 0.05)});
       }
     mesh[0].faces = {{0, 1, 2}};
@@ -67,8 +66,8 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
 
     const double b1 = in(0.2, 0.4), b2 = in(0.2, 0.4), b[3] = {1 - b1 - b2, b1, b2};
     const auto second = [&](const std::vector<Vec3>& p) { return p[3] * b[0] + p[4] * b[1] + p[5] * b[2]; };
-    const auto at_image = image_point(
-        camera, prepared.scene.positions[0] * 0.4 + scene.positions[1] * 0.3 + scene.positions[2] * 0.3);
+    const auto at_image =
+        image_point(camera, prepared.scene.positions[0] * 0.4 + scene.positions[1] * 0.3 + scene.positions[2] * 0.3);
     SurfacePoint x[3];
     x[0].p = camera.position;
     x[1] = prepared.point_on_triangle(0, camera.position, camera.direction(at_image[0], at_image[1]));
@@ -92,8 +91,7 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       const auto velocity = [&](double u, double v) {
         const auto above = positions(kStep), below = positions(-kStep), here = positions(0);
         const Vec3 p = seen(camera, u, v, here.data());
-        const Vec3 pixel_flow =
-            (seen(camera, u, v, above.data()) - seen(camera, u, v, below.data())) / (2 * kStep);
+        const Vec3 pixel_flow = (seen(camera, u, v, above.data()) - seen(camera, u, v, below.data())) / (2 * kStep);
         const Vec3 n = normalize(cross(here[1] - here[0], here[2] - here[0]));
         Vec3 across = rate_2 - pixel_flow;
         across -= n * dot(n, across);
@@ -105,19 +103,17 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       };
       const auto v0 = velocity(at_image[0], at_image[1]);
       constexpr double kImageStep = 1e-3;
-      const double divergence = (velocity(at_image[0] + kImageStep, at_image[1])[0] -
-                                 velocity(at_image[0] - kImageStep, at_image[1])[0] +
-                                 velocity(at_image[0], at_image[1] + kImageStep)[1] -
-                                 velocity(at_image[0], at_image[1] - kImageStep)[1]) /
-                                (2 * kImageStep);
+      const double divergence =
+          (velocity(at_image[0] + kImageStep, at_image[1])[0] - velocity(at_image[0] - kImageStep, at_image[1])[0] +
+           velocity(at_image[0], at_image[1] + kImageStep)[1] - velocity(at_image[0], at_image[1] - kImageStep)[1]) /
+          (2 * kImageStep);
       const auto path = [&](double t) {
         const auto p = positions(t);
-        const Vec3 x1 = seen(camera, at_image[0] + t * v0[0], at_image[1] + t * v0[1], p.data()),
-                   x2 = second(p), d = x2 - x1;
+        const Vec3 x1 = seen(camera, at_image[0] + t * v0[0], at_image[1] + t * v0[1], p.data()), x2 = second(p),
+                   d = x2 - x1;
         const Vec3 m1 = cross(p[1] - p[0], p[2] - p[0]), m2 = cross(p[5] - p[3], p[4] - p[3]);
-        return std::array<double, 2>{
-            std::log(std::abs(dot(normalize(m1), d) * dot(m2, d)) / std::pow(dot(d, d), 2)),
-            length(x1 - camera.position) + length(d)};
+        return std::array<double, 2>{std::log(std::abs(dot(normalize(m1), d) * dot(m2, d)) / std::pow(dot(d, d), 2)),
+                                     length(x1 - camera.position) + length(d)};
       };
       const auto above = path(kStep), below = path(-kStep);
       const double log_f = (above[0] - below[0]) / (2 * kStep) + divergence,
@@ -128,8 +124,7 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
       double ours = 0, our_length = 0;
       for (const VertexGradient& g : differential.vertices)
         if (g.vertex == moved) ours += g.log_f[axis], our_length += g.length[axis];
-      EXPECT_NEAR(ours, log_f, 1e-5 * (10 + std::abs(log_f)))
-          << "trial " << trial << ", degree of freedom " << dof;
+      EXPECT_NEAR(ours, log_f, 1e-5 * (10 + std::abs(log_f))) << "trial " << trial << ", degree of freedom " << dof;
       EXPECT_NEAR(our_length, path_length, 1e-6) << "trial " << trial << ", degree of freedom " << dof;
     }
   }
@@ -217,14 +212,13 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
   expect_same(one, other, 100, 1.7, c.glass ? 0.8 : 0.3);
 }
 
-INSTANTIATE_TEST_SUITE_P(Scenes, CameraFlowOfEveryPixel,
-                         ::testing::Values(Case{"everything_follows", false, GateShape::gaussian(0.3),
-                                                Sampling::standard, 1000, 0, 48},
-                                           Case{"a_few_pixels_boxcar_ellipsoidal", false,
-                                                GateShape::boxcar(0.6), Sampling::ellipsoidal, 6, 0, 24},
-                                           Case{"glass", true, GateShape::gaussian(0.3), Sampling::standard,
-                                                4, 16, 48}),
-                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, CameraFlowOfEveryPixel,
+    ::testing::Values(Case{"everything_follows", false, GateShape::gaussian(0.3), Sampling::standard, 1000, 0, 48},
+                      Case{"a_few_pixels_boxcar_ellipsoidal", false, GateShape::boxcar(0.6), Sampling::ellipsoidal, 6,
+                           0, 24},
+                      Case{"glass", true, GateShape::gaussian(0.3), Sampling::standard, 4, 16, 48}),
+    [](const auto& test) { return test.param.name; });
 
 /// A moving corner of two faces, bright, under a lamp that looks away from the camera.
 Scene moving_corner() {
@@ -236,8 +230,8 @@ Scene moving_corner() {
   corner.faces.push_back({0, 3, 5});
   corner.faces.push_back({0, 5, 4});
   add_shape(scene, "corner", corner, diffuse(Rgb(0.7)));
-  add_shape(scene, "lamp", quad({-0.3, 2, -0.3}, {0.3, 2, -0.3}, {0.3, 2, 0.3}, {-0.3, 2, 0.3}),
-            diffuse(Rgb(0)), Rgb(10));
+  add_shape(scene, "lamp", quad({-0.3, 2, -0.3}, {0.3, 2, -0.3}, {0.3, 2, 0.3}, {-0.3, 2, 0.3}), diffuse(Rgb(0)),
+            Rgb(10));
   return scene;
 }
 
@@ -335,9 +329,8 @@ TEST(CameraFlow, CornersOfMovingObjectsAreQuiet) {
   const GateSet gates(GateShape::steady(), {0.0});
   double variance[2];
   for (const int follows : {0, 1}) {
-    const Renderer renderer(
-        scene, gates, {.max_bounces = 3, .sampling = Sampling::standard, .follow_radius = 4.0 * follows},
-        &basis);
+    const Renderer renderer(scene, gates,
+                            {.max_bounces = 3, .sampling = Sampling::standard, .follow_radius = 4.0 * follows}, &basis);
     const Estimate mean = term_means(renderer, Term::interior, 1, 1, 64, 32, {3, 0, 0})[0][0];
     variance[follows] = mean.standard_error * mean.standard_error;
   }
@@ -360,8 +353,7 @@ TEST(CameraFlow, IsLeftOutWhereNothingMovesCloseToAnything) {
     for (Vec3& p : s.positions)
       if (p.y == -2) p.y = -0.6;
   })) << "close to the floor";
-  EXPECT_TRUE(possible([](Scene& s) { s.materials[0].type = MaterialType::rough_dielectric; }))
-      << "glass, from within";
+  EXPECT_TRUE(possible([](Scene& s) { s.materials[0].type = MaterialType::rough_dielectric; })) << "glass, from within";
   EXPECT_TRUE(possible([](Scene& s) { s.positions[7] = {0.1, 0.1, 0.1}; })) << "a dent";
 }
 

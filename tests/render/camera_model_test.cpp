@@ -36,8 +36,7 @@ TEST_P(CameraModelTest, ProjectUndoesDirection) {
 
 TEST_P(CameraModelTest, OutsideIsNoPixel) {
   const double w = given_.width, h = given_.height;
-  const double outside[][2] = {
-      {-0.01, h / 2}, {w + 0.01, h / 2}, {w / 2, -0.01}, {w / 2, h + 0.01}, {-1, -1}};
+  const double outside[][2] = {{-0.01, h / 2}, {w + 0.01, h / 2}, {w / 2, -0.01}, {w / 2, h + 0.01}, {-1, -1}};
   for (const auto& uv : outside)
     EXPECT_EQ(camera_.project(camera_.position + camera_.direction(uv[0], uv[1]) * 3.0), -1);
 }
@@ -50,11 +49,9 @@ TEST_P(CameraModelTest, LooksWhereItShould) {
   const double across = std::acos(dot(camera_.direction(0, h / 2), camera_.direction(w, h / 2))) * 180 / kPi;
   EXPECT_NEAR(across, given_.fov, 1e-9);
   const Vec3 up = given_.up - forward * dot(given_.up, forward);
-  EXPECT_GT(dot(camera_.direction(w / 2, 0), up), dot(camera_.direction(w / 2, h), up))
-      << "row 0 is at the top";
+  EXPECT_GT(dot(camera_.direction(w / 2, 0), up), dot(camera_.direction(w / 2, h), up)) << "row 0 is at the top";
   const Vec3 right = cross(forward, given_.up);
-  EXPECT_GT(dot(camera_.direction(w, h / 2), right), dot(camera_.direction(0, h / 2), right))
-      << "column 0 is left";
+  EXPECT_GT(dot(camera_.direction(w, h / 2), right), dot(camera_.direction(0, h / 2), right)) << "column 0 is left";
 }
 
 TEST_P(CameraModelTest, AreaPerSolidAngleIsTheJacobian) {

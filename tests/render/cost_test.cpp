@@ -69,8 +69,7 @@ class Cost : public ::testing::TestWithParam<Sampling> {
   /// Ellipses cross hundreds of triangles of the field: far fewer samples take as long. Enough of them, in
   /// any case, that clearing and merging the strands' gradients (about 3 ms a pass here) is a small share.
   static int samples(Term term) {
-    const bool ellipses =
-        term == Term::path_length || (term == Term::interior && GetParam() == Sampling::ellipsoidal);
+    const bool ellipses = term == Term::path_length || (term == Term::interior && GetParam() == Sampling::ellipsoidal);
     return ellipses ? 1 : term == Term::interior ? 512 : 64;
   }
   static std::string sampling() { return GetParam() == Sampling::standard ? "standard" : "ellipsoidal"; }
@@ -90,8 +89,7 @@ TEST_P(Cost, IndependentOfTheNumberOfParameters) {
   const EstimatorOptions options{.max_bounces = 2, .sampling = GetParam()};
   const Renderer one(scene, gates, options, &translation), many(scene, gates, options, &free);
   GatedImage adjoint = one.render({1, 0, 0}, {0, 1});
-  for (std::size_t i = 0; i < adjoint.data.size(); ++i)
-    adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
+  for (std::size_t i = 0; i < adjoint.data.size(); ++i) adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
   std::vector<double> of_one(DofLayout(scene).size(), 0.0), of_many(of_one);
   for (const Term term : kTerms) {
     const auto gradient = [&](const Renderer& renderer, const TangentBasis& basis, std::vector<double>& sum) {
@@ -110,8 +108,7 @@ TEST_P(Cost, IndependentOfTheNumberOfParameters) {
           one.derive(term, {1, 0, 1}, {0, samples(term)});
         });
     // The same samples were taken, so the time was spent on the same work.
-    const double single = translation.transpose_apply(of_one)[0],
-                 from_all = translation.transpose_apply(of_many)[0];
+    const double single = translation.transpose_apply(of_one)[0], from_all = translation.transpose_apply(of_many)[0];
     EXPECT_NE(single, 0);
     EXPECT_NEAR(from_all, single, 1e-9 * std::abs(single));
   }
@@ -149,10 +146,9 @@ TEST_P(Cost, NearlyIndependentOfTheNumberOfGates) {
         });
 }
 
-INSTANTIATE_TEST_SUITE_P(, Cost, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
-                         [](const auto& test) {
-                           return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
-                         });
+INSTANTIATE_TEST_SUITE_P(, Cost, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
+  return std::string(test.param == Sampling::standard ? "Standard" : "Ellipsoidal");
+});
 
 }  // namespace
 }  // namespace isochron::testing

@@ -36,8 +36,7 @@ class Determinism : public ::testing::TestWithParam<Sampling> {
     Results r;
     r.image = renderer.render(stream, range);
     GatedImage adjoint = r.image;
-    for (std::size_t i = 0; i < adjoint.data.size(); ++i)
-      adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
+    for (std::size_t i = 0; i < adjoint.data.size(); ++i) adjoint.data[i] = std::sin(1.0 + static_cast<double>(i));
     for (const Term term : kTerms) {
       r.derivatives.push_back(renderer.derive(term, stream, range));
       r.gradients.emplace_back(DofLayout(scene_).size(), 0.0);

@@ -106,8 +106,8 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
   add_shape(scene, "light", quad({-3, -3, -0.5}, {3, -3, 0.4}, {3, 3, 0.4}, {-3, 3, -0.5}), diffuse(Rgb(0.5)),
             radiance);
   const Vec3 normal = normalize(cross(Vec3{6, 0, 0.9}, Vec3{0, 6, 0}));
-  const GateSet gates(
-      gate.shape(), gate.kind == PlainGate::steady ? std::vector<double>{0} : std::vector<double>{1.0, 1.3});
+  const GateSet gates(gate.shape(),
+                      gate.kind == PlainGate::steady ? std::vector<double>{0} : std::vector<double>{1.0, 1.3});
   const PlainCamera camera(scene.camera);
   const int cells = 400;
   for (const Sampling sampling : samplings(gate)) {
@@ -119,8 +119,7 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
         for (int g = 0; g < gates.size(); ++g) {
           batches[pixel * gates.size() + g].add(image.at(pixel, g, 0));
           for (int c = 1; c < 3; ++c)
-            EXPECT_NEAR(image.at(pixel, g, c) * 3, image.at(pixel, g, 0) * radiance[c],
-                        1e-12 * radiance[c] * 30);
+            EXPECT_NEAR(image.at(pixel, g, c) * 3, image.at(pixel, g, 0) * radiance[c], 1e-12 * radiance[c] * 30);
         }
     }
     for (int pixel = 0; pixel < 12; ++pixel)
@@ -214,8 +213,7 @@ TEST_P(ClosedForm, DirectLightOnAFloor) {
       const double expected = floor_mean(scene, gate, centers[g], n);
       const double coarse = floor_mean(scene, gate, centers[g], 3 * n / 4);
       ASSERT_NEAR(coarse, expected, 1e-3 * expected) << "the quadrature itself";
-      EXPECT_NEAR(means[g].mean, expected, kLimit * means[g].standard_error + 1e-3 * expected)
-          << "gate " << g;
+      EXPECT_NEAR(means[g].mean, expected, kLimit * means[g].standard_error + 1e-3 * expected) << "gate " << g;
       EXPECT_GT(expected, 0.01);
       EXPECT_LT(means[g].standard_error, 8e-3 * expected) << "gate " << g;
     }
@@ -316,9 +314,8 @@ TEST_P(Agreement, OfStandardAndEllipsoidalPerBlock) {
   }
   for (std::size_t i = 0; i < results[0].size(); ++i) {
     EXPECT_LT(std::abs(z_score(results[0][i], results[1][i])), kLimit)
-        << "block " << i / gates.size() << " gate " << i % gates.size() << ": " << results[0][i].mean
-        << " +- " << results[0][i].standard_error << " and " << results[1][i].mean << " +- "
-        << results[1][i].standard_error;
+        << "block " << i / gates.size() << " gate " << i % gates.size() << ": " << results[0][i].mean << " +- "
+        << results[0][i].standard_error << " and " << results[1][i].mean << " +- " << results[1][i].standard_error;
   }
   for (int g = 0; g < gates.size(); ++g)
     for (const auto& r : results) {

@@ -41,8 +41,7 @@ TEST_P(Figure8, Pixels) {
     const int n = kTermSamples[static_cast<int>(term)];
     PixelBatches batches;
     for (int b = 0; b < kBatches; ++b)
-      batches.add(
-          renderer.derive(term, {1, 0, 1 + static_cast<std::uint32_t>(term)}, {b * n, (b + 1) * n}).front());
+      batches.add(renderer.derive(term, {1, 0, 1 + static_cast<std::uint32_t>(term)}, {b * n, (b + 1) * n}).front());
     ours += batches;
   }
   Scene above = scene, below = scene;
@@ -68,9 +67,8 @@ TEST_P(Figure8, Pixels) {
   for (std::size_t i = 0; i < ours.mean.size(); ++i) {
     if (std::abs(reference.mean[i]) < 0.02 * peak) continue;
     const double error = std::sqrt(ours.variance[i] + reference.variance[i]);
-    EXPECT_LT(std::abs(scores.image[i]), 6)
-        << "pixel " << i << ": ours " << ours.mean[i] << ", finite difference " << reference.mean[i]
-        << ", standard error " << error;
+    EXPECT_LT(std::abs(scores.image[i]), 6) << "pixel " << i << ": ours " << ours.mean[i] << ", finite difference "
+                                            << reference.mean[i] << ", standard error " << error;
     errors.push_back(error);
     squares += scores.image[i] * scores.image[i];
     ++moving;
@@ -82,11 +80,11 @@ TEST_P(Figure8, Pixels) {
   RecordProperty("rms_z", std::to_string(std::sqrt(squares / moving)));
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Gates, Figure8,
-    ::testing::Values(Case{"gaussian", GateShape::gaussian(0.1)}, Case{"boxcar", GateShape::boxcar(0.25)},
-                      Case{"truncated_gaussian", GateShape::truncated_gaussian(0.15, 0.15)}),
-    [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(Gates, Figure8,
+                         ::testing::Values(Case{"gaussian", GateShape::gaussian(0.1)},
+                                           Case{"boxcar", GateShape::boxcar(0.25)},
+                                           Case{"truncated_gaussian", GateShape::truncated_gaussian(0.15, 0.15)}),
+                         [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace isochron::testing

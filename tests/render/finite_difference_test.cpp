@@ -107,9 +107,8 @@ TEST_P(FiniteDifference, TotalDerivative) {
   EstimatorOptions reference_options = options;
   reference_options.sampling = Sampling::standard;
   for (std::size_t p = 0; p < parameters.size(); ++p) {
-    const auto difference =
-        finite_difference(scene, parameters[p].motion, parameters[p].step, gates, reference_options,
-                          factor * c.reference_samples, kBatches, {32, 0, 0});
+    const auto difference = finite_difference(scene, parameters[p].motion, parameters[p].step, gates, reference_options,
+                                              factor * c.reference_samples, kBatches, {32, 0, 0});
     const double scale = parameters[p].geometry ? motion_scale : size_of(p);
     for (int g = 0; g < 2; ++g) {
       Estimate total;
@@ -122,8 +121,8 @@ TEST_P(FiniteDifference, TotalDerivative) {
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
       EXPECT_LT(error, parameters[p].slack * limit / std::sqrt(factor) * scale)
-          << parameters[p].name << ", gate " << g << ": ours " << total.standard_error
-          << ", finite difference " << difference[g].standard_error;
+          << parameters[p].name << ", gate " << g << ": ours " << total.standard_error << ", finite difference "
+          << difference[g].standard_error;
     }
   }
 }
@@ -131,20 +130,16 @@ TEST_P(FiniteDifference, TotalDerivative) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, FiniteDifference,
     ::testing::Values(
-        Case{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120,
-             250},
+        Case{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120, 250},
         Case{"diffuse_boxcar_standard", Look::diffuse, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
         Case{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3),
              Sampling::ellipsoidal, 40, 400},
-        Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60,
-             250},
-        Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40,
+        Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 250},
+        Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 400},
+        Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60,
              400},
-        Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3),
-             Sampling::standard, 60, 400},
         Case{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 250},
-        Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60,
-             250}),
+        Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60, 250}),
     [](const auto& test) { return test.param.name; });
 
 }  // namespace

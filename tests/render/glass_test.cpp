@@ -93,8 +93,8 @@ TEST(Glass, StandardAgreesWithEllipsoidal) {
   }
   for (int g = 0; g < 3; ++g) {
     const Estimate &a = results[0][g], &b = results[1][g];
-    EXPECT_LT(std::abs(z_score(a, b)), 4.5) << g << ": " << a.mean << " +- " << a.standard_error << ", " << b.mean
-                                            << " +- " << b.standard_error;
+    EXPECT_LT(std::abs(z_score(a, b)), 4.5)
+        << g << ": " << a.mean << " +- " << a.standard_error << ", " << b.mean << " +- " << b.standard_error;
     EXPECT_LT(std::hypot(a.standard_error, b.standard_error), 0.03 * a.mean);
   }
 }

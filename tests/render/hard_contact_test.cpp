@@ -28,8 +28,8 @@ Scene standing_cube(double albedo) {
   add_shape(scene, "back", quad({-1, 0, -1}, {1, 0, -1}, {1, 1.5, -1}, {-1, 1.5, -1}), diffuse(Rgb(0.7)));
   add_shape(scene, "left", quad({-1, 0, 1}, {-1, 0, -1}, {-1, 1.5, -1}, {-1, 1.5, 1}), diffuse(Rgb(0.7)));
   add_shape(scene, "cube", box({-0.35, 0, -0.35}, {0.25, 0.6, 0.25}), diffuse(Rgb(albedo)));
-  add_shape(scene, "lamp", quad({0.3, 1.8, 0.2}, {0.9, 1.8, 0.2}, {0.9, 1.8, 0.8}, {0.3, 1.8, 0.8}),
-            diffuse(Rgb(0.0)), Rgb(10.0));
+  add_shape(scene, "lamp", quad({0.3, 1.8, 0.2}, {0.9, 1.8, 0.2}, {0.9, 1.8, 0.8}, {0.3, 1.8, 0.8}), diffuse(Rgb(0.0)),
+            Rgb(10.0));
   return scene;
 }
 
@@ -51,8 +51,7 @@ class StandingCube : public ::testing::TestWithParam<ContactCase> {};
 TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
   const ContactCase& c = GetParam();
   const Scene scene = standing_cube(c.albedo);
-  const std::vector<Motion> motions = {translate(scene, "cube", {1, 0, 0}),
-                                       translate(scene, "cube", {0, 0, 1})};
+  const std::vector<Motion> motions = {translate(scene, "cube", {1, 0, 0}), translate(scene, "cube", {0, 0, 1})};
   const TangentBasis basis = make_basis(scene, motions);
   const GateSet gates(c.shape, {c.center});
   EstimatorOptions options{.max_bounces = c.max_bounces, .sampling = c.sampling};
@@ -61,8 +60,7 @@ TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
   for (int t = 0; t < 3; ++t) terms[t] = term_means(renderer, kTerms[t], 2, 1, c.samples, 32, {41, 0, 0});
   options.sampling = Sampling::standard;
   for (int m = 0; m < 2; ++m) {
-    const Estimate difference =
-        finite_difference(scene, motions[m], 0.03, gates, options, 120, 32, {42, 0, 0})[0];
+    const Estimate difference = finite_difference(scene, motions[m], 0.03, gates, options, 120, 32, {42, 0, 0})[0];
     Estimate total;
     double scale = 0;
     for (const auto& term : terms) {
@@ -78,16 +76,14 @@ TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Gates, StandingCube,
-                         ::testing::Values(ContactCase{"direct_gaussian_standard", GateShape::gaussian(0.4),
-                                                       5.0, Sampling::standard, 0.7, 1, 40},
-                                           ContactCase{"direct_boxcar_ellipsoidal", GateShape::boxcar(1.2),
-                                                       5.0, Sampling::ellipsoidal, 0.7, 1, 24},
-                                           ContactCase{"black_steady", GateShape::steady(), 0,
-                                                       Sampling::standard, 0, 2, 40},
-                                           ContactCase{"black_boxcar_ellipsoidal", GateShape::boxcar(1.2),
-                                                       5.0, Sampling::ellipsoidal, 0, 2, 24}),
-                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Gates, StandingCube,
+    ::testing::Values(
+        ContactCase{"direct_gaussian_standard", GateShape::gaussian(0.4), 5.0, Sampling::standard, 0.7, 1, 40},
+        ContactCase{"direct_boxcar_ellipsoidal", GateShape::boxcar(1.2), 5.0, Sampling::ellipsoidal, 0.7, 1, 24},
+        ContactCase{"black_steady", GateShape::steady(), 0, Sampling::standard, 0, 2, 40},
+        ContactCase{"black_boxcar_ellipsoidal", GateShape::boxcar(1.2), 5.0, Sampling::ellipsoidal, 0, 2, 24}),
+    [](const auto& test) { return test.param.name; });
 
 /// Irradiance at p with normal n from a polygon of unit radiance, all of it above p's horizon (Lambert's
 /// formula).
@@ -119,8 +115,7 @@ TEST(LampOnWall, ImageIsThatOfQuadrature) {
   for (int i = 0; i < kSteps; ++i)
     for (int j = 0; j < kSteps; ++j) {
       const Vec3 p{0, 0.6 + 0.4 * (i + 0.5) / kSteps, -0.2 + 0.4 * (j + 0.5) / kSteps};
-      exact +=
-          7 * 0.6 / kPi * irradiance(p, {1, 0, 0}, {lamp[0], lamp[1], lamp[2], lamp[3]}) / (kSteps * kSteps);
+      exact += 7 * 0.6 / kPi * irradiance(p, {1, 0, 0}, {lamp[0], lamp[1], lamp[2], lamp[3]}) / (kSteps * kSteps);
     }
   // A gate that is constant over all lengths of direct light, 1.5 to 2.8.
   const double width = 1.6;

@@ -48,8 +48,7 @@ Scene make_scene(const Place& place) {
   }
   add_shape(scene, "floor", floor, diffuse(Rgb(kAlbedo)));
   const Vec3 &b = place.lamp, &u = place.u, &v = place.v;
-  add_shape(scene, "lamp", quad(b - u - v, b + u - v, b + u + v, b - u + v), diffuse(Rgb(0.0)),
-            Rgb(kRadiance));
+  add_shape(scene, "lamp", quad(b - u - v, b + u - v, b + u + v, b - u + v), diffuse(Rgb(0.0)), Rgb(kRadiance));
   if (!place.wall.faces.empty()) add_shape(scene, "wall", place.wall, diffuse(Rgb(0.8), true));
   return scene;
 }
@@ -63,35 +62,31 @@ struct Shift {
 /// Mean of the image under the gate, by the midpoint rule: what the floor reflects, over the image, and the
 /// lamp itself, over its area.
 double image_mean(const Place& place, const GateShape& gate, double center, const Shift& shift) {
-  const Vec3 forward = normalize(place.look_at - place.camera),
-             right = normalize(cross(forward, Vec3{0, 1, 0}));
+  const Vec3 forward = normalize(place.look_at - place.camera), right = normalize(cross(forward, Vec3{0, 1, 0}));
   const Vec3 up = cross(right, forward), area = cross(place.u, place.v) * 4.0, lamp = place.lamp + shift.lamp;
   const double t = std::tan(0.5 * place.fov * kPi / 180);
   double floor = 0, direct = 0;
   constexpr int kGrid = 1200, kLampGrid = 300;
   for (int i = 0; i < kGrid; ++i)
     for (int j = 0; j < kGrid; ++j) {
-      const Vec3 d =
-          forward + right * (t * ((2 * i + 1.0) / kGrid - 1)) + up * (t * ((2 * j + 1.0) / kGrid - 1));
+      const Vec3 d = forward + right * (t * ((2 * i + 1.0) / kGrid - 1)) + up * (t * ((2 * j + 1.0) / kGrid - 1));
       if (!(d.y < 0)) continue;
-      const Vec3 to_x = d * ((shift.floor - place.camera.y) / d.y), x = place.camera + to_x,
-                 to_lamp = lamp - x;
+      const Vec3 to_x = d * ((shift.floor - place.camera.y) / d.y), x = place.camera + to_x, to_lamp = lamp - x;
       const double r = length(to_lamp), projected = -dot(area, to_lamp);
       if (!(projected > 0 && to_lamp.y > 0)) continue;
       floor += projected * to_lamp.y / (r * r * r * r) * gate.value(length(to_x) + r - center);
     }
   for (int i = 0; i < kLampGrid; ++i)
     for (int j = 0; j < kLampGrid; ++j) {
-      const Vec3 d = lamp + place.u * ((2 * i + 1.0) / kLampGrid - 1) +
-                     place.v * ((2 * j + 1.0) / kLampGrid - 1) - place.camera;
+      const Vec3 d =
+          lamp + place.u * ((2 * i + 1.0) / kLampGrid - 1) + place.v * ((2 * j + 1.0) / kLampGrid - 1) - place.camera;
       const double depth = dot(d, forward), projected = -dot(area, d);
-      if (!(depth > 0 && projected > 0 && std::abs(dot(d, right)) < t * depth &&
-            std::abs(dot(d, up)) < t * depth))
+      if (!(depth > 0 && projected > 0 && std::abs(dot(d, right)) < t * depth && std::abs(dot(d, up)) < t * depth))
         continue;
       direct += projected / (depth * depth * depth) * gate.value(length(d) - center);
     }
-  return kRadiance * (kAlbedo / kPi * floor / (1.0 * kGrid * kGrid) +
-                      direct / (4 * t * t) / (1.0 * kLampGrid * kLampGrid));
+  return kRadiance *
+         (kAlbedo / kPi * floor / (1.0 * kGrid * kGrid) + direct / (4 * t * t) / (1.0 * kLampGrid * kLampGrid));
 }
 
 /// A small lamp that faces down.
@@ -160,8 +155,7 @@ TEST_P(HardLight, MatchesQuadrature) {
   const Scene scene = make_scene(place);
   const GateSet gates(c.gate, {c.center});
   const std::vector<Shift> shifts = {{1, {}}, {0, c.lamp_motion}};
-  std::vector<Motion> motions = {translate(scene, "floor", {0, 1, 0}),
-                                 translate(scene, "lamp", c.lamp_motion)};
+  std::vector<Motion> motions = {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", c.lamp_motion)};
   if (!place.wall.faces.empty()) motions.push_back(translate(scene, "wall", {0, 1, 1}));
   const TangentBasis basis = make_basis(scene, motions);
 
@@ -185,8 +179,7 @@ TEST_P(HardLight, MatchesQuadrature) {
     const Renderer renderer(scene, gates, options, &basis);
     const Estimate image = image_means(renderer, 1, kSamples, kBatches, {61, 0, 0})[0];
     EXPECT_LT(std::abs(image.mean - exact_image), 4.5 * image.standard_error + kQuadrature * exact_image)
-        << "share " << share << ": " << image.mean << " +- " << image.standard_error << ", exact "
-        << exact_image;
+        << "share " << share << ": " << image.mean << " +- " << image.standard_error << ", exact " << exact_image;
     least_error = std::min(least_error, image.standard_error);
     std::vector<std::vector<Estimate>> terms[3];
     for (int t = 0; t < 3; ++t)
@@ -218,12 +211,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"specular_boxcar", bistatic, GateShape::boxcar(4e-3 * kSpecular), kSpecular, 1e-3, {1, 1, 0}},
         Case{"slivers", slivers, GateShape::gaussian(1e-3 * kSpecular), 1.002 * kSpecular, 2e-4, {1, 1, 0}},
         Case{"straight_grazing", grazing, GateShape::gaussian(1e-3), 1.0, 2e-4, {0, 1, 0}},
-        Case{"straight_seen",
-             seen,
-             GateShape::gaussian(2e-3),
-             std::sqrt(0.01 + 0.04 + 4),
-             2e-4,
-             {0.2, 0.3, 1}},
+        Case{"straight_seen", seen, GateShape::gaussian(2e-3), std::sqrt(0.01 + 0.04 + 4), 2e-4, {0.2, 0.3, 1}},
         Case{"in_plane", in_the_walls_plane, GateShape::gaussian(0.02), 3.21, 1e-3, {0, 1, 0.2}}),
     [](const auto& test) { return test.param.name; });
 
@@ -247,9 +235,8 @@ TEST(ShortestPath, GatesThatEndThereAreExactlyDark) {
   // Of all lamp points the corner nearest to the camera has the shortest path over the floor.
   const Scene scene = make_scene(facing_down({-0.6, 1, 0.2}, {0, 0, 0}, 60, {0.5, 1.4, -0.1}, 0.05));
   const double shortest = std::sqrt(1.05 * 1.05 + 0.25 * 0.25 + 2.4 * 2.4);
-  const TangentBasis basis =
-      make_basis(scene, {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0}),
-                         change_albedo(scene, "floor")});
+  const TangentBasis basis = make_basis(scene, {translate(scene, "floor", {0, 1, 0}),
+                                                translate(scene, "lamp", {0.3, 1, 0}), change_albedo(scene, "floor")});
   for (const double width : {1e-6, 3e-3, 0.3})
     for (const double share : {0.0, 0.3, 1.0}) {
       EstimatorOptions options{.max_bounces = 2};

@@ -12,8 +12,7 @@
 namespace isochron::testing {
 namespace {
 
-double exponent(const Scene& scene, const GrowthMethod& method, int samples,
-                const std::vector<double>& widths) {
+double exponent(const Scene& scene, const GrowthMethod& method, int samples, const std::vector<double>& widths) {
   std::vector<double> variances;
   for (const double width : widths) {
     const double error = growth_estimate(scene, method, width, samples, 64).standard_error;

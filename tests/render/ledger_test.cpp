@@ -27,8 +27,7 @@ class Ledger : public ::testing::TestWithParam<Case> {
  protected:
   Ledger() : scene_(load_scene(TEST_DATA "/reference/scene.yaml")) {
     scene_.camera.width = scene_.camera.height = 6;
-    basis_ = make_basis(
-        scene_, {rotate_y(scene_, "block", {-0.2, -0.4, 0.15}), translate(scene_, "light", {0, 0, 1})});
+    basis_ = make_basis(scene_, {rotate_y(scene_, "block", {-0.2, -0.4, 0.15}), translate(scene_, "light", {0, 0, 1})});
   }
   EstimatorOptions options(int max_bounces) const {
     EstimatorOptions options;

@@ -41,8 +41,7 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
   const auto expected = image_means(reference, 2, 60, kBatches, {41, 0, 0});
   const auto image = image_means(ours, 2, 40, kBatches, {42, 0, 0});
   for (int g = 0; g < 2; ++g) {
-    EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5)
-        << image[g].mean << ", standard " << expected[g].mean;
+    EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5) << image[g].mean << ", standard " << expected[g].mean;
     EXPECT_LT(image[g].standard_error, 0.04 * expected[g].mean);
   }
   // Smooth parts and jumps are shared out differently between the two terms; their sum must agree.
@@ -63,10 +62,8 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
     const double scale = std::hypot(exact[m][0].mean, exact[m][1].mean) / std::sqrt(2.0);
     for (int g = 0; g < 2; ++g) {
       EXPECT_LT(std::abs(z_score(derivative[m][g], exact[m][g])), 4.5)
-          << "motion " << m << " gate " << g << ": " << derivative[m][g].mean << ", standard "
-          << exact[m][g].mean;
-      EXPECT_LT(derivative[m][g].standard_error, (smooth ? 0.08 : 0.15) * scale)
-          << "motion " << m << " gate " << g;
+          << "motion " << m << " gate " << g << ": " << derivative[m][g].mean << ", standard " << exact[m][g].mean;
+      EXPECT_LT(derivative[m][g].standard_error, (smooth ? 0.08 : 0.15) * scale) << "motion " << m << " gate " << g;
     }
   }
 }
@@ -105,8 +102,7 @@ TEST(ArcPick, UniformHasTheSameMean) {
     const double scale = std::hypot(exact[0].mean, exact[1].mean) / std::sqrt(2.0);
     for (int g = 0; g < 2; ++g) {
       EXPECT_LT(std::abs(z_score(derivative[g], exact[g])), 4.5)
-          << name(term) << " gate " << g << ": " << derivative[g].mean << ", by contribution "
-          << exact[g].mean;
+          << name(term) << " gate " << g << ": " << derivative[g].mean << ", by contribution " << exact[g].mean;
       EXPECT_LT(derivative[g].standard_error, 0.15 * scale) << name(term) << " gate " << g;
     }
   }
@@ -189,8 +185,8 @@ TEST(GatePick, ProbabilitiesAndDensity) {
 TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {
   const Scene scene = load_scene(PROJECT_ROOT "/scenes/cube/scene.yaml");
   const TangentBasis basis = make_basis(scene, {translate(scene, "cube", {0, 1, 0})});
-  const auto mix = [&](double width, Sampling sampling = Sampling::automatic,
-                       Purpose purpose = Purpose::images, unsigned seed = 1) {
+  const auto mix = [&](double width, Sampling sampling = Sampling::automatic, Purpose purpose = Purpose::images,
+                       unsigned seed = 1) {
     const GateSet gates(GateShape::gaussian(width * 5.4), {5.4});
     return measure_mix(scene, gates, {.max_bounces = 4, .sampling = sampling}, &basis, {seed, 0, 0}, purpose);
   };

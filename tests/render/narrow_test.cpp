@@ -99,7 +99,9 @@ struct Case {
   bool jumps = false;  ///< constant between the jumps of a boxcar
 };
 
-void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.name;
+}
 
 class NarrowFieldOfView : public ::testing::TestWithParam<std::tuple<Case, Sampling>> {};
 

@@ -9,8 +9,8 @@
 #include <map>
 
 #include "core/math/random.h"
-#include "tests/materials/walter.h"
 #include "scene_building.h"
+#include "tests/materials/walter.h"
 
 namespace isochron::testing {
 namespace {
@@ -154,8 +154,7 @@ std::vector<SurfacePoint> surface_points(const PreparedScene& scene, const PathS
   return x;
 }
 
-Gradients by_hand(const PreparedScene& scene, const PathSpec& spec, bool length_only,
-                  LocalDifferential& raw) {
+Gradients by_hand(const PreparedScene& scene, const PathSpec& spec, bool length_only, LocalDifferential& raw) {
   const std::vector<SurfacePoint> x = surface_points(scene, spec);
   differentiate_path(scene, x.data(), static_cast<int>(x.size()), length_only, raw);
   Gradients result;

@@ -48,7 +48,9 @@ struct Case {
   Sampling sampling;
   bool antithetic = true;
 };
-void PrintTo(const Case& c, std::ostream* out) { *out << c.kind; }
+void PrintTo(const Case& c, std::ostream* out) {
+  *out << c.kind;
+}
 
 class Reference : public ::testing::TestWithParam<Case> {};
 
@@ -94,25 +96,42 @@ TEST_P(Reference, EveryTerm) {
       agrees("path_length", length, row.at("path_length"));
       const Estimate total = sum(sum(in, vis), length);
       agrees("total", total, row.at("total"));
-      EXPECT_LT(total.standard_error, (standard ? 0.04 : c.antithetic ? 0.06 : 0.08) * scale) << c.names[g] << " parameter " << p;
+      EXPECT_LT(total.standard_error, (standard       ? 0.04
+                                       : c.antithetic ? 0.06
+                                                      : 0.08) *
+                                          scale)
+          << c.names[g] << " parameter " << p;
     }
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Gates, Reference,
-    ::testing::Values(Case{"gaussian_standard", {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
-                           GateShape::gaussian(0.3), Sampling::standard},
-                      Case{"boxcar_standard", {"boxcar:5:0:4.7:5.3", "boxcar:6:0:5.7:6.3", "boxcar:7:0:6.7:7.3"},
-                           GateShape::boxcar(0.6), Sampling::standard},
-                      Case{"truncated_standard", {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
-                           GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard},
-                      Case{"gaussian_ellipsoidal", {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
-                           GateShape::gaussian(0.3), Sampling::ellipsoidal},
-                      Case{"truncated_ellipsoidal", {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
-                           GateShape::truncated_gaussian(0.3, 0.3), Sampling::ellipsoidal},
-                      Case{"truncated_uncoupled", {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
-                           GateShape::truncated_gaussian(0.3, 0.3), Sampling::ellipsoidal, false}),
+    ::testing::Values(Case{"gaussian_standard",
+                           {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
+                           GateShape::gaussian(0.3),
+                           Sampling::standard},
+                      Case{"boxcar_standard",
+                           {"boxcar:5:0:4.7:5.3", "boxcar:6:0:5.7:6.3", "boxcar:7:0:6.7:7.3"},
+                           GateShape::boxcar(0.6),
+                           Sampling::standard},
+                      Case{"truncated_standard",
+                           {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
+                           GateShape::truncated_gaussian(0.3, 0.3),
+                           Sampling::standard},
+                      Case{"gaussian_ellipsoidal",
+                           {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
+                           GateShape::gaussian(0.3),
+                           Sampling::ellipsoidal},
+                      Case{"truncated_ellipsoidal",
+                           {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
+                           GateShape::truncated_gaussian(0.3, 0.3),
+                           Sampling::ellipsoidal},
+                      Case{"truncated_uncoupled",
+                           {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
+                           GateShape::truncated_gaussian(0.3, 0.3),
+                           Sampling::ellipsoidal,
+                           false}),
     [](const auto& test) { return test.param.kind; });
 
 }  // namespace

@@ -79,12 +79,12 @@ TEST_P(Sinks, AdjointIsTheTransposeOfTheJacobian) {
   const TangentBasis basis = make_basis(scene, motions);
   for (const Setting& s : settings()) {
     const GateSet gates(s.shape, {4.9, 5.6, 5.8});
-    const Renderer renderer(scene, gates,
-                            {.max_bounces = 3, .sampling = s.sampling, .antithetic = s.antithetic}, &basis);
+    const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = s.sampling, .antithetic = s.antithetic},
+                            &basis);
     ASSERT_EQ(renderer.mix().interior, s.sampling == Sampling::ellipsoidal ? 1 : 0);
     for (const Term term : kTerms) {
-      SCOPED_TRACE(std::string(s.name) +
-                   (s.sampling == Sampling::standard ? ", standard, " : ", ellipsoidal, ") + name(term));
+      SCOPED_TRACE(std::string(s.name) + (s.sampling == Sampling::standard ? ", standard, " : ", ellipsoidal, ") +
+                   name(term));
       const Stream stream{11, 5, 1 + static_cast<std::uint32_t>(term)};
       const SampleRange range{3, 67};
       const std::vector<GatedImage> images = renderer.derive(term, stream, range);
@@ -107,19 +107,17 @@ TEST_P(Sinks, AdjointIsTheTransposeOfTheJacobian) {
         }
         EXPECT_NEAR(sum, gradient[c], 1e-11 * scale) << "column " << c;
         const bool geometry = c < 4;
-        const bool expected =
-            term == Term::interior
-                ? true
-                : geometry && (term == Term::visibility ||
-                               (s.shape.kind() != GateKind::gaussian && !s.shape.is_steady()));
+        const bool expected = term == Term::interior
+                                  ? true
+                                  : geometry && (term == Term::visibility ||
+                                                 (s.shape.kind() != GateKind::gaussian && !s.shape.is_steady()));
         EXPECT_EQ(scale > 0, expected) << "column " << c;
       }
     }
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, Sinks, ::testing::Bool(),
-                         [](const auto& test) { return test.param ? "Grey" : "Rgb"; });
+INSTANTIATE_TEST_SUITE_P(, Sinks, ::testing::Bool(), [](const auto& test) { return test.param ? "Grey" : "Rgb"; });
 
 /// Explicit zeros wherever `whole` has entries: the same parts count as moving, so that the same samples are
 /// taken.
@@ -160,8 +158,7 @@ TEST(Jacobian, ColumnsEqualSingleTangents) {
 /// Motions of the same vertices need no such zeros.
 TEST(Jacobian, ColumnsOfOneShapeEqualSingleTangents) {
   const Scene scene = make_scene(true);
-  const std::vector<Motion> motions{translate(scene, "block", {1, 0, 0}),
-                                    translate(scene, "block", {0.2, 0.5, 0}),
+  const std::vector<Motion> motions{translate(scene, "block", {1, 0, 0}), translate(scene, "block", {0.2, 0.5, 0}),
                                     rotate_y(scene, "block", {0.1, 0, 3})};
   const TangentBasis whole = make_basis(scene, motions);
   const GateSet gates(GateShape::boxcar(0.5), {4.9, 5.6});

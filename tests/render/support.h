@@ -17,8 +17,7 @@ struct Motion {
 };
 
 inline Motion move_vertices(const Scene& scene, const std::string& shape, std::function<bool(const Vec3&)> select,
-                            std::function<Vec3(const Vec3&, double)> place,
-                            std::function<Vec3(const Vec3&)> velocity) {
+                            std::function<Vec3(const Vec3&, double)> place, std::function<Vec3(const Vec3&)> velocity) {
   const Shape& s = scene.shapes[scene.find_shape(shape)];
   std::vector<int> chosen;
   for (int v = s.first_vertex; v < s.first_vertex + s.vertex_count; ++v)
@@ -33,8 +32,9 @@ inline Motion move_vertices(const Scene& scene, const std::string& shape, std::f
           }};
 }
 
-inline Motion translate(const Scene& scene, const std::string& shape, const Vec3& direction,
-                        std::function<bool(const Vec3&)> select = [](const Vec3&) { return true; }) {
+inline Motion translate(
+    const Scene& scene, const std::string& shape, const Vec3& direction,
+    std::function<bool(const Vec3&)> select = [](const Vec3&) { return true; }) {
   return move_vertices(
       scene, shape, select, [=](const Vec3& p, double t) { return p + direction * t; },
       [=](const Vec3&) { return direction; });
@@ -49,7 +49,9 @@ inline Motion rotate_y(const Scene& scene, const std::string& shape, const Vec3&
         const Vec3 d = p - pivot;
         return pivot + Vec3{c * d.x + s * d.z, d.y, -s * d.x + c * d.z};
       },
-      [=](const Vec3& p) { return cross(Vec3{0, 1, 0}, p - pivot); });
+      [=](const Vec3& p) {
+        return cross(Vec3{0, 1, 0}, p - pivot);
+      });
 }
 
 inline Motion change_albedo(const Scene& scene, const std::string& material) {
@@ -133,8 +135,7 @@ inline double z_score(const Estimate& a, const Estimate& b) {
 }
 
 /// Image means per gate over `batches` batches of `samples` samples each.
-inline std::vector<Estimate> image_means(const Renderer& renderer, int gates, int samples, int batches,
-                                         Stream stream) {
+inline std::vector<Estimate> image_means(const Renderer& renderer, int gates, int samples, int batches, Stream stream) {
   std::vector<Batches> sums(gates);
   for (int b = 0; b < batches; ++b) {
     const GatedImage image = renderer.render(stream, {b * samples, (b + 1) * samples});

@@ -14,8 +14,8 @@ inline Scene growth_scene(bool plate) {
   scene.camera.fov = 80;
   scene.camera.width = scene.camera.height = 8;
   add_shape(scene, "floor", Mesh{{{-20, 0, 20}, {20, 0, 20}, {0, 0, -30}}, {{0, 1, 2}}}, diffuse(Rgb(0.6)));
-  add_shape(scene, "lamp", quad({-0.1, 2, -0.1}, {0.1, 2, -0.1}, {0.1, 2, 0.1}, {-0.1, 2, 0.1}),
-            diffuse(Rgb(0.0)), Rgb(10.0));
+  add_shape(scene, "lamp", quad({-0.1, 2, -0.1}, {0.1, 2, -0.1}, {0.1, 2, 0.1}, {-0.1, 2, 0.1}), diffuse(Rgb(0.0)),
+            Rgb(10.0));
   if (plate)
     add_shape(scene, "plate", quad({-0.4, 1.2, 0.1}, {0.2, 1.2, 0.1}, {0.2, 1.2, 0.7}, {-0.4, 1.2, 0.7}),
               diffuse(Rgb(0.0)));
@@ -27,10 +27,9 @@ struct GrowthMethod {
   Sampling sampling;
   bool antithetic;
 };
-inline constexpr GrowthMethod kGrowthMethods[] = {
-    {"standard", Sampling::standard, true},
-    {"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
-    {"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true}};
+inline constexpr GrowthMethod kGrowthMethods[] = {{"standard", Sampling::standard, true},
+                                                  {"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
+                                                  {"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true}};
 inline constexpr double kGrowthCenter = 4.35;
 
 /// The interior derivative of the mean image by a vertical motion of the floor, gaussian gate of standard
@@ -40,12 +39,10 @@ inline Estimate growth_estimate(const Scene& scene, const GrowthMethod& method, 
                                 int batches) {
   const TangentBasis basis = make_basis(scene, {translate(scene, "floor", {0, 1, 0})});
   const GateSet gates(GateShape::gaussian(width * kGrowthCenter), {kGrowthCenter});
-  const Renderer renderer(scene, gates,
-                          {.max_bounces = 1,
-                           .sampling = method.sampling,
-                           .antithetic = method.antithetic,
-                           .numbers = Numbers::independent},
-                          &basis);
+  const Renderer renderer(
+      scene, gates,
+      {.max_bounces = 1, .sampling = method.sampling, .antithetic = method.antithetic, .numbers = Numbers::independent},
+      &basis);
   return term_means(renderer, Term::interior, 1, 1, samples, batches, {61, 0, 0})[0][0];
 }
 

@@ -57,18 +57,17 @@ TEST(Coincidence, CountsTrianglesPerPair) {
   add_shape(scene, "cube", box({0, 0, 0}, {1, 1, 1}), diffuse(Rgb(0.5)));  // its bottom is cut the same way
   add_shape(scene, "shell", box({0, 0, 0}, {1, 1, 1}, true), diffuse(Rgb(0.5)));
   EXPECT_EQ(found_in(scene), (Found{{0, 1, 2}, {1, 2, 12}}));
-  EXPECT_EQ(
-      coincidence_warning(scene),
-      "shapes on the same surface: 'floor' and 'cube' (2 triangles), 'cube' and 'shell' (12 triangles); "
-      "light would be reflected by either or by both, so images are wrong there: leave one out, or move "
-      "them apart");
+  EXPECT_EQ(coincidence_warning(scene),
+            "shapes on the same surface: 'floor' and 'cube' (2 triangles), 'cube' and 'shell' (12 triangles); "
+            "light would be reflected by either or by both, so images are wrong there: leave one out, or move "
+            "them apart");
 }
 
 TEST(Coincidence, NamesAFewPairs) {
   Scene scene;
   for (int i = 0; i < 7; ++i)
-    add_shape(scene, std::string(1, static_cast<char>('a' + i)),
-              {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}, diffuse(Rgb(0.5)));
+    add_shape(scene, std::string(1, static_cast<char>('a' + i)), {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}},
+              diffuse(Rgb(0.5)));
   const std::string text = coincidence_warning(scene);
   EXPECT_NE(text.find("'d' and 'e' (1 triangle) and 2 more pairs;"), std::string::npos) << text;
 }

@@ -20,8 +20,7 @@ using Face = std::array<int, 3>;
 
 /// Corners of the unit cube's six faces, seen from outside counter-clockwise; corner i is (i & 1, i / 2 & 1,
 /// i / 4).
-constexpr int kCube[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4},
-                             {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+constexpr int kCube[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
 
 Vec3 cube_corner(int i) {
   return {double(i & 1), double(i >> 1 & 1), double(i >> 2)};
@@ -58,9 +57,7 @@ void expect_cube(const Mesh& raw) {
 
 class MeshFile : public testing::Test {
  protected:
-  Mesh read(const std::string& name, const std::string& contents) {
-    return read_mesh(folder.write(name, contents));
-  }
+  Mesh read(const std::string& name, const std::string& contents) { return read_mesh(folder.write(name, contents)); }
   /// The message without the folder.
   std::string error(const std::string& name, const std::string& contents) {
     const std::string message = error_of([&] { read(name, contents); });
@@ -188,8 +185,7 @@ TEST_F(MeshFile, PolygonsBecomeFans) {
 TEST_F(MeshFile, CornersTwiceCostNoOtherTriangle) {
   const std::string points = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
   const std::vector<Face> expected{{0, 1, 2}, {0, 1, 3}};
-  EXPECT_EQ(read("m.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 2 3\nf 1 2 4 1\nf 1 1 2\n").faces,
-            expected);
+  EXPECT_EQ(read("m.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 2 3\nf 1 2 4 1\nf 1 1 2\n").faces, expected);
   EXPECT_EQ(read("m.off", "OFF\n4 3 0\n" + points + "4 0 1 1 2\n4 0 1 3 0\n3 0 0 1\n").faces, expected);
 }
 
@@ -202,10 +198,8 @@ TEST_F(MeshFile, CommentsAndAttributesAreNotTakenForData) {
     EXPECT_EQ(mesh.positions, positions) << contents;
     EXPECT_EQ(mesh.faces, faces) << contents;
   };
-  expect_same("m.obj",
-              "v 0 0 0\nvt 0.5\nv 1 0 0 # 7\nv 0 1 0\nf 1 2 3 # the 4 th\n\nv 1 1 0\nf -3 4//1 3/1\n");
-  expect_same("m.off",
-              "OFF # a\n# 1\n4 2\n0 0 0\n# 2\n1 0 0\n\n0 1 0\n1 1 0\n3 0 1 2 255 0 0\n3 1 3 2 # 3\n");
+  expect_same("m.obj", "v 0 0 0\nvt 0.5\nv 1 0 0 # 7\nv 0 1 0\nf 1 2 3 # the 4 th\n\nv 1 1 0\nf -3 4//1 3/1\n");
+  expect_same("m.off", "OFF # a\n# 1\n4 2\n0 0 0\n# 2\n1 0 0\n\n0 1 0\n1 1 0\n3 0 1 2 255 0 0\n3 1 3 2 # 3\n");
   expect_same("m.off",
               "CNOFF\n4 2 5\n0 0 0 0 0 1 9 9 9 1\n1 0 0 0 0 1 9 9 9 1\n0 1 0 0 0 1 9 9 9 1\n"
               "1 1 0 0 0 1 9 9 9 1\n3 0 1 2 0.5 0 0 1\n3 1 3 2\n");
@@ -238,8 +232,7 @@ TEST_F(MeshFile, MeshesThatAreNoManifoldAreReadAsTheyAre) {
     indices += fmt::format("3 {} {} {}\n", f[0], f[1], f[2]);
     obj += fmt::format("f {} {} {}\n", f[0] + 1, f[1] + 1, f[2] + 1);
     stl += "facet\nouter loop\n";
-    for (const int v : f)
-      stl += fmt::format("vertex {} {} {}\n", positions[v].x, positions[v].y, positions[v].z);
+    for (const int v : f) stl += fmt::format("vertex {} {} {}\n", positions[v].x, positions[v].y, positions[v].z);
     stl += "endloop\nendfacet\n";
   }
   const std::string counts = fmt::format("OFF\n{} {} 0\n", positions.size(), faces.size());
@@ -279,8 +272,7 @@ TEST_F(MeshFile, ObjErrors) {
   EXPECT_EQ(error("m.obj", "garbage"), "m.obj: has no faces");
   EXPECT_EQ(error("m.abc", three), "m.abc: '.abc' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)");
   std::filesystem::create_directory(folder.path("folder.obj"));
-  EXPECT_EQ(error_of([&] { read_mesh(folder.path("folder.obj")); }),
-            folder.path("folder.obj") + ": is a folder");
+  EXPECT_EQ(error_of([&] { read_mesh(folder.path("folder.obj")); }), folder.path("folder.obj") + ": is a folder");
 }
 
 TEST_F(MeshFile, OffErrors) {
@@ -290,8 +282,7 @@ TEST_F(MeshFile, OffErrors) {
   EXPECT_EQ(error("m.off", "OFF\n3 -1 0\n"), "m.off:2: impossible counts");
   EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 nan 0\n"), "m.off:4: 'nan' is not a finite number");
   EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n"), "m.off:4: the file ends too early");
-  EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"),
-            "m.off:6: there is no vertex 3 (0 to 2)");
+  EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n"), "m.off:6: there is no vertex 3 (0 to 2)");
   EXPECT_EQ(error("m.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n"),
             "m.off:6: a face of 2 vertices (at least three)");
   EXPECT_EQ(error("m.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"), "m.off: has no faces");
@@ -340,13 +331,10 @@ TEST_F(MeshFile, CountsAreNotBelieved) {
   const std::string header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n";
   const std::string faces = "element face 1\nproperty list uchar int vertex_index\nend_header\n";
   const std::string more = "property float z\nproperty list int int more\n";
-  EXPECT_EQ(error("m.ply", header + more + faces + "0 0 0 9223372036854775807\n"),
-            "m.ply:11: impossible counts");
-  EXPECT_EQ(error("m.ply", header + more + faces + "0 0 0 2000000000 1\n"),
-            "m.ply:11: the line ends too early");
+  EXPECT_EQ(error("m.ply", header + more + faces + "0 0 0 9223372036854775807\n"), "m.ply:11: impossible counts");
+  EXPECT_EQ(error("m.ply", header + more + faces + "0 0 0 2000000000 1\n"), "m.ply:11: the line ends too early");
   EXPECT_EQ(error("m.off", "OFF\n2147483647 1 0\n0 0 0\n"), "m.off:3: the file ends too early");
-  EXPECT_EQ(error("m.off", "OFF\n1 1 0\n0 0 0\n9223372036854775807 0 0 0\n"),
-            "m.off:4: '' is not an integer");
+  EXPECT_EQ(error("m.off", "OFF\n1 1 0\n0 0 0\n9223372036854775807 0 0 0\n"), "m.off:4: '' is not an integer");
 
   const std::string good = cube_ply("binary_little_endian");
   const auto with = [&](const std::string& from, const std::string& to) {
@@ -377,8 +365,7 @@ TEST_F(MeshFile, PlyHeadersThatContradictThemselves) {
 }
 
 TEST_F(MeshFile, BinaryPlyOfEveryType) {
-  const auto read_as = [&](const std::string& coordinate, const auto& x, const std::string& index,
-                           const auto& i) {
+  const auto read_as = [&](const std::string& coordinate, const auto& x, const std::string& index, const auto& i) {
     std::string bytes = "ply\r\nformat binary_big_endian 1.0\r\nelement vertex 3\r\n";
     for (const char* axis : {"z", "y", "x"}) bytes += "property " + coordinate + " " + axis + "\r\n";
     bytes += "property list char ushort more\r\nelement face 1\r\nproperty list double " + index +
@@ -413,8 +400,7 @@ TEST_F(MeshFile, MessagesArePrintable) {
 }
 
 TEST_F(MeshFile, StlErrors) {
-  EXPECT_EQ(error("m.stl", "garbage"),
-            "m.stl:1: is neither text STL nor binary STL of the size its header states");
+  EXPECT_EQ(error("m.stl", "garbage"), "m.stl:1: is neither text STL nor binary STL of the size its header states");
   std::string bad = cube_stl(true);
   const float nan = std::nanf("");
   std::memcpy(bad.data() + 84 + 50 * 2 + 12 + 4, &nan, sizeof nan);
@@ -425,8 +411,7 @@ TEST_F(MeshFile, StlErrors) {
             "m.stl:5: 'x' is not a finite number");
   EXPECT_EQ(error("m.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n"),
             "m.stl:6: a facet of 2 vertices (three)");
-  EXPECT_EQ(error("m.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\n"),
-            "m.stl:4: the file ends within a facet");
+  EXPECT_EQ(error("m.stl", "solid\nfacet\nouter loop\nvertex 0 0 0\n"), "m.stl:4: the file ends within a facet");
 }
 
 TEST(CleanMesh, WeldsSeams) {
@@ -481,15 +466,13 @@ TEST(CleanMesh, KeepsThinFaces) {
 
 TEST(CleanMesh, RejectsFacesBackToBack) {
   const Mesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {1, 0, 2}}};
-  EXPECT_EQ(
-      error_of([&] { clean_mesh(mesh); }),
-      "two faces with corners (0, 0, 0) (1, 0, 0) (0, 1, 0) lie back to back (one face, and two_sided in its "
-      "material, is allowed)");
+  EXPECT_EQ(error_of([&] { clean_mesh(mesh); }),
+            "two faces with corners (0, 0, 0) (1, 0, 0) (0, 1, 0) lie back to back (one face, and two_sided in its "
+            "material, is allowed)");
 }
 
 TEST(Edges, RejectsThreeFaces) {
-  const Mesh mesh{{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}},
-                  {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}}};
+  const Mesh mesh{{{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}}, {{0, 1, 2}, {0, 1, 3}, {1, 0, 4}}};
   EXPECT_EQ(error_of([&] { build_edges(mesh); }),
             "the edge from (0, 0, 0) to (0, 0, 1) has 3 faces (at most two are allowed)");
 }
@@ -509,8 +492,7 @@ TEST(Edges, MatchBruteForce) {
     std::shuffle(name.begin(), name.end(), random);
     Mesh mesh;
     mesh.positions.resize(name.size());
-    for (int i = 0; i < kSide * kSide; ++i)
-      mesh.positions[name[i]] = {double(i % kSide), double(i / kSide), 0};
+    for (int i = 0; i < kSide * kSide; ++i) mesh.positions[name[i]] = {double(i % kSide), double(i / kSide), 0};
     for (int i = 0; i < kSide * kSide; ++i) {
       if (i % kSide == kSide - 1 || i / kSide == kSide - 1) continue;
       if (random() % 4 != 0) mesh.faces.push_back({name[i], name[i + 1], name[i + kSide]});

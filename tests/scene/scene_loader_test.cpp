@@ -145,16 +145,19 @@ TEST_F(SceneLoader, GlassIsSolid) {
     text.replace(text.find("shapes:"), 7, shape + more + "}");
     folder.write("scene.yaml", text);
     std::string found = error_of([&] { load_scene(folder.path("scene.yaml")); });
-    for (std::size_t at; (at = found.find(folder.path(""))) != std::string::npos;) found.erase(at, folder.path("").size());
+    for (std::size_t at; (at = found.find(folder.path(""))) != std::string::npos;)
+      found.erase(at, folder.path("").size());
     return found;
   };
   EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"), "no error");
-  EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n"),
-            "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; this one ends at the "
-            "edge from (1, 0, 0) to (0, 1, 0)");
-  EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 3 2\n"),
-            "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; the faces of this one "
-            "disagree about its outside at the edge from (1, 0, 0) to (0, 1, 0)");
+  EXPECT_EQ(
+      message("3 0 2 1\n3 0 1 3\n3 0 3 2\n"),
+      "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; this one ends at the "
+      "edge from (1, 0, 0) to (0, 1, 0)");
+  EXPECT_EQ(
+      message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 3 2\n"),
+      "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; the faces of this one "
+      "disagree about its outside at the edge from (1, 0, 0) to (0, 1, 0)");
   EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n", ", emission: 1"),
             "scene.yaml:11:59: shapes[0].emission: a shape of rough_dielectric emits nothing (leave it out)");
 }
@@ -165,8 +168,7 @@ TEST_F(SceneLoader, EdgesOfLaterShapesCountOn) {
   for (int shape = 0; shape < 2; ++shape) {
     // The diagonal joins the quad's corners 0 and 2, between its two triangles.
     const auto diagonal = std::count_if(scene.edges.begin(), scene.edges.end(), [&](const Edge& edge) {
-      return edge.vertex == std::array{4 * shape, 4 * shape + 2} &&
-             edge.face == std::array{2 * shape, 2 * shape + 1};
+      return edge.vertex == std::array{4 * shape, 4 * shape + 2} && edge.face == std::array{2 * shape, 2 * shape + 1};
     });
     EXPECT_EQ(diagonal, 1) << shape;
   }
@@ -174,9 +176,8 @@ TEST_F(SceneLoader, EdgesOfLaterShapesCountOn) {
 
 TEST_F(SceneLoader, DirectionsOfAnyLength) {
   for (const std::string length : {"1e-200", "1e200"}) {
-    const Scene scene =
-        load_scene(with("material: metal}", "material: metal, transform: {rotate: {axis: [0, 0, " + length +
-                                                "], degrees: 90}}}"));
+    const Scene scene = load_scene(
+        with("material: metal}", "material: metal, transform: {rotate: {axis: [0, 0, " + length + "], degrees: 90}}}"));
     EXPECT_LT(isochron::length(scene.positions[1] - Vec3{0, 1, 0}), 1e-15);
     EXPECT_NE(error("up: [0, 1, 0]", "up: [0, 0, " + length + "]").find("up is parallel"), std::string::npos);
   }
@@ -192,17 +193,16 @@ TEST_F(SceneLoader, ColoursAndDefaults) {
 
 TEST_F(SceneLoader, TransformScalesThenRotatesThenTranslates) {
   // A quarter turn about z takes (x, y) to (-y, x).
-  const Scene scene =
-      load_scene(with("material: metal}",
-                      "material: metal, transform: {scale: 2, rotate: {axis: [0, 0, 3], degrees: 90}, "
-                      "translate: [10, 20, 30]}}"));
+  const Scene scene = load_scene(with("material: metal}",
+                                      "material: metal, transform: {scale: 2, rotate: {axis: [0, 0, 3], degrees: 90}, "
+                                      "translate: [10, 20, 30]}}"));
   const Vec3 expected[] = {{10, 20, 30}, {10, 22, 30}, {8, 22, 30}, {8, 20, 30}};
   for (int v = 0; v < 4; ++v) EXPECT_LT(length(scene.positions[v] - expected[v]), 1e-14) << v;
   EXPECT_EQ(scene.positions[4], (Vec3{0, 0, 2}));
 
   // A third of a turn about the diagonal takes x to y, y to z, z to x.
-  const Scene turned = load_scene(
-      with("material: metal}", "material: metal, transform: {rotate: {axis: [1, 1, 1], degrees: 120}}}"));
+  const Scene turned =
+      load_scene(with("material: metal}", "material: metal, transform: {rotate: {axis: [1, 1, 1], degrees: 120}}}"));
   EXPECT_LT(length(turned.positions[1] - Vec3{0, 1, 0}), 1e-15);
   EXPECT_LT(length(turned.positions[3] - Vec3{0, 0, 1}), 1e-15);
 }
@@ -218,16 +218,13 @@ TEST_F(SceneLoader, PathsAreRelativeToTheSceneFile) {
 TEST_F(SceneLoader, CameraErrors) {
   EXPECT_EQ(error("fov: 40", "fov: 180"),
             "scene.yaml:5:8: camera.fov: 180 is out of range (a number above 0, below 180)");
-  EXPECT_EQ(error("fov: 40", "fov: 0"),
-            "scene.yaml:5:8: camera.fov: 0 is out of range (a number above 0, below 180)");
+  EXPECT_EQ(error("fov: 40", "fov: 0"), "scene.yaml:5:8: camera.fov: 0 is out of range (a number above 0, below 180)");
   EXPECT_EQ(error("fov: 40", "fov: wide"),
             "scene.yaml:5:8: camera.fov: 'wide' is not a finite number (a number above 0, below 180)");
   EXPECT_EQ(error("  fov: 40\n", ""), "scene.yaml:2:3: camera.fov: is missing");
-  EXPECT_EQ(
-      error("fov: 40", "fov: 40\n  zoom: 2"),
-      "scene.yaml:6:3: camera.zoom: is not a known key (allowed: position, look_at, up, fov, resolution)");
-  EXPECT_EQ(error("fov: 40", "fov: 40\n  fov: 41"),
-            "scene.yaml:6:3: camera.fov: stands here twice, first on line 5");
+  EXPECT_EQ(error("fov: 40", "fov: 40\n  zoom: 2"),
+            "scene.yaml:6:3: camera.zoom: is not a known key (allowed: position, look_at, up, fov, resolution)");
+  EXPECT_EQ(error("fov: 40", "fov: 40\n  fov: 41"), "scene.yaml:6:3: camera.fov: stands here twice, first on line 5");
   EXPECT_EQ(error("[64, 48]", "[64, 0]"),
             "scene.yaml:6:20: camera.resolution[1]: 0 is out of range (an integer from 1 to 32768)");
   EXPECT_EQ(error("[64, 48]", "[64.5, 48]"),
@@ -237,11 +234,9 @@ TEST_F(SceneLoader, CameraErrors) {
   EXPECT_EQ(error("look_at: [0, 0, 0]", "look_at: [0, 0, 5]"),
             "scene.yaml:3:12: camera.look_at: is the camera's position (a point away from it)");
   for (const std::string far : {"1e200", "1e-200", "1e308"})
-    EXPECT_EQ(
-        error("position: [0, 0, 5]\n  look_at: [0, 0, 0]",
-              "position: [0, 0, 0]\n  look_at: [0, 0, " + far + "]"),
-        "scene.yaml:3:12: camera.look_at: lies too near the camera's position or too far away (a distance "
-        "whose square a double can hold)");
+    EXPECT_EQ(error("position: [0, 0, 5]\n  look_at: [0, 0, 0]", "position: [0, 0, 0]\n  look_at: [0, 0, " + far + "]"),
+              "scene.yaml:3:12: camera.look_at: lies too near the camera's position or too far away (a distance "
+              "whose square a double can hold)");
   EXPECT_EQ(error("up: [0, 1, 0]", "up: [0, 0, -3]"),
             "scene.yaml:4:7: camera.up: up is parallel to the line of sight (any other direction)");
   EXPECT_EQ(error("up: [0, 1, 0]", "up: [0, 0, 0]"),
@@ -253,9 +248,8 @@ TEST_F(SceneLoader, CameraErrors) {
 TEST_F(SceneLoader, MaterialErrors) {
   EXPECT_EQ(error("albedo: 0.6", "albedo: 1.5"),
             "scene.yaml:8:34: materials.white.albedo: 1.5 is out of range (a number at least 0, at most 1)");
-  EXPECT_EQ(
-      error("albedo: 0.6", "albedo: [0, -1, 0]"),
-      "scene.yaml:8:38: materials.white.albedo[1]: -1 is out of range (a number at least 0, at most 1)");
+  EXPECT_EQ(error("albedo: 0.6", "albedo: [0, -1, 0]"),
+            "scene.yaml:8:38: materials.white.albedo[1]: -1 is out of range (a number at least 0, at most 1)");
   EXPECT_EQ(error("roughness: 0.2", "roughness: 0"),
             "scene.yaml:9:45: materials.metal.roughness: 0 is out of range (a number above 0, at most 1)");
   EXPECT_EQ(error("roughness: 0.2", "roughness: 1.01"),
@@ -266,11 +260,9 @@ TEST_F(SceneLoader, MaterialErrors) {
   EXPECT_EQ(error("type: diffuse", "type: difuse"),
             "scene.yaml:8:17: materials.white.type: 'difuse' is not known, did you mean 'diffuse'? "
             "(allowed: diffuse, rough_conductor, rough_dielectric)");
-  EXPECT_EQ(
-      error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
-      "scene.yaml:8:39: materials.white.roughness: is not a known key (allowed: type, albedo, two_sided)");
-  EXPECT_EQ(error("  metal:", "  white:"),
-            "scene.yaml:9:3: materials.white: stands here twice, first on line 8");
+  EXPECT_EQ(error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
+            "scene.yaml:8:39: materials.white.roughness: is not a known key (allowed: type, albedo, two_sided)");
+  EXPECT_EQ(error("  metal:", "  white:"), "scene.yaml:9:3: materials.white: stands here twice, first on line 8");
 }
 
 TEST_F(SceneLoader, ShapeErrors) {
@@ -315,15 +307,12 @@ TEST_F(SceneLoader, MeshErrorsNameTheShape) {
   };
   const std::string at = "scene.yaml:11:25: shapes[0].file: meshes/";
   EXPECT_EQ(mesh("none.obj", ""), at + "none.obj: cannot be opened: No such file or directory");
-  EXPECT_EQ(mesh("quad.fbx", "x"),
-            at + "quad.fbx: '.fbx' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)");
+  EXPECT_EQ(mesh("quad.fbx", "x"), at + "quad.fbx: '.fbx' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)");
   EXPECT_EQ(mesh("empty.obj", "v 0 0 0\n"), at + "empty.obj: has no faces");
   EXPECT_EQ(mesh("huge.obj", "v 0 0 0\nv 1e200 0 0\nv 0 1 0\nf 1 2 3\n"),
             at + "huge.obj:2: '1e200' is not a finite number");
-  EXPECT_EQ(mesh("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"),
-            at + "flat.obj: has no face with an area");
-  EXPECT_EQ(mesh("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"),
-            at + "nan.obj:2: 'nan' is not a finite number");
+  EXPECT_EQ(mesh("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), at + "flat.obj: has no face with an area");
+  EXPECT_EQ(mesh("nan.obj", "v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n"), at + "nan.obj:2: 'nan' is not a finite number");
   EXPECT_EQ(mesh("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n"),
             at + "index.obj:4: there is no vertex 4 (the file has 3)");
   EXPECT_EQ(mesh("fan.obj", "v 0 0 0\nv 0 0 1\nv 1 0 0\nv 0 1 0\nv -1 0 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n"),

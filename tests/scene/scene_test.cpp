@@ -29,8 +29,7 @@ TEST(TangentBasis, TransposeProductMatchesTheDenseMatrix) {
   ASSERT_EQ(product.size(), static_cast<std::size_t>(kColumns));
   for (int column = 0; column < kColumns; ++column) {
     long double expected = 0;
-    for (int row = 0; row < kRows; ++row)
-      expected += static_cast<long double>(dense[row][column]) * gradient[row];
+    for (int row = 0; row < kRows; ++row) expected += static_cast<long double>(dense[row][column]) * gradient[row];
     EXPECT_NEAR(product[column], static_cast<double>(expected), 1e-14);
   }
 }

@@ -36,9 +36,7 @@ class TemporaryFolder {
     std::ifstream stream(path_ / name, std::ios::binary);
     return (std::ostringstream() << stream.rdbuf()).str();
   }
-  int entries() const {
-    return static_cast<int>(std::distance(std::filesystem::directory_iterator(path_), {}));
-  }
+  int entries() const { return static_cast<int>(std::distance(std::filesystem::directory_iterator(path_), {})); }
 
  private:
   std::filesystem::path path_;

@@ -28,8 +28,7 @@ class YamlReader : public testing::Test {
 
 TEST_F(YamlReader, ReadsEveryType) {
   YamlMap map =
-      open("a: -1.5e2\nb: +7\nc: true\nd: word\ne: [1, 2, 3]\nf: {g: 0.25}\nh: 0.5\ni: [0.1, 0.2, 0.3]\n")
-          .map();
+      open("a: -1.5e2\nb: +7\nc: true\nd: word\ne: [1, 2, 3]\nf: {g: 0.25}\nh: 0.5\ni: [0.1, 0.2, 0.3]\n").map();
   EXPECT_EQ(map.require("a").number(), -150);
   EXPECT_EQ(map.require("b").integer(0, 10), 7);
   EXPECT_TRUE(map.require("c").boolean());
@@ -66,8 +65,7 @@ TEST_F(YamlReader, Ranges) {
     return error([&] { value(text).number(range); });
   };
   EXPECT_EQ(with("0", NumberRange::positive()), "f.yaml:1:4: k: 0 is out of range (a number above 0)");
-  EXPECT_EQ(with("-0.5", NumberRange::non_negative()),
-            "f.yaml:1:4: k: -0.5 is out of range (a number at least 0)");
+  EXPECT_EQ(with("-0.5", NumberRange::non_negative()), "f.yaml:1:4: k: -0.5 is out of range (a number at least 0)");
   EXPECT_EQ(with("1.5", NumberRange::closed(0, 1)),
             "f.yaml:1:4: k: 1.5 is out of range (a number at least 0, at most 1)");
   EXPECT_EQ(with("2", {.high = 2, .high_open = true}), "f.yaml:1:4: k: 2 is out of range (a number below 2)");
@@ -127,12 +125,10 @@ TEST_F(YamlReader, MissingUnknownAndRepeatedKeys) {
   EXPECT_EQ(read("inner: {width: 1}\n"), "no error");
   EXPECT_EQ(read("other: 1\n"), "f.yaml:1:1: inner: is missing");
   EXPECT_EQ(read("inner:\n  height: 2\n"), "f.yaml:2:3: inner.width: is missing");
-  EXPECT_EQ(read("inner:\n  wdith: 2\n"),
-            "f.yaml:2:3: inner.width: is missing, is 'wdith' a misspelling of it?");
+  EXPECT_EQ(read("inner:\n  wdith: 2\n"), "f.yaml:2:3: inner.width: is missing, is 'wdith' a misspelling of it?");
   EXPECT_EQ(read("inner:\n  width: 2\n  hieght: 3\n"),
             "f.yaml:3:3: inner.hieght: is not a known key, did you mean 'height'? (allowed: width, height)");
-  EXPECT_EQ(read("inner: {width: 2}\n\nzebra: 3\n"),
-            "f.yaml:3:1: zebra: is not a known key (allowed: inner)");
+  EXPECT_EQ(read("inner: {width: 2}\n\nzebra: 3\n"), "f.yaml:3:1: zebra: is not a known key (allowed: inner)");
   EXPECT_EQ(read("inner:\n  width: 2\n  height: 1\n  width: 3\n"),
             "f.yaml:4:3: inner.width: stands here twice, first on line 2");
   EXPECT_EQ(read("inner: {[1]: 2}\n"), "f.yaml:1:9: inner: a list of 1 is used as a key (a word)");
@@ -187,12 +183,9 @@ TEST_F(YamlReader, Overrides) {
   EXPECT_EQ(error([&] { open(text, {"a.=1"}); }), "--set a.=1: must be KEY.PATH=VALUE");
   EXPECT_EQ(error([&] { open(text, {"=1"}); }), "--set =1: must be KEY.PATH=VALUE");
   EXPECT_EQ(error([&] { open(text, {"list[x]=1"}); }), "--set list[x]=1: must be KEY.PATH=VALUE");
-  EXPECT_EQ(error([&] { open(text, {"list[2].x=1"}); }),
-            "--set list[2].x: there is no entry 2 (the list has 2)");
+  EXPECT_EQ(error([&] { open(text, {"list[2].x=1"}); }), "--set list[2].x: there is no entry 2 (the list has 2)");
   // Sections that the file leaves out are made; lists are not.
-  EXPECT_EQ(
-      open(text, {"c.d.e=7", "c.d.f=8"}).map().require("c").map().require("d").map().require("e").number(),
-      7);
+  EXPECT_EQ(open(text, {"c.d.e=7", "c.d.f=8"}).map().require("c").map().require("d").map().require("e").number(), 7);
   EXPECT_EQ(error([&] { open(text, {"c.d=7"}).map().require("c").number(); }).substr(0, 8), "--set c:");
   EXPECT_EQ(error([&] { open(text, {"nobody[0]=1"}); }), "--set nobody[0]: there is no key 'nobody'");
   EXPECT_EQ(error([&] { open(text, {"a.b.c=1"}); }), "--set a.b.c: 'c' is looked for in '1', not in a map");

@@ -26,8 +26,7 @@ float pixel(bool smooth, int channel, int x, int y) {
 }
 
 void write(const std::string& file, Imf::Compression compression, bool smooth) {
-  const std::vector<std::string> names = {"gate000.Y", "interior.gate001.Y",
-                                          "path_length.gate010.with.a.long.name.Y"};
+  const std::vector<std::string> names = {"gate000.Y", "interior.gate001.Y", "path_length.gate010.with.a.long.name.Y"};
   Imf::Header header(kWidth, kHeight);
   header.compression() = compression;
   Imf::FrameBuffer buffer;

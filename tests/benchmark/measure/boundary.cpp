@@ -58,14 +58,15 @@ Result measure(const Setting& s, const EstimatorOptions& options, int batches) {
   renderer.derive(Term::visibility, {5, 0, 2}, {0, 0});  // learns
   const double learning = cpu_seconds() - start;
   for (int b = 0; b < batches; ++b) {
-    const GatedImage image =
-        renderer.derive(Term::visibility, {5, 0, 2}, {b * s.samples, (b + 1) * s.samples}).front();
+    const GatedImage image = renderer.derive(Term::visibility, {5, 0, 2}, {b * s.samples, (b + 1) * s.samples}).front();
     mean.add(image.mean(0));
     pixels.resize(image.data.size());
     for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i].add(image.data[i]);
   }
   const double seconds = cpu_seconds() - start;
-  const auto variance = [](const testing::Batches& x) { return x.estimate().standard_error * x.estimate().standard_error; };
+  const auto variance = [](const testing::Batches& x) {
+    return x.estimate().standard_error * x.estimate().standard_error;
+  };
   Result result{mean.estimate().mean, variance(mean) * seconds, 0, learning / seconds};
   for (const auto& pixel : pixels) result.of_pixels += variance(pixel) * seconds / static_cast<double>(pixels.size());
   return result;
@@ -83,9 +84,11 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
     if (&variant == kVariants) all = r;
     std::fprintf(csv, "%s,%s,%.6g,%.6g,%.6g,%.3g\n", setting.name, variant.name, r.mean, r.of_mean, r.of_pixels,
                  r.learning);
-    std::printf("%-12s %-22s mean % .4e   variance x seconds: of the mean %.2e (%6.2f), of pixels %.2e (%6.2f)   learning %2.0f %%\n",
-                setting.name, variant.name, r.mean, r.of_mean, r.of_mean / all.of_mean, r.of_pixels,
-                r.of_pixels / all.of_pixels, 100 * r.learning);
+    std::printf(
+        "%-12s %-22s mean % .4e   variance x seconds: of the mean %.2e (%6.2f), of pixels %.2e (%6.2f)   learning "
+        "%2.0f %%\n",
+        setting.name, variant.name, r.mean, r.of_mean, r.of_mean / all.of_mean, r.of_pixels,
+        r.of_pixels / all.of_pixels, 100 * r.learning);
     std::fflush(stdout);
   }
 }
@@ -105,11 +108,21 @@ Scene sensor() {
 /// A twice subdivided icosahedron on a floor, under a lamp.
 Mesh ball(const Vec3& center, double radius) {
   const double g = 0.5 * (1 + std::sqrt(5.0));
-  Mesh mesh{{{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-             {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}},
-            {{0, 11, 5}, {0, 5, 1}, {0, 1, 7}, {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4}, {11, 10, 2},
-             {10, 7, 6}, {7, 1, 8}, {3, 9, 4}, {3, 4, 2}, {3, 2, 6}, {3, 6, 8}, {3, 8, 9}, {4, 9, 5},
-             {2, 4, 11}, {6, 2, 10}, {8, 6, 7}, {9, 8, 1}}};
+  Mesh mesh{{{-1, g, 0},
+             {1, g, 0},
+             {-1, -g, 0},
+             {1, -g, 0},
+             {0, -1, g},
+             {0, 1, g},
+             {0, -1, -g},
+             {0, 1, -g},
+             {g, 0, -1},
+             {g, 0, 1},
+             {-g, 0, -1},
+             {-g, 0, 1}},
+            {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+             {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+             {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}}};
   for (int level = 0; level < 2; ++level) {
     std::map<std::pair<int, int>, int> middles;
     const auto middle = [&](int a, int b) {

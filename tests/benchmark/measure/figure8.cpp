@@ -88,8 +88,7 @@ class Differences {
 
   void add(const Stream& stream, SampleRange range) {
     difference.add([&] {
-      const GatedImage above = above_renderer_.render(stream, range),
-                       below = below_renderer_.render(stream, range);
+      const GatedImage above = above_renderer_.render(stream, range), below = below_renderer_.render(stream, range);
       images_.add(above);
       GatedImage result = above;
       for (std::size_t i = 0; i < result.data.size(); ++i)
@@ -100,9 +99,7 @@ class Differences {
   const GatedImage& image() const { return images_.mean(); }
   double step() const { return step_; }
   /// Cost with independent images: their variances add.
-  double independent_cost() const {
-    return images_.mean_variance() / (2 * step_ * step_) * difference.seconds;
-  }
+  double independent_cost() const { return images_.mean_variance() / (2 * step_ * step_) * difference.seconds; }
   double independent_variance(std::size_t i) const { return images_.variance(i) / (2 * step_ * step_); }
 
   Timed difference;
@@ -166,9 +163,7 @@ void measure(const std::string& kind, const std::string& folder, int effort, Tab
     for (double x : v) sum += x;
     return std::sqrt(sum / static_cast<double>(v.size()));
   };
-  const auto largest = [](const std::vector<double>& v) {
-    return std::sqrt(*std::max_element(v.begin(), v.end()));
-  };
+  const auto largest = [](const std::vector<double>& v) { return std::sqrt(*std::max_element(v.begin(), v.end())); };
   const auto scores = z_scores(ours, difference);
   const double peak = difference.peak();  // ours has outliers
   GatedImage z = total;
@@ -191,11 +186,9 @@ void measure(const std::string& kind, const std::string& folder, int effort, Tab
   table.add(kind, "largest standard error over peak: finite differences", largest(difference.variance) / peak,
             "< 0.05");
   table.add(kind, "root mean square error over peak: ours", root_mean(ours.variance) / peak);
-  table.add(kind, "root mean square error over peak: finite differences",
-            root_mean(difference.variance) / peak);
+  table.add(kind, "root mean square error over peak: finite differences", root_mean(difference.variance) / peak);
   table.add(kind, "CPU seconds: finite differences", reference.difference.seconds);
-  table.add(kind, "our cost with the samples split best over the cost as split",
-            root_cost * root_cost / cost);
+  table.add(kind, "our cost with the samples split best over the cost as split", root_cost * root_cost / cost);
 
   for (const double factor : {4.0, 1.0}) {
     Differences other(problem, theta, factor * step);
@@ -222,8 +215,7 @@ void measure(const std::string& kind, const std::string& folder, int effort, Tab
     table.add(kind, at + "cost of ours over common; median pixel", median(common), "<= 0.2");
     table.add(kind, at + "cost of ours over independent; mean variance", cost / other.independent_cost());
     table.add(kind, at + "cost of ours over independent; median pixel", median(independent), "<= 0.01");
-    table.add(kind, at + "root mean square bias over peak",
-              std::copysign(std::sqrt(std::abs(bias)), bias) / peak);
+    table.add(kind, at + "root mean square bias over peak", std::copysign(std::sqrt(std::abs(bias)), bias) / peak);
   }
 }
 

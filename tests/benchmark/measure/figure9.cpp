@@ -39,13 +39,12 @@ void measure(const char* folder, std::FILE* csv, double budget) {
   std::vector<GatedImage> images = {
       Renderer(scene, problem.gates(), options).render(problem.stream(Pass::primal), {0, 256})};
 
-  std::fprintf(csv,
-               "term,method,samples,mean,standard_error,cost,gain,gain_blocks_4,gain_blocks_16,gain_mean\n");
+  std::fprintf(csv, "term,method,samples,mean,standard_error,cost,gain,gain_blocks_4,gain_blocks_16,gain_mean\n");
   for (Term term : {Term::interior, Term::path_length}) {
     std::vector<double> standard;
-    for (const Method& method : {Method{"standard", Sampling::standard, true, 16},
-                                 Method{"ellipsoidal", Sampling::ellipsoidal, false, 2},
-                                 Method{"coupled", Sampling::ellipsoidal, true, 2}}) {
+    for (const Method& method :
+         {Method{"standard", Sampling::standard, true, 16}, Method{"ellipsoidal", Sampling::ellipsoidal, false, 2},
+          Method{"coupled", Sampling::ellipsoidal, true, 2}}) {
       options.sampling = method.sampling;
       options.antithetic = method.antithetic;
       const Renderer renderer(scene, problem.gates(), options, &basis);
@@ -66,10 +65,10 @@ void measure(const char* folder, std::FILE* csv, double budget) {
       for (const testing::PixelBatches& p : pixels) cost.push_back(p.mean_variance() * seconds);
       if (method.sampling == Sampling::standard) standard = cost;
       const testing::Estimate mean = means.estimate();
-      std::printf("%-12s %-12s %6d samples  mean % .5f +- %.5f  cost %.3e  gains", name(term), method.name,
-                  samples, mean.mean, mean.standard_error, cost[0]);
-      std::fprintf(csv, "%s,%s,%d,%.5g,%.2g,%.4g", name(term), method.name, samples, mean.mean,
-                   mean.standard_error, cost[0]);
+      std::printf("%-12s %-12s %6d samples  mean % .5f +- %.5f  cost %.3e  gains", name(term), method.name, samples,
+                  mean.mean, mean.standard_error, cost[0]);
+      std::fprintf(csv, "%s,%s,%d,%.5g,%.2g,%.4g", name(term), method.name, samples, mean.mean, mean.standard_error,
+                   cost[0]);
       for (std::size_t i = 0; i < cost.size(); ++i) {
         std::printf(" %.4g", standard[i] / cost[i]);
         std::fprintf(csv, ",%.4g", standard[i] / cost[i]);

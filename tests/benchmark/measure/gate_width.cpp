@@ -84,8 +84,9 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
         std::fflush(stdout);
       };
       report("image", mix.image, [&](SampleRange range) { return renderer.render({1, 0, 0}, range); });
-      report("interior", mix.interior,
-             [&](SampleRange range) { return renderer.derive(Term::interior, {1, 0, 1}, range)[0]; });
+      report("interior", mix.interior, [&](SampleRange range) {
+        return renderer.derive(Term::interior, {1, 0, 1}, range)[0];
+      });
     }
   }
 }
@@ -106,8 +107,8 @@ void measure_growth(int batches, std::FILE* csv) {
         const double width = std::pow(10.0, -0.5 * step);
         const int samples = method.sampling == Sampling::standard ? 800 : 50;
         const Estimate e = testing::growth_estimate(scene, method, width, samples, batches);
-        const double variance = e.standard_error * e.standard_error * samples * batches * scene.camera.width *
-                                scene.camera.height;
+        const double variance =
+            e.standard_error * e.standard_error * samples * batches * scene.camera.width * scene.camera.height;
         std::fprintf(csv, "%s,%.4g,\"%s\",%.6g,%.6g,%.6g\n", shadow ? "shadow" : "open", width, method.name, e.mean,
                      e.standard_error, variance);
         if (width < 0.011) narrow.push_back(width), variances.push_back(variance);

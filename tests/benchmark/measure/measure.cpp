@@ -68,8 +68,7 @@ class Report {
   Report(const Report&) = delete;
   Report& operator=(const Report&) = delete;
 
-  void add(const std::string& figure, const std::string& what, double value, const char* unit,
-           const char* goal = "") {
+  void add(const std::string& figure, const std::string& what, double value, const char* unit, const char* goal = "") {
     std::printf("%-34s %-62s %9.3f %-8s %s\n", figure.c_str(), what.c_str(), value, unit, goal);
     std::fprintf(csv_, "%s,%s,%.4g,%s,%s\n", figure.c_str(), what.c_str(), value, unit, goal);
     std::fflush(stdout);
@@ -122,8 +121,7 @@ void measure_forward(const NamedScene& s, int rounds, Report& report) {
 void measure_gradient(const NamedScene& s, int rounds, Report& report) {
   for (const bool narrow : {false, true}) {
     const GateSet gates = narrow ? narrow_gates() : wide_gates();
-    const EstimatorOptions options{.max_bounces = 3,
-                                   .sampling = narrow ? Sampling::ellipsoidal : Sampling::standard};
+    const EstimatorOptions options{.max_bounces = 3, .sampling = narrow ? Sampling::ellipsoidal : Sampling::standard};
     const SampleRange samples{0, narrow ? 4 : 16};
     for (const bool vertices : {false, true}) {
       const TangentBasis basis = vertices ? all_vertices(s.scene) : translation(s.scene);
@@ -142,8 +140,7 @@ void measure_gradient(const NamedScene& s, int rounds, Report& report) {
               return 1.0;
             });
         report.add(std::string(name(term)) + " gradient / render",
-                   s.name + (narrow ? " ellipsoidal" : " standard") +
-                       (vertices ? " all vertices" : " one translation"),
+                   s.name + (narrow ? " ellipsoidal" : " standard") + (vertices ? " all vertices" : " one translation"),
                    pair.ratio, "", term == Term::interior ? "<= 3" : "");
       }
     }
@@ -176,19 +173,16 @@ void measure_load(const std::string& figure, const std::string& what, Sampling s
                rounds, CLOCK_THREAD_CPUTIME_ID, [&] { return work(a), 1.0; }, [&] { return work(b), 1.0; })
         .ratio;
   };
-  report.add(figure, what + " render", pair([&](Side& s) { s.renderer.render({.seed = 3}, samples); }), "",
-             goal);
+  report.add(figure, what + " render", pair([&](Side& s) { s.renderer.render({.seed = 3}, samples); }), "", goal);
   report.add(figure, what + " interior gradient", pair([&](Side& s) {
-               s.renderer.add_gradient(Term::interior, s.adjoint, {.seed = 3, .pass = 1}, samples,
-                                       s.gradient);
+               s.renderer.add_gradient(Term::interior, s.adjoint, {.seed = 3, .pass = 1}, samples, s.gradient);
              }),
              "", goal);
 }
 
 /// What more unknowns, gates and triangles cost.
 void measure_loads(int rounds, Report& report) {
-  const Scene small = small_scene(), large = large_scene(), coarse = subdivided(small, 3),
-              fine = subdivided(small, 8);
+  const Scene small = small_scene(), large = large_scene(), coarse = subdivided(small, 3), fine = subdivided(small, 8);
   const GateSet wide = wide_gates(), narrow = narrow_gates();
   std::vector<double> centers;
   for (int g = 0; g < 256; ++g) centers.push_back(5 + 4.5 * g / 255);
@@ -198,14 +192,13 @@ void measure_loads(int rounds, Report& report) {
     const std::string how = standard ? "standard" : "ellipsoidal";
     const GateSet& gates = standard ? wide : narrow;
     const TangentBasis free = all_vertices(large), shift = translation(large);
-    measure_load("105 000 unknowns / one", how, sampling, {large, gates, free}, {large, gates, shift}, rounds,
-                 "<= 1.3", report);
-    const TangentBasis box = translation(small);
-    measure_load("256 gates / one", how, sampling, {small, many, box}, {small, one, box}, rounds, "<= 1.5",
+    measure_load("105 000 unknowns / one", how, sampling, {large, gates, free}, {large, gates, shift}, rounds, "<= 1.3",
                  report);
+    const TangentBasis box = translation(small);
+    measure_load("256 gates / one", how, sampling, {small, many, box}, {small, one, box}, rounds, "<= 1.5", report);
     const TangentBasis of_fine = translation(fine), of_coarse = translation(coarse);
-    measure_load("1.7 million triangles / 1700", how, sampling, {fine, gates, of_fine},
-                 {coarse, gates, of_coarse}, std::min(rounds, 5), "<= 3", report);
+    measure_load("1.7 million triangles / 1700", how, sampling, {fine, gates, of_fine}, {coarse, gates, of_coarse},
+                 std::min(rounds, 5), "<= 3", report);
   }
 }
 
@@ -227,8 +220,8 @@ void measure_threads(const NamedScene& s, int rounds, Report& report) {
     return measure_pair(rounds, CLOCK_MONOTONIC, with(1), with(2)).ratio;
   };
   const SampleRange samples{0, 64};
-  report.add("one thread / two", s.name + " render", speed_up([&] { renderer.render({.seed = 3}, samples); }),
-             "", ">= 1.9");
+  report.add("one thread / two", s.name + " render", speed_up([&] { renderer.render({.seed = 3}, samples); }), "",
+             ">= 1.9");
   report.add("one thread / two", s.name + " interior gradient", speed_up([&] {
                renderer.add_gradient(Term::interior, adjoint, {.seed = 3, .pass = 1}, samples, gradient);
              }),
@@ -254,7 +247,6 @@ int main(int argc, char** argv) {
   measure_loads(rounds, report);
   // Unlike the figures above, wall times need both cores. The load counts this program itself.
   if (double load; getloadavg(&load, 1) == 1 && load > 1.5)
-    std::fprintf(stderr, "The machine is busy (load %.1f): the figures for threads are not worth much.\n",
-                 load);
+    std::fprintf(stderr, "The machine is busy (load %.1f): the figures for threads are not worth much.\n", load);
   for (const NamedScene& s : scenes) measure_threads(s, rounds, report);
 }
