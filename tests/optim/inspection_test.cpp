@@ -113,7 +113,7 @@ TEST_F(InspectionTest, PredictsTheVarianceThatRepeatsHave) {
   EXPECT_LT(predicted, 2 * measured);
   // Not by accident: neither image nor terms are negligible here.
   EXPECT_GT(cost.variance.image / 3, 0.05 * measured);
-  EXPECT_GT((cost.variance.term[0] + cost.variance.cross[0] / 3) / 12, 0.03 * measured);
+  EXPECT_GT((cost.variance.term[0] + cost.variance.cross[0] / 3) / 12, 0.01 * measured);
 }
 
 TEST_F(InspectionTest, FragmentReadsBack) {

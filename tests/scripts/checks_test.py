@@ -20,11 +20,11 @@ LIMIT = 6
 
 # Samples per pixel, and pixels across. The others take longer for a clear verdict: scripts/check_experiments.py.
 QUICK = {
-    "corridor": (2048, 2),
+    "corridor": (8192, 2),
     "cube": (256, 16),
     "figure1": (2048, 16),
-    "height_field": (64, 8),
-    "height_field_steady": (64, 8),
+    "height_field": (512, 8),
+    "height_field_steady": (512, 8),
     "tree": (192, 16),
 }
 

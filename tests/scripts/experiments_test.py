@@ -25,7 +25,7 @@ DEFAULT = ([4, 4], 4, 3, None)
 CLOSER = {
     "branches": ([12, 12], 16, 6, None),
     "corridor": ([2, 2], 4096, 8, 0.02),
-    "cube": ([48, 48], 4, 20, None),
+    "cube": ([64, 64], 4, 20, None),
     "height_field": ([12, 12], 16, 6, None),
     "tree": ([16, 16], 8, 6, None),
 }
