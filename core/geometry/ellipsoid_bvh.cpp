@@ -280,15 +280,15 @@ int EllipsoidBvh::query_surfaces(const Vec3& a, const Vec3& b, double tau_low, d
 
 void EllipsoidBvh::sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u,
                                    std::vector<int>& ids, std::vector<double>& inverse_probability) const {
-  const auto shell = make_shell(a.p, b.p, tau_low, tau_high);
-  if (!shell) return;
-  if (impl_->blocks.size() <= kKept)
+  if (!impl_ || impl_->blocks.size() <= kKept) {
     query_surfaces(a.p, b.p, tau_low, tau_high, ids);
-  else if (tau_low < tau_high)
-    impl_->visit_some<true>(*shell, a, b, u, ids, inverse_probability);
-  else
-    impl_->visit_some<false>(*shell, a, b, u, ids, inverse_probability);
-  inverse_probability.resize(ids.size(), 1.0);
+    inverse_probability.resize(ids.size(), 1.0);
+  } else if (const auto shell = make_shell(a.p, b.p, tau_low, tau_high)) {
+    if (tau_low < tau_high)
+      impl_->visit_some<true>(*shell, a, b, u, ids, inverse_probability);
+    else
+      impl_->visit_some<false>(*shell, a, b, u, ids, inverse_probability);
+  }
 }
 
 std::optional<EllipsoidBvh::Shell> EllipsoidBvh::make_shell(const Vec3& a, const Vec3& b, double tau_low,

@@ -18,15 +18,12 @@ Bounds range_box(const std::pair<Item*, Item*>& range) {
   return box;
 }
 
-std::size_t blocks_of(std::ptrdiff_t count) {
-  return static_cast<std::size_t>((count + 7) / 8);
-}
-
 }  // namespace
 
 /// Binned surface-area heuristic, counting whole blocks as the cost of a side: leaves come out full.
 EllipsoidBvh::Impl::Item* EllipsoidBvh::Impl::split(const Range& range) {
   constexpr int kBins = 32;
+  const auto blocks_of = [](int count) { return (count + kWidth - 1) / kWidth; };
   Bounds centers;
   for (const Item* i = range.first; i != range.second; ++i) centers.add(i->center);
   double best = kInfinity, best_scale = 0;
@@ -48,13 +45,13 @@ EllipsoidBvh::Impl::Item* EllipsoidBvh::Impl::split(const Range& range) {
     int count = 0;
     for (std::size_t bin = kBins - 1; bin > 0; --bin) {
       if (counts[bin]) side.add(boxes[bin]), count += counts[bin];
-      right_cost[bin] = count ? side.half_area() * static_cast<double>(blocks_of(count)) : kInfinity;
+      right_cost[bin] = count ? side.half_area() * blocks_of(count) : kInfinity;
     }
     side = Bounds{}, count = 0;
     for (std::size_t bin = 1; bin < kBins; ++bin) {
       if (counts[bin - 1]) side.add(boxes[bin - 1]), count += counts[bin - 1];
       if (!count) continue;
-      const double cost = side.half_area() * static_cast<double>(blocks_of(count)) + right_cost[bin];
+      const double cost = side.half_area() * blocks_of(count) + right_cost[bin];
       if (cost < best) best = cost, best_axis = axis, best_bin = static_cast<int>(bin), best_scale = scale;
     }
   }

@@ -278,7 +278,7 @@ class EllipsoidalConnections {
     for (std::size_t i = 0; i < candidates.size(); ++i) {
       ArcPair arcs;
       sample(candidates[i], arcs);
-      const double weight = arcs.weight() * (inverse_probability.empty() ? 1 : inverse_probability[i]);
+      const double weight = arcs.weight() * inverse_probability[i];
       if (!(weight > 0)) continue;
       total += weight;
       const double share = weight / total;

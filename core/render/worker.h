@@ -21,7 +21,7 @@ struct Worker {
   Path path;
   LocalDifferential differential;
   std::vector<int> candidates;              ///< triangles that may hold an arc
-  std::vector<double> inverse_probability;  ///< of each candidate, where they are a choice; else empty
+  std::vector<double> inverse_probability;  ///< of each candidate to be one, for the pick by contribution
   long long rays = 0;
   long long arcs = 0;  ///< triangles looked at for arcs, and the queries that found them
 

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/math/chi_square.h"
+
 namespace isochron {
 namespace {
 
@@ -23,15 +25,6 @@ TEST(Rng, DependsOnItsArgumentsAlone) {
   const Stream stream{7, 3, 2};
   Rng a(stream, 12345, 6), b(stream, 12345, 6);
   for (int i = 0; i < 100; ++i) EXPECT_EQ(a.uniform(), b.uniform());
-}
-
-// z of a chi-square statistic with many degrees of freedom is close to normal: |z| < 5 fails falsely once in
-// 1e6.
-double chi_square_z(const std::vector<int>& counts, double expected) {
-  double chi2 = 0;
-  for (const int c : counts) chi2 += (c - expected) * (c - expected) / expected;
-  const double dof = static_cast<double>(counts.size()) - 1;
-  return (chi2 - dof) / std::sqrt(2 * dof);
 }
 
 TEST(Rng, UniformInOpenInterval) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/math/random.h"
+#include "tests/math/chi_square.h"
 
 namespace isochron {
 namespace {
@@ -112,13 +113,6 @@ TEST(Sobol, ScrambleIsNested) {
     const std::uint32_t difference = nested_permutation(a, key) ^ nested_permutation(b, key);
     ASSERT_EQ(std::countr_zero(difference), common);
   }
-}
-
-double chi_square_z(const std::vector<int>& counts, double expected) {
-  double chi2 = 0;
-  for (const int c : counts) chi2 += (c - expected) * (c - expected) / expected;
-  const double dof = static_cast<double>(counts.size()) - 1;
-  return (chi2 - dof) / std::sqrt(2 * dof);
 }
 
 // Over scrambles every coordinate of every point is uniform, and so is each pair of dimensions. 4 points with 16 + 120
