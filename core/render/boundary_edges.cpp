@@ -13,6 +13,29 @@ Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const
   return {};
 }
 
+/// How often an edge is to be looked at from the camera: by its length in the image, and between two faces that are both
+/// seen, where light changes little, by the angle between them. Zero where it makes no difference to any image.
+double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, bool wedge) {
+  const Vec3 a = edge.origin - scene.camera.position, b = edge.end - scene.camera.position;
+  if (scene.camera.misses_image(edge.origin, edge.end)) return 0;
+  const Vec3 middle = (a + b) * 0.5;
+  const double r = isochron::length(middle);
+  if (edge.faces() == 2) {
+    bool seen[2], dark = true;
+    for (int i = 0; i < 2; ++i) {
+      const Material& material = scene.material_of(edge.face[i]);
+      seen[i] = dot(scene.normal[edge.face[i]], a) <= kCoplanarAngle * isochron::length(a);
+      dark &= !seen[i] && !material.two_sided && !scene.is_dielectric(edge.face[i]);
+    }
+    if (dark) return 0;
+    if (seen[0] != seen[1]) wedge = false;
+  } else {
+    wedge = false;
+  }
+  const double in_image = isochron::length(cross(a, b)) / (r * (r * r + edge.length * edge.length));
+  return in_image * (wedge ? std::min(1.0, edge.wedge()) : 1.0);
+}
+
 }  // namespace
 
 BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
@@ -33,7 +56,7 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
     }
     const bool moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
     if (moves || scene.camera_flow.possible())
-      primary_.add(b, b.length / (length_squared(b.point(0.5) - scene.camera.position) + b.length * b.length), moves);
+      if (const double weight = primary_weight(scene, b, wedge); weight > 0) primary_.add(b, weight, moves);
     b.azimuths = wedge ? b.wedge() : kPi;
     secondary_.add(b, b.length * b.azimuths, moves);
   }
