@@ -86,13 +86,16 @@ BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records, const std:
   }
 
   // For a given total cost, the variance is least where each technique is used in proportion to the root of its
-  // second moment over its cost.
+  // second moment, which is that of guided samples, over its cost.
   double total_cost = 0, wanted_cost = 0;
   std::array<double, kTechniques> trust;
   trust.fill(1);
   for (int t = 0; t < kTechniques; ++t) {
     double square = 0, fourth = 0;
-    for (const GuideRecord& r : of_technique[t]) square += r.square, fourth += r.square * r.square;
+    for (const GuideRecord& r : of_technique[t]) {
+      const double guided = r.square / warps_[r.table].density(r.x);
+      square += guided, fourth += guided * guided;
+    }
     if (fourth > 0) trust[t] = square * square / (square * square + kFewEqual * fourth);
     rate_[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
     total_cost += cost[t];

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/gates/gate.h"
+#include "core/math/random.h"
 #include "core/render/camera_model.h"
 #include "core/render/path_differential.h"
 
@@ -40,7 +41,7 @@ class Warp {
 struct GuideRecord {
   int table;
   double x;       ///< in (0, 1): the boundary point's place in the unguided distribution
-  double square;  ///< summed over pixels, gates and columns
+  double square;  ///< summed over pixels, gates, columns and colours
 };
 
 class BoundaryGuide {
@@ -72,53 +73,66 @@ class BoundaryGuide {
   std::array<double, kTechniques> rate_;
 };
 
-/// Sink of the learning pass.
+/// Sink of the learning pass. What one sample adds to the same value of the same image is summed before it is squared: the
+/// two sides of a boundary cancel in part.
 class GuideSink {
  public:
   static constexpr bool kDifferential = true;
   GuideSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis)
-      : gates_(gates), layout_(layout), basis_(basis) {}
+      : gates_(gates), layout_(layout), basis_(basis), sums_(gates.size()) {}
 
   void bind(const LocalDifferential& differential) {
-    rates_.clear();
+    rate_ = 0;
     for (const VertexGradient& v : differential.vertices)
       for (int axis = 0; axis < 3; ++axis) {
         const int dof = layout_.vertex(v.vertex, axis);
         for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
-          add_rate(basis_.entries[i].column, v.log_f[axis] * basis_.entries[i].coefficient);
+          rate_ += sign(basis_.entries[i].column) * v.log_f[axis] * basis_.entries[i].coefficient;
       }
-    rate_squared_ = 0;
-    for (const auto& [column, rate] : rates_) rate_squared_ += rate * rate;
   }
   template <class Use>
-  void add(int /*pixel*/, const Rgb& value, double length, Use) {
-    double squared = 0;
-    gates_.for_each_value(length, [&](int, double w) { squared += w * w; });
-    square_ += squared * rate_squared_ * value.max() * value.max();
+  void add(int pixel, const Rgb& value, double length, Use) {
+    if (pixel != pixel_) square_sums();
+    pixel_ = pixel;
+    gates_.for_each_value(length, [&](int gate, double w) {
+      sums_[gate] += value * (w * rate_);
+      touched_.push_back(gate);
+    });
   }
   /// What was added since the last call came from place x of a table.
   void note(int table, double x) {
+    square_sums();
     if (square_ > 0) records.push_back({table, x, square_});
     square_ = 0;
+    ++sample_;
   }
 
   std::vector<GuideRecord> records;
 
  private:
-  void add_rate(int column, double rate) {
-    for (auto& known : rates_)
-      if (known.first == column) {
-        known.second += rate;
-        return;
-      }
-    rates_.emplace_back(column, rate);
+  /// The square of a sum of columns with random signs is, on average, the sum of their squares.
+  double sign(int column) const {
+    if (basis_.columns == 1) return 1;
+    const auto bits = philox({static_cast<std::uint32_t>(column) / 32, sample_, 0, 0}, {0x7369676eu, 0});
+    return bits[0] >> (column % 32) & 1 ? 1 : -1;
+  }
+  void square_sums() {
+    for (const int gate : touched_) {
+      const Rgb& sum = sums_[gate];
+      square_ += sum.r * sum.r + sum.g * sum.g + sum.b * sum.b;
+      sums_[gate] = Rgb();
+    }
+    touched_.clear();
   }
 
   const GateSet& gates_;
   const DofLayout layout_;
   const TangentBasis& basis_;
-  std::vector<std::pair<int, double>> rates_;
-  double rate_squared_ = 0, square_ = 0;
+  std::vector<Rgb> sums_;     ///< of the current pixel, by gate
+  std::vector<int> touched_;  ///< gates that were added to; repeats do no harm
+  int pixel_ = -1;
+  double rate_ = 0, square_ = 0;
+  std::uint32_t sample_ = 0;
 };
 
 /// Tells a learning sink where contributions came from; others do not ask.

@@ -122,6 +122,60 @@ TEST(BoundaryEdges, DensityIsTheFrequency) {
   }
 }
 
+/// A camera sees three faces of a cube from a corner, and one from straight ahead; what it cannot see is not looked at, save
+/// where its back reflects or lets light through. No edge is lost that is partly in the image.
+TEST(BoundaryEdges, OnlyThoseThatTheCameraCanSee) {
+  const auto seen = [](Scene scene) {
+    const TangentBasis basis = make_basis(scene, {translate(scene, "cube", {0, 1, 0})});
+    const PreparedScene prepared(scene, &basis);
+    const BoundaryEdges edges(prepared);
+    return edges.has_primary() ? tally(20000, [&](double u) { return edges.sample_primary(u); }) : std::map<Pair, int>();
+  };
+  Scene corner = cube_scene();
+  corner.camera.position = {5, 5, 5};
+  EXPECT_EQ(seen(corner).size(), 9u) << "six of the outline, three inside it";
+  corner.materials[0].two_sided = true;
+  EXPECT_EQ(seen(corner).size(), 12u);
+
+  Scene ahead = cube_scene();
+  EXPECT_EQ(seen(ahead).size(), 4u);
+  ahead.camera.look_at = {5, 0, 5};
+  EXPECT_EQ(seen(ahead).size(), 0u) << "beside the image";
+  ahead.camera.look_at = {0, 0, 10};
+  EXPECT_EQ(seen(ahead).size(), 0u) << "behind the camera";
+  // So close that the image holds part of the left edge alone, no corner.
+  ahead.camera.position = {-0.99, 0, 1.5};
+  ahead.camera.look_at = {-0.99, 0, 0};
+  ahead.camera.fov = 20;
+  const auto left = seen(ahead);
+  ASSERT_EQ(left.size(), 1u);
+  for (const int v : {left.begin()->first.first, left.begin()->first.second})
+    EXPECT_EQ(ahead.positions[v].x, -1) << v;
+}
+
+/// Inside the outline an edge counts by the angle between its faces, on it by its length in the image alone.
+TEST(BoundaryEdges, PrimaryOnesByLengthInTheImageAndAngle) {
+  const double angle = 0.1, rise = std::tan(angle / 2);
+  Scene scene;
+  scene.camera.position = {0, 1000, 0};  // far: lengths in the image are those seen from above
+  scene.camera.up = {0, 0, 1};
+  scene.camera.fov = 1;
+  add_shape(scene, "roof", Mesh{{{-1, 0, -1}, {-1, 0, 1}, {0, rise, -1}, {0, rise, 1}, {1, 0, -1}, {1, 0, 1}},
+                                {{0, 1, 3}, {0, 3, 2}, {2, 3, 5}, {2, 5, 4}}}, diffuse(Rgb(0.5)));
+  const TangentBasis basis = make_basis(scene, {translate(scene, "roof", {0, 1, 0})});
+  const PreparedScene prepared(scene, &basis);
+  const BoundaryEdges edges(prepared);
+  std::map<Pair, double> density;
+  tally(20000, [&](double u) {
+    const auto s = edges.sample_primary(u);
+    density[{s.edge->vertex[0], s.edge->vertex[1]}] = s.share;
+    return s;
+  });
+  const double outline = density[{0, 1}];
+  EXPECT_NEAR((density[{2, 3}] / outline), angle, 1e-4) << "the ridge";
+  EXPECT_NEAR((density[{0, 2}] / outline), 0.5, 1e-4) << "a gable, half as long";
+}
+
 /// The side is right if points just off the edge, to either side of the grazing plane, lie in the solid or
 /// not.
 TEST(BoundaryEdges, OccluderSideOfACube) {

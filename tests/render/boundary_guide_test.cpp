@@ -8,6 +8,7 @@
 
 #include "core/math/random.h"
 #include "core/render/boundary_edges.h"
+#include "core/render/sinks.h"
 #include "support.h"
 
 namespace isochron::testing {
@@ -92,12 +93,47 @@ TEST(BoundaryGuide, LearnsWhereContributionsAre) {
   const Warp& warp = guide.warp(BoundaryGuide::table(BoundaryGuide::from_edge));
   EXPECT_GT(warp.below(0.25), 0.75);
   for (int i = 0; i < 100; ++i) EXPECT_GT(warp.density((i + 0.5) / 100), 0.2);
-  // Rates for the same total cost of 10: in proportion to the roots of 40 / 1 and 1000 / 4, which are 1 / 1.1 and
-  // 2.5 / 1.1. 10 and 1000 records make 10 / 18 and 1000 / 1008 of that, on a logarithmic scale. The last one, which found
-  // nothing, is rarely used.
-  EXPECT_NEAR(guide.rate(BoundaryGuide::primary), std::pow(1 / 1.1, 10.0 / 18), 1e-12);
-  EXPECT_NEAR(guide.rate(BoundaryGuide::from_edge), std::pow(2.5 / 1.1, 1000.0 / 1008), 1e-12);
+  // Rates for the same total cost of 10: in proportion to the roots of second moment over cost. Guided moments are those
+  // of the records over their densities. 10 and 1000 records make 10 / 18 and about 1000 / 1008 of that, on a logarithmic
+  // scale. The last one, which found nothing, is rarely used.
+  double moment = 0;
+  for (const GuideRecord& r : records)
+    if (r.table == BoundaryGuide::from_edge) moment += r.square / warp.density(r.x);
+  EXPECT_LT(moment, 400);
+  const double of_primary = std::sqrt(40 / guide.warp(BoundaryGuide::primary).density(0.5)),
+               of_edge = std::sqrt(moment / 4), scale = 10 / (of_primary + 4 * of_edge);
+  EXPECT_NEAR(guide.rate(BoundaryGuide::primary), std::pow(of_primary * scale, 10.0 / 18), 1e-12);
+  EXPECT_NEAR(guide.rate(BoundaryGuide::from_edge), std::pow(of_edge * scale, 1000.0 / 1008), 1e-3);
   EXPECT_EQ(guide.rate(BoundaryGuide::from_camera), 0.125);
+}
+
+/// What one sample adds to one value of an image counts by the square of its sum, the rest by the sum of its squares; with
+/// several unknowns, on average.
+TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
+  const Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  const GateSet gates(GateShape::boxcar(1), {5.0, 7.0});  // one at 5, the other at 7
+  const DofLayout layout(scene);
+  LocalDifferential differential;
+  differential.vertices.push_back({scene.triangles[scene.shapes[scene.find_shape("block")].first_triangle].vertex[0], {0, 2, 1}, {}});
+  for (const int columns : {1, 2}) {
+    std::vector<Motion> motions{translate(scene, "block", {0, 1, 0})};
+    if (columns == 2) motions.push_back(translate(scene, "block", {0, 0, 3}));
+    const TangentBasis basis = make_basis(scene, motions);
+    GuideSink sink(gates, layout, basis);
+    const int samples = columns == 1 ? 1 : 4096;
+    for (int i = 0; i < samples; ++i) {
+      sink.bind(differential);
+      sink.add(3, Rgb(1, 0, 0), 5, kValueOnly);
+      sink.add(3, Rgb(-0.5, 0, 0), 5, kValueOnly);
+      sink.add(3, Rgb(0, 4, 0), 7, kValueOnly);
+      sink.add(4, Rgb(0, 0, -2), 5, kValueOnly);
+      sink.note(BoundaryGuide::primary, 0.5);
+    }
+    double mean = 0;
+    for (const GuideRecord& r : sink.records) mean += r.square / samples;
+    // Rates 2 and 3 for the two columns; a record is (0.25 + 16 + 4) (2 +- 3)^2, of standard deviation 12 (20.25).
+    EXPECT_NEAR(mean, 20.25 * (columns == 1 ? 4 : 13), columns == 1 ? 1e-12 : 4.5 * 12 * 20.25 / 64) << columns;
+  }
 }
 
 TEST(BoundaryGuide, LearnsNothingFromNothing) {
