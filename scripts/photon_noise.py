@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """What photon noise in the target does to reconstructions: error at the end against the number of photons.
 
-    scripts/photon_noise.py measure CSV [NAME...]   some minutes; rows of other experiments stay
+    scripts/photon_noise.py measure CSV [NAME...]   a quarter of an hour; rows of other experiments stay
     scripts/photon_noise.py plot CSV PNG
 
 For every experiment, count and draw of the noise: a run shortened as `SHORT` says, and its error at the end in % of the
@@ -19,15 +19,15 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+import plot
 from reproduction.measure import ROOT, program, summary
 
-PHOTONS = (100, 1000, 10_000, 100_000, 1_000_000, 0)
-DRAWS = 2
+PHOTONS = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 0)
+DRAWS = 3
 SHORT = {
-    "corridor": ("optimizer={method: adam, learning_rate: 0.02, iterations: 60, decay: {start: 30, half_life: 8}}",
-                 "samples={primal: 3072, interior: 1536, visibility: 192, path_length: 0}", "target.samples=131072"),
-    "sofa": ("optimizer={method: adam, learning_rate: 0.05, iterations: 100, decay: {start: 60, half_life: 20}}",
-             "samples={primal: 1024, interior: 1024, visibility: 64, path_length: 128}", "target.samples=65536"),
+    "corridor": ("optimizer={method: adam, learning_rate: 0.015, iterations: 80, decay: {start: 45, half_life: 12}}",
+                 "samples={primal: 4096, interior: 2048, visibility: 384, path_length: 0}", "target.samples=524288"),
+    "sofa": ("samples={primal: 256, interior: 256, visibility: 32, path_length: 64}", "target.samples=16384"),
 }
 COLUMNS = ("experiment", "photons", "draw", "error_percent")
 
@@ -54,7 +54,7 @@ def measure(file, names):
                         csv.writer(out, lineterminator="\n").writerows([COLUMNS, *sorted(rows, key=lambda r: r[0])])
 
 
-def plot(file, picture):
+def draw(file, picture):
     with open(file, encoding="ascii", newline="") as lines:
         rows = list(csv.DictReader(lines))
     figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
@@ -70,14 +70,14 @@ def plot(file, picture):
     axes.set_ylabel("error at the end, % of the initial one")
     axes.grid(True, which="both", lw=0.4, alpha=0.4)
     axes.legend(fontsize=8)
-    figure.savefig(picture, dpi=90)
+    plot.save(figure, pathlib.Path(picture))
 
 
 def main(arguments):
     if len(arguments) >= 2 and arguments[0] == "measure" and set(arguments[2:]) <= set(SHORT):
         measure(pathlib.Path(arguments[1]), arguments[2:] or list(SHORT))
     elif len(arguments) == 3 and arguments[0] == "plot":
-        plot(arguments[1], arguments[2])
+        draw(arguments[1], arguments[2])
     else:
         print(__doc__.strip(), file=sys.stderr)
         return 2
