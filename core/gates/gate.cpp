@@ -189,4 +189,10 @@ double GateSet::relative_width() const {
   return shape_.width() * size() / sum;
 }
 
+double GateSet::relative_coverage() const {
+  if (shape_.is_steady()) return relative_width();
+  const double apart = (sorted_.back() - sorted_.front()) / shape_.width();  // in widths of one gate
+  return relative_width() * std::min(1 + apart, static_cast<double>(size()));
+}
+
 }  // namespace isochron

@@ -174,6 +174,8 @@ class GateSet {
   }
   /// Standard deviation of the gates over the mean of their centres; steady: infinity.
   double relative_width() const;
+  /// The same of all gates together, which overlap or not: how much of the path lengths they take in.
+  double relative_coverage() const;
 
  private:
   static constexpr int kBlock = 8;

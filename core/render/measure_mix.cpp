@@ -5,8 +5,9 @@
 namespace isochron {
 namespace {
 
-/// Outside of these widths, relative to the path length, one technique is far better in every scene measured,
-/// and what standard sampling hardly ever hits looks too quiet in a trial.
+/// Outside of these, relative to the path length, one technique is far better in every scene measured: gates that together
+/// cover less than `from`, which standard sampling hits so rarely that it looks too quiet in a trial, and gates wider than
+/// `to`.
 struct Doubtful {
   double from, to;
 };
@@ -91,14 +92,14 @@ double variance_and_work(const Renderer& renderer, int block, int batches, int s
 
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
                         const TangentBasis* basis, const Stream& stream, Purpose purpose) {
-  const double width = gates.relative_width();
+  const double width = gates.relative_width(), coverage = gates.relative_coverage();
   if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   const Scene small = reduced(scene);
   const double samples = kPaths / (small.camera.width * small.camera.height);
   const int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
   const auto choose = [&](const Doubtful& widths, int block, const TangentBasis* moving, auto&& estimate) -> double {
-    if (width < widths.from) return 1;
+    if (coverage < widths.from) return 1;
     if (width > widths.to) return 0;
     double cost[3];
     for (int i = 0; i < 3; ++i) {

@@ -213,5 +213,25 @@ TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {
   EXPECT_EQ(one.interior, two.interior);
 }
 
+/// Each of the tree's gates takes in 0.2 % of the path length, but the fourteen of them 2.4 %: standard sampling uses every
+/// path that hits any, and its gradients have less variance for the same work (2.6 times on the chart of the README). The
+/// same gates one by one are left to connections.
+TEST(MeasureMix, LooksAtWhatAllGatesCover) {
+  Scene scene = load_scene(PROJECT_ROOT "/scenes/tree/scene.yaml");
+  const TangentBasis basis = make_basis(scene, {translate(scene, "lamp", {1, 0, 0})});
+  std::vector<double> centers;
+  for (int i = 0; i < 14; ++i) centers.push_back(6 + 0.15 * i);
+  const GateShape shape = GateShape::truncated_gaussian(0.015, 0.03);
+  const GateSet all(shape, centers), one(shape, {centers[0]});
+  EXPECT_NEAR(all.relative_coverage(), 14 * all.relative_width(), 1e-12);
+  // Two that overlap cover one standard deviation, 2 / sqrt(12), and what lies between their centres.
+  EXPECT_NEAR(GateSet(GateShape::boxcar(2), {5.4, 5.6}).relative_coverage(), (2 / std::sqrt(12.0) + 0.2) / 5.5, 1e-12);
+  const EstimatorOptions options{.max_bounces = 2};
+  for (const unsigned seed : {1, 2, 3}) {
+    EXPECT_EQ(measure_mix(scene, all, options, &basis, {seed, 0, 0}, Purpose::gradients).interior, 0) << seed;
+    EXPECT_EQ(measure_mix(scene, one, options, &basis, {seed, 0, 0}, Purpose::gradients).interior, 1) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace isochron::testing
