@@ -66,6 +66,7 @@ def draw(file, picture):
         axes.loglog(counts, middle, "-", color=color, label=f"{name}, median")
         if clean := [e for p, e in points if not p]:
             axes.axhline(statistics.median(clean), color=color, ls=":", lw=1, label=f"{name}, no noise")
+    axes.set_title("Reconstructions from counted photons")
     axes.set_xlabel("photons per pixel and colour in the brightest gate")
     axes.set_ylabel("error at the end, % of the initial one")
     axes.grid(True, which="both", lw=0.4, alpha=0.4)
