@@ -30,7 +30,7 @@ EXPERIMENTS = {
     "height_field": (512, 8),
     "height_field_steady": (512, 8),
     "sofa": (32768, 6, "shape[8]"),
-    "tree": (1024, 16),
+    "tree": (16384, 16),
     "validation/figure8_boxcar": (4096, 12),
     "validation/figure8_gaussian": (4096, 12),
     "validation/figure8_truncated_gaussian": (4096, 12),

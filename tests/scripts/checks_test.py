@@ -25,7 +25,7 @@ QUICK = {
     "figure1": (2048, 16),
     "height_field": (512, 8),
     "height_field_steady": (512, 8),
-    "tree": (192, 16),
+    "tree": (8192, 16),
 }
 
 
