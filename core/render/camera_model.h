@@ -41,8 +41,8 @@ class CameraModel {
   bool misses_image(const Vec3& a, const Vec3& b) const {
     const Vec3 from_a = a - position, from_b = b - position;
     const double across = 0.5 * width * pixel_size_, down = 0.5 * height * pixel_size_;
-    for (const Vec3& outwards : {-forward, right_ - forward * across, -right_ - forward * across,
-                                 up_ - forward * down, -up_ - forward * down})
+    for (const Vec3& outwards :
+         {-forward, right_ - forward * across, -right_ - forward * across, up_ - forward * down, -up_ - forward * down})
       if (dot(from_a, outwards) > 0 && dot(from_b, outwards) > 0) return true;
     return false;
   }

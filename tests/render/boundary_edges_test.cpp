@@ -129,7 +129,8 @@ TEST(BoundaryEdges, OnlyThoseThatTheCameraCanSee) {
     const TangentBasis basis = make_basis(scene, {translate(scene, "cube", {0, 1, 0})});
     const PreparedScene prepared(scene, &basis);
     const BoundaryEdges edges(prepared);
-    return edges.has_primary() ? tally(20000, [&](double u) { return edges.sample_primary(u); }) : std::map<Pair, int>();
+    return edges.has_primary() ? tally(20000, [&](double u) { return edges.sample_primary(u); })
+                               : std::map<Pair, int>();
   };
   Scene corner = cube_scene();
   corner.camera.position = {5, 5, 5};
@@ -149,8 +150,7 @@ TEST(BoundaryEdges, OnlyThoseThatTheCameraCanSee) {
   ahead.camera.fov = 20;
   const auto left = seen(ahead);
   ASSERT_EQ(left.size(), 1u);
-  for (const int v : {left.begin()->first.first, left.begin()->first.second})
-    EXPECT_EQ(ahead.positions[v].x, -1) << v;
+  for (const int v : {left.begin()->first.first, left.begin()->first.second}) EXPECT_EQ(ahead.positions[v].x, -1) << v;
 }
 
 /// Inside the outline an edge counts by the angle between its faces, on it by its length in the image alone.
@@ -160,8 +160,10 @@ TEST(BoundaryEdges, PrimaryOnesByLengthInTheImageAndAngle) {
   scene.camera.position = {0, 1000, 0};  // far: lengths in the image are those seen from above
   scene.camera.up = {0, 0, 1};
   scene.camera.fov = 1;
-  add_shape(scene, "roof", Mesh{{{-1, 0, -1}, {-1, 0, 1}, {0, rise, -1}, {0, rise, 1}, {1, 0, -1}, {1, 0, 1}},
-                                {{0, 1, 3}, {0, 3, 2}, {2, 3, 5}, {2, 5, 4}}}, diffuse(Rgb(0.5)));
+  add_shape(scene, "roof",
+            Mesh{{{-1, 0, -1}, {-1, 0, 1}, {0, rise, -1}, {0, rise, 1}, {1, 0, -1}, {1, 0, 1}},
+                 {{0, 1, 3}, {0, 3, 2}, {2, 3, 5}, {2, 5, 4}}},
+            diffuse(Rgb(0.5)));
   const TangentBasis basis = make_basis(scene, {translate(scene, "roof", {0, 1, 0})});
   const PreparedScene prepared(scene, &basis);
   const BoundaryEdges edges(prepared);

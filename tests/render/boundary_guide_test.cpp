@@ -114,7 +114,8 @@ TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
   const GateSet gates(GateShape::boxcar(1), {5.0, 7.0});  // one at 5, the other at 7
   const DofLayout layout(scene);
   LocalDifferential differential;
-  differential.vertices.push_back({scene.triangles[scene.shapes[scene.find_shape("block")].first_triangle].vertex[0], {0, 2, 1}, {}});
+  differential.vertices.push_back(
+      {scene.triangles[scene.shapes[scene.find_shape("block")].first_triangle].vertex[0], {0, 2, 1}, {}});
   for (const int columns : {1, 2}) {
     std::vector<Motion> motions{translate(scene, "block", {0, 1, 0})};
     if (columns == 2) motions.push_back(translate(scene, "block", {0, 0, 3}));

@@ -118,7 +118,8 @@ void measure(const std::string& kind, const std::string& folder, int effort, Tab
   const std::vector<double> theta = problem.parameters().initial();
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = problem.parameters().tangent(theta);
-  const Renderer renderer(scene, problem.gates(), problem.estimator(effort * samples.visibility, Purpose::images), &basis);
+  const Renderer renderer(scene, problem.gates(), problem.estimator(effort * samples.visibility, Purpose::images),
+                          &basis);
   EstimatorOptions plain = problem.experiment().estimator;
   plain.numbers = Numbers::independent;
   const Renderer plain_renderer(scene, problem.gates(), plain);
@@ -218,7 +219,8 @@ void measure(const std::string& kind, const std::string& folder, int effort, Tab
     const std::string at = label;
     table.add(kind, at + "cost of ours over common; mean variance", cost / other.difference.cost());
     table.add(kind, at + "cost of ours over common; median pixel", median(common), "<= 0.2");
-    table.add(kind, at + "cost of ours over independent; mean variance", cost / (images.batches.mean_variance() * of_images));
+    table.add(kind, at + "cost of ours over independent; mean variance",
+              cost / (images.batches.mean_variance() * of_images));
     table.add(kind, at + "cost of ours over independent; median pixel", median(independent), "<= 0.01");
     table.add(kind, at + "root mean square bias over peak", std::copysign(std::sqrt(std::abs(bias)), bias) / peak);
   }

@@ -155,12 +155,14 @@ void measure_bare(const std::string& figure, const Scene& first, const Scene& se
     std::vector<RecordedRay> rays;
     explicit Side(const Scene& scene)
         : prepared(scene, nullptr), rays(record_rays(prepared, wide_gates(), 3, kSamples.count())) {}
-    double trace() const { trace_bare(prepared.caster.embree_scene(), rays);
-      return static_cast<double>(rays.size()); }
+    double trace() const {
+      trace_bare(prepared.caster.embree_scene(), rays);
+      return static_cast<double>(rays.size());
+    }
   };
   const Side a(first), b(second);
-  const Pair pair =
-      measure_pair(rounds, CLOCK_THREAD_CPUTIME_ID, [&] { return a.trace(); }, [&] { return b.trace(); });
+  const Pair pair = measure_pair(
+      rounds, CLOCK_THREAD_CPUTIME_ID, [&] { return a.trace(); }, [&] { return b.trace(); });
   report.add(figure, "Embree alone", pair.ratio, "");
 }
 
