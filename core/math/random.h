@@ -40,12 +40,16 @@ class Rng {
   /// The numbers of another sample of the same stream and index, without folding the key again.
   Rng with_sample(std::uint32_t sample) const { return Rng(key_, {0, counter_[1], sample, counter_[3]}); }
 
-  /// What scrambles the points of one set of samples of this stream and index; `set` tells sets apart.
-  std::uint64_t scramble_key(std::uint32_t set) const {
-    // No sample has the largest number: no other use of these counters.
-    const auto bits = philox({set, counter_[1], ~std::uint32_t{0}, counter_[3]}, key_);
+  /// The same stream and index with other numbers; `set` tells sets of samples apart.
+  Rng in_set(std::uint32_t set) const { return Rng({key_[0] + set, key_[1]}, counter_); }
+
+  /// What scrambles the points of this stream, index and set.
+  std::uint64_t scramble_key() const {
+    const auto bits = of_no_sample();
     return std::uint64_t{bits[0]} << 32 | bits[1];
   }
+  /// Uniform in (0, 1), one for all samples of this stream, index and set.
+  double shift() const { return (of_no_sample()[2] + 0.5) * 0x1p-32; }
   /// The numbers of another sample as above, the first of them, as many as a point has, from point `point` of the
   /// scrambled Sobol sequence of the key. Each sample by itself is as random as before; points 0, 1, ... n - 1 together
   /// cover their cube evenly, best where n is a power of two.
@@ -71,6 +75,10 @@ class Rng {
  private:
   Rng(const std::array<std::uint32_t, 2>& key, const std::array<std::uint32_t, 4>& counter)
       : key_(key), counter_(counter) {}
+  /// No sample has the largest number: no other use of these counters.
+  std::array<std::uint32_t, 4> of_no_sample() const {
+    return philox({0, counter_[1], ~std::uint32_t{0}, counter_[3]}, key_);
+  }
 
   std::array<std::uint32_t, 2> key_;
   std::array<std::uint32_t, 4> counter_;

@@ -11,6 +11,7 @@
 #include "core/render/ellipsoidal.h"
 #include "core/render/ledger.h"
 #include "core/render/primary_boundary.h"
+#include "core/render/sample_points.h"
 #include "core/render/secondary_boundary.h"
 
 namespace isochron {
@@ -115,21 +116,12 @@ struct Renderer::Impl {
     return GatedImage(scene.camera.width, scene.camera.height, gates.size(), scene.scene.grey ? 1 : 3);
   }
 
-  /// Runs sample(pixel, rng) for the pixels of one strand and all samples of the range, in a fixed order.
+  /// Runs f(pixel) for the pixels of one strand, in a fixed order.
   template <class F>
-  void for_each_sample(int strand, int strands, const Stream& stream, SampleRange range, F&& sample) const {
+  void for_each_pixel(int strand, int strands, F&& f) const {
     const int pixels = scene.camera.pixels();
     for (int block = strand * kPixelsPerBlock; block < pixels; block += strands * kPixelsPerBlock)
-      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) {
-        const Rng of_pixel(stream, static_cast<std::uint64_t>(pixel), 0);
-        const bool together = options.numbers == Numbers::low_discrepancy;
-        const std::uint64_t key = together ? of_pixel.scramble_key(static_cast<std::uint32_t>(range.begin)) : 0;
-        for (int s = range.begin; s < range.end; ++s) {
-          const auto number = static_cast<std::uint32_t>(s), point = static_cast<std::uint32_t>(s - range.begin);
-          Rng rng = together ? of_pixel.with_point(number, key, point) : of_pixel.with_sample(number);
-          sample(pixel, rng);
-        }
-      }
+      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) f(pixel);
   }
 
   template <class Sink>
@@ -138,9 +130,6 @@ struct Renderer::Impl {
     arcs += worker.arcs;
   }
 
-  /// Number of samples where they are to be `rate` on average.
-  static int sample_count(double rate, Rng& rng) { return rate == 1 ? 1 : static_cast<int>(rate + rng.uniform()); }
-
   /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling.
   template <class Sink>
   void run_paths(Worker<Sink>& worker, double share, const GatePass& pass, int strand, int strands,
@@ -148,17 +137,24 @@ struct Renderer::Impl {
     const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
     worker.ellipsoidal_share = share;
     worker.pair_gain = pair_gain;
-    EllipsoidalConnections connections(worker, pass);
-    const auto by_connections = [share](Rng& rng) { return share == 1 || (share > 0 && rng.uniform() < share); };
-    for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
-      if (by_connections(rng)) connections.sample_from_camera(splat_scale, rng);
+    GatePass lengths = pass, pairs = pass;
+    lengths.pairs = false;
+    pairs.value = false;
+    EllipsoidalConnections connections(worker, pass), camera_lengths(worker, lengths), camera_pairs(worker, pairs);
+    const SamplePoints points(stream, range, options.numbers);
+    const PointSet of_lengths = points.of_image(Technique::camera_lengths);
+    const PointSet of_pairs = points.of_image(Technique::camera_pairs);
+    for_each_pixel(strand, strands, [&](int pixel) {
+      if (pass.value)
+        points.in_image(of_lengths, pixel, share,
+                        [&](Rng& rng) { camera_lengths.sample_from_camera(splat_scale, rng); });
+      if (pass.pairs)
+        points.in_image(of_pairs, pixel, share, [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale, rng); });
       const double rate = worker.pick.rate(pixel);
-      for (int i = sample_count(rate, rng); i > 0; --i) {
-        if (by_connections(rng))
-          connections.sample_walk(pixel, scale / rate, rng);
-        else
-          sample_standard(worker, pixel, scale / rate, pass.pairs, rng);
-      }
+      points.in_pixel(Technique::walk, pixel, rate * share,
+                      [&](Rng& rng) { connections.sample_walk(pixel, scale / rate, rng); });
+      points.in_pixel(Technique::standard, pixel, rate * (1 - share),
+                      [&](Rng& rng) { sample_standard(worker, pixel, scale / rate, pass.pairs, rng); });
     });
     count(worker);
   }
@@ -233,18 +229,23 @@ struct Renderer::Impl {
       const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
       PrimaryBoundary primary(worker, edges, guide, mix.interior == 1);
       SecondaryBoundary secondary(worker, edges, guide, mix.interior == 1);
-      const auto run = [&](double rate, Rng& rng, auto&& sample) {
-        for (int i = sample_count(rate, rng); i > 0; --i) sample(1 / rate);
-      };
-      for_each_sample(strand, strands, stream, range, [&](int pixel, Rng& rng) {
-        run(guide.rate(BoundaryGuide::primary), rng, [&](double share) { primary.sample(share * splat_scale, rng); });
+      const double edges_rate = guide.rate(BoundaryGuide::primary),
+                   borders_rate = guide.rate(BoundaryGuide::pixel_border),
+                   from_edge_rate = guide.rate(BoundaryGuide::from_edge);
+      const SamplePoints points(stream, range, options.numbers);
+      const PointSet of_edges = points.of_image(Technique::primary_edge);
+      const PointSet of_borders = points.of_image(Technique::pixel_border);
+      const PointSet of_segments = points.of_image(Technique::from_edge);
+      for_each_pixel(strand, strands, [&](int pixel) {
+        points.in_image(of_edges, pixel, edges_rate, [&](Rng& rng) { primary.sample(splat_scale / edges_rate, rng); });
         if (scene.camera_flow.possible())
-          run(guide.rate(BoundaryGuide::pixel_border), rng,
-              [&](double share) { primary.sample_pixel_border(share * splat_scale, rng); });
-        run(guide.rate(BoundaryGuide::from_edge), rng,
-            [&](double share) { secondary.sample_from_edge(share * splat_scale, rng); });
-        run(guide.rate(BoundaryGuide::from_camera) * worker.pick.rate(pixel), rng,
-            [&](double share) { secondary.sample_from_camera(pixel, share * scale, rng); });
+          points.in_image(of_borders, pixel, borders_rate,
+                          [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
+        points.in_image(of_segments, pixel, from_edge_rate,
+                        [&](Rng& rng) { secondary.sample_from_edge(splat_scale / from_edge_rate, rng); });
+        const double rate = guide.rate(BoundaryGuide::from_camera) * worker.pick.rate(pixel);
+        points.in_pixel(Technique::from_camera, pixel, rate,
+                        [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / rate, rng); });
       });
       count(worker);
     }

@@ -18,8 +18,9 @@ enum class Sampling { automatic, standard, ellipsoidal };
 /// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
 enum class ArcPick { contribution, uniform };
 
-/// The first numbers of each sample: together a pixel's samples cover evenly what they are taken from (see Rng), or every
-/// number is independent of all others.
+/// The first numbers of each sample: together the samples of a technique cover evenly what they are taken from, in each
+/// pixel or, where they may land on any, over the whole image (see SamplePoints); or every number is independent of all
+/// others.
 enum class Numbers { low_discrepancy, independent };
 
 /// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
@@ -56,9 +57,9 @@ enum class Term { interior, visibility, path_length };
 inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_length};
 const char* name(Term term);
 
-/// Samples [begin, end) of each pixel. Disjoint ranges of one stream are independent. Low-discrepancy samples belong
-/// together within a range, others are scrambled anew: [0, 8) is not the mean of [0, 4) and [4, 8), and varies less.
-/// Ranges with the same begin are not independent: the longer one has the samples of the shorter one.
+/// Samples [begin, end) of each pixel. Ranges of one stream that begin at different numbers are independent, those that
+/// begin at the same are not. The samples of a range belong together: [0, 8) is not the mean of [0, 4) and [4, 8), and
+/// with low-discrepancy numbers varies less.
 struct SampleRange {
   int begin = 0, end = 0;
   int count() const { return end - begin; }

@@ -36,7 +36,7 @@ Point scrambled(std::uint64_t key, std::uint32_t index) {
 }
 
 std::uint64_t random_key(std::uint32_t k) {
-  return Rng({11, 0, 0}, k, 0).scramble_key(0);
+  return Rng({11, 0, 0}, k, 0).scramble_key();
 }
 
 /// Whether the points hold one in each of the boxes that bits_x halvings of one axis and bits_y of the other make.
@@ -156,9 +156,9 @@ TEST(Sobol, FlipsOfTheEighthsAreIndependent) {
 }
 
 TEST(Sobol, RngTakesPointsFirstAndIndependentNumbersAfter) {
-  const Rng base({7, 3, 2}, 123, 0);
-  const std::uint64_t key = base.scramble_key(4);
-  EXPECT_NE(key, base.scramble_key(5));
+  const Rng base = Rng({7, 3, 2}, 123, 0).in_set(4);
+  const std::uint64_t key = base.scramble_key();
+  EXPECT_NE(key, Rng({7, 3, 2}, 123, 0).in_set(5).scramble_key());
   Rng with = base.with_point(9, key, 5), without = base.with_sample(9);
   const Point point = scrambled(key, 5);
   for (int i = 0; i < 40; ++i) {

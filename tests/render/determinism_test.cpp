@@ -24,11 +24,8 @@ class Determinism : public ::testing::TestWithParam<Sampling> {
   ~Determinism() override { set_thread_count(0); }
 
   /// Guided, so that what each renderer learns is tested, too.
-  Renderer make_renderer(Numbers numbers = Numbers::low_discrepancy) const {
-    return {scene_,
-            gates_,
-            {.max_bounces = 3, .sampling = GetParam(), .numbers = numbers, .guiding_samples = 0.3},
-            &basis_};
+  Renderer make_renderer() const {
+    return {scene_, gates_, {.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 0.3}, &basis_};
   }
 
   Results run(const Stream& stream, SampleRange range) const { return run(renderer_, stream, range); }
@@ -100,18 +97,6 @@ TEST_P(Determinism, EverythingInTheKeyMatters) {
       EXPECT_NE(r.gradients[term], base.gradients[term]);
     }
   }
-}
-
-// Independent samples do not know of their range.
-TEST_P(Determinism, RangesAverage) {
-  const Renderer renderer = make_renderer(Numbers::independent);
-  const std::vector<double> whole = flat(run(renderer, {3, 1, 4}, {2, 18})),
-                            first = flat(run(renderer, {3, 1, 4}, {2, 10})),
-                            second = flat(run(renderer, {3, 1, 4}, {10, 18}));
-  double largest = 0;
-  for (double x : whole) largest = std::max(largest, std::abs(x));
-  for (std::size_t i = 0; i < whole.size(); ++i)
-    ASSERT_NEAR(whole[i], 0.5 * (first[i] + second[i]), 1e-12 * largest) << i;
 }
 
 TEST_P(Determinism, GradientsAreAddedToWhatIsThere) {

@@ -1,0 +1,102 @@
+// Which samples a technique takes, where its points lie together, and what that gains.
+#include "core/render/sample_points.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "scene_building.h"
+#include "support.h"
+
+namespace isochron::testing {
+namespace {
+
+constexpr Stream kStream{5, 2, 1};
+
+/// First numbers of the samples that come with pixels [begin, end).
+std::vector<double> numbers_of(const SamplePoints& points, Technique technique, int begin, int end, double rate) {
+  const PointSet set = points.of_image(technique);
+  std::vector<double> numbers;
+  for (int pixel = begin; pixel < end; ++pixel)
+    points.in_image(set, pixel, rate, [&](Rng& rng) { numbers.push_back(rng.uniform()); });
+  return numbers;
+}
+
+TEST(SamplePoints, PixelsOfAnImageShareOneSet) {
+  // 512 samples, however many pixels they come with: one in each of as many intervals.
+  for (const double rate : {1.0, 0.5, 0.125}) {
+    const int pixels = static_cast<int>(128 / rate);
+    std::set<int> intervals;
+    for (const double x :
+         numbers_of({kStream, {3, 7}, Numbers::low_discrepancy}, Technique::from_edge, 0, pixels, rate))
+      intervals.insert(static_cast<int>(x * 512));
+    EXPECT_EQ(intervals.size(), 512u) << rate;
+  }
+}
+
+TEST(SamplePoints, EverySampleHasNumbersOfItsOwn) {
+  for (const Numbers numbers : {Numbers::low_discrepancy, Numbers::independent}) {
+    std::set<double> all;
+    std::size_t count = 0;
+    const auto add = [&](const std::vector<double>& some) {
+      all.insert(some.begin(), some.end()), count += some.size();
+    };
+    for (const SampleRange range : {SampleRange{0, 4}, SampleRange{4, 8}})
+      for (const Technique technique : {Technique::primary_edge, Technique::from_edge}) {
+        const SamplePoints points(kStream, range, numbers);
+        add(numbers_of(points, technique, 0, 20, 1.7));
+        for (int pixel = 0; pixel < 20; ++pixel)
+          points.in_pixel(technique, pixel, 1.7, [&](Rng& rng) { add({rng.uniform()}); });
+      }
+    EXPECT_EQ(all.size(), count);  // 1100 numbers of 32 bits: two are equal by chance in 1e-4 of such sets
+    EXPECT_NEAR(static_cast<double>(count), 2 * 2 * 2 * 20 * 4 * 1.7, 90);
+  }
+}
+
+TEST(SamplePoints, FractionalRatesHoldOnAverage) {
+  // 2.3 samples on average, by a shift that is uniform over the sets: 2 or 3, with a deviation of 0.46, so over 4000 sets
+  // within 0.033 of the mean at 4.5 deviations (false alarm 7e-6 each).
+  constexpr int kSets = 4000;
+  double in_pixel = 0, in_image = 0;
+  for (int i = 0; i < kSets; ++i) {
+    const SamplePoints points({1, static_cast<std::uint32_t>(i), 0}, {0, 1}, Numbers::low_discrepancy);
+    points.in_pixel(Technique::walk, 7, 2.3, [&](Rng&) { ++in_pixel; });
+    in_image += static_cast<double>(numbers_of(points, Technique::walk, 5, 6, 2.3).size());
+  }
+  EXPECT_NEAR(in_pixel / kSets, 2.3, 0.033);
+  EXPECT_NEAR(in_image / kSets, 2.3, 0.033);
+}
+
+// A plate under a lamp rises; under a narrow gate connections of the camera find the light, boundary segments the lamp's
+// rim. Variance over 64 sets of the sum over the image of the derivative: each is known to 18 %. It falls 4.1 times for the
+// interior term, 38 times for the visibility term.
+TEST(SamplePoints, SumsOverTheImageVaryLess) {
+  Scene scene;
+  scene.camera = {{0, 1.5, 2}, {0, 0, 0}, {0, 1, 0}, 50, 16, 16};
+  add_shape(scene, "plate", quad({-0.5, 0, 0.5}, {0.5, 0, 0.5}, {0.5, 0, -0.5}, {-0.5, 0, -0.5}),
+            conductor(Rgb(0.8), 0.4));
+  add_shape(scene, "lamp", quad({-0.3, 2, -0.3}, {0.3, 2, -0.3}, {0.3, 2, 0.3}, {-0.3, 2, 0.3}), diffuse(Rgb(0.0)),
+            Rgb(10.0));
+  const TangentBasis basis = make_basis(scene, {translate(scene, "plate", {0, 1, 0})});
+  const GateSet gates(GateShape::gaussian(0.02), {4.4});
+  const auto variance = [&](Term term, Numbers numbers) {
+    const Renderer renderer(scene, gates, {.max_bounces = 1, .sampling = Sampling::ellipsoidal, .numbers = numbers},
+                            &basis);
+    double sum = 0, squares = 0;
+    constexpr int kSets = 64;
+    for (std::uint32_t i = 0; i < kSets; ++i) {
+      double total = 0;
+      for (const double x : renderer.derive(term, {1, i, 0}, {0, 4})[0].data) total += x;
+      sum += total, squares += total * total;
+    }
+    return squares / kSets - sum * sum / (kSets * kSets);
+  };
+  const auto gain = [&](Term term) {
+    return variance(term, Numbers::independent) / variance(term, Numbers::low_discrepancy);
+  };
+  EXPECT_GT(gain(Term::interior), 2);
+  EXPECT_GT(gain(Term::visibility), 15);
+}
+
+}  // namespace
+}  // namespace isochron::testing
