@@ -1,5 +1,7 @@
 #include "core/render/boundary_edges.h"
 
+#include "core/render/piercings.h"
+
 namespace isochron {
 namespace {
 
@@ -20,7 +22,8 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, bool
   if (scene.camera.misses_image(edge.origin, edge.end)) return 0;
   const Vec3 middle = (a + b) * 0.5;
   const double r = isochron::length(middle);
-  if (edge.faces() == 2) {
+  bool within_outline = edge.pierced;
+  if (edge.faces() == 2 && !edge.pierced) {
     bool seen[2], dark = true;
     for (int i = 0; i < 2; ++i) {
       const Material& material = scene.material_of(edge.face[i]);
@@ -28,12 +31,10 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, bool
       dark &= !seen[i] && !material.two_sided && !scene.is_dielectric(edge.face[i]);
     }
     if (dark) return 0;
-    if (seen[0] != seen[1]) wedge = false;
-  } else {
-    wedge = false;
+    within_outline = seen[0] == seen[1];
   }
   const double in_image = isochron::length(cross(a, b)) / (r * (r * r + edge.length * edge.length));
-  return in_image * (wedge ? std::min(1.0, edge.wedge()) : 1.0);
+  return in_image * (wedge && within_outline ? std::min(1.0, edge.wedge()) : 1.0);
 }
 
 }  // namespace
@@ -60,8 +61,54 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
     b.azimuths = wedge ? b.wedge() : kPi;
     secondary_.add(b, b.length * b.azimuths, moves);
   }
+  if (scene.moving.geometry) add_piercings(scene, wedge);
   primary_.finish();
   secondary_.finish();
+}
+
+void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
+  for (const Piercing& p : find_piercings(scene.scene, scene.caster)) {
+    BoundaryEdge b;
+    b.pierced = true;
+    b.origin = p.end[0];
+    b.end = p.end[1];
+    b.length = isochron::length(b.end - b.origin);
+    b.tangent = (b.end - b.origin) / b.length;
+    bool moves = false;
+    for (int i = 0; i < 2; ++i) {
+      b.face[i] = p.triangle[i];
+      b.inward[i] = normalize(cross(scene.normal[b.face[i]], b.tangent));
+      for (int v : scene.scene.triangles[b.face[i]].vertex) moves |= scene.moving.vertex[v] != 0;
+    }
+    // The angle between the planes takes the place of the wedge.
+    const double angle =
+        std::atan2(isochron::length(cross(b.inward[0], b.inward[1])), std::abs(dot(b.inward[0], b.inward[1])));
+    b.opening = kPi - angle;
+    if (angle < kCoplanarAngle || !(moves || scene.camera_flow.possible())) continue;
+    if (const double weight = primary_weight(scene, b, wedge); weight > 0) primary_.add(b, weight, moves);
+  }
+}
+
+void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b,
+                                 LocalDifferential& out) {
+  const BoundaryEdge& edge = *point.edge;
+  if (!edge.pierced) {
+    const double share[2] = {1 - point.s, point.s};
+    for (int i = 0; i < 2; ++i)
+      if (scene.moving.vertex[edge.vertex[i]]) out.vertices.push_back({edge.vertex[i], n_b * share[i], {}});
+    return;
+  }
+  // The line stays in both planes: n_b = a n_0 + c n_1 moves by a n_0 . (velocity of face 0) + c n_1 . (velocity of face 1).
+  const Vec3 &n0 = scene.normal[edge.face[0]], &n1 = scene.normal[edge.face[1]];
+  const double cosine = dot(n0, n1), determinant = isochron::length(cross(n0, n1)) * isochron::length(cross(n0, n1));
+  const double of[2] = {dot(n_b, n0), dot(n_b, n1)};
+  for (int i = 0; i < 2; ++i) {
+    const Vec3 g = scene.normal[edge.face[i]] * ((of[i] - cosine * of[1 - i]) / determinant);
+    const SurfacePoint y = scene.point_in_plane(edge.face[i], point.y);
+    for (int k = 0; k < 3; ++k)
+      if (const int v = scene.scene.triangles[edge.face[i]].vertex[k]; scene.moving.vertex[v])
+        out.vertices.push_back({v, g * y.b[k], {}});
+  }
 }
 
 void BoundaryEdges::Choice::add(const BoundaryEdge& edge, double weight, bool moves) {

@@ -1,12 +1,14 @@
 // Mesh edges as visibility boundaries: their geometry and how they are picked (theory section 5).
 #pragma once
+#include "core/render/path_differential.h"
 #include "core/render/prepared_scene.h"
 
 namespace isochron {
 
-/// An edge at the current parameters.
+/// An edge at the current parameters, or the line along which two triangles pass through each other.
 struct BoundaryEdge {
-  int vertex[2];
+  bool pierced = false;  ///< such a line: both faces go on beyond it, and it has no vertices
+  int vertex[2] = {-1, -1};
   int face[2];  ///< face[1] is -1 on an open border
   Vec3 origin, end;
   Vec3 tangent;  ///< unit, from origin to end
@@ -34,7 +36,7 @@ class BoundaryEdges {
     /// The number that gives this point.
     double x() const { return begin + s * share; }
   };
-  /// Edges that the camera may see moving, by their length in the image and, inside of an outline, the angle between their
+  /// Edges and lines of piercing triangles that the camera may see moving, by their length in the image and, inside of an outline, the angle between their
   /// faces; the same of static ones where points beside them may follow others, in equal shares. `u` in (0, 1).
   bool has_primary() const { return !primary_.distribution.empty(); }
   Sample sample_primary(double u) const { return primary_.sample(u); }
@@ -46,6 +48,9 @@ class BoundaryEdges {
   /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
   /// both (no boundary) or the plane holds a face.
   static int occluder_side(const BoundaryEdge& edge, const Vec3& n_b);
+
+  /// Adds n_b . (velocity of the edge at y), n_b being normal to the edge.
+  static void add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b, LocalDifferential& out);
 
  private:
   /// Edges to pick from by weight; where there are both, moving and static ones get equal shares.
@@ -59,6 +64,7 @@ class BoundaryEdges {
     Sample sample(double u) const;
   };
   Choice primary_, secondary_;
+  void add_piercings(const PreparedScene& scene, bool wedge);
 };
 
 }  // namespace isochron

@@ -20,11 +20,13 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
   double front_slope = 0;
   Vec3 into_front;
   for (int i = 0; i < edge.faces(); ++i) {
-    const double across = dot(edge.inward[i], side);
+    const double sign = edge.pierced && dot(edge.inward[i], side) < 0 ? -1 : 1;
+    const Vec3 inward = edge.inward[i] * sign;
+    const double across = dot(inward, side);
     // A face seen edge-on takes no part of the image: what lies behind it is seen beside the edge.
     if (!(across > 0) || std::abs(dot(scene.normal[edge.face[i]], d)) <= kCoplanarAngle) continue;
-    const double slope = dot(edge.inward[i], d) / across;  // depth gained per distance beside the edge
-    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope, into_front = edge.inward[i];
+    const double slope = dot(inward, d) / across;  // depth gained per distance beside the edge
+    if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope, into_front = inward;
   }
   // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the
   // edge start within a surface, or behind one.
@@ -69,7 +71,10 @@ class PrimaryBoundary {
     if (!(sine > 0)) return;
     const Vec3 n_b = normal / sine;
 
-    const bool moves = scene_.moving.vertex[edge->vertex[0]] || scene_.moving.vertex[edge->vertex[1]];
+    LocalDifferential& differential = worker_.differential;
+    differential.clear();
+    BoundaryEdges::add_velocity(scene_, point, n_b, differential);
+    const bool moves = !differential.empty();
     if (!moves && !scene_.camera_flow.possible_along(d)) return;
 
     // Off the faces, to the camera's side of each, so that the edge does not hide itself.
@@ -79,11 +84,6 @@ class PrimaryBoundary {
     ++worker_.rays;
     if (scene_.caster.occluded(scene_.camera.position, y + off * scene_.caster.offset())) return;
 
-    LocalDifferential& differential = worker_.differential;
-    differential.clear();
-    const double share[2] = {1 - point.s, point.s};
-    for (int i = 0; i < 2; ++i)
-      if (scene_.moving.vertex[edge->vertex[i]]) differential.vertices.push_back({edge->vertex[i], n_b * share[i], {}});
     worker_.sink.bind(differential);
 
     const double factor =

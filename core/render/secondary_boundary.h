@@ -164,9 +164,7 @@ class SecondaryBoundary {
     const Vec3 b = g.n_b * g.side;
     LocalDifferential& common = camera_flow_;
     common.clear();
-    const double share[2] = {1 - g.y.s, g.y.s};
-    for (int i = 0; i < 2; ++i)
-      if (scene_.moving.vertex[g.y.edge->vertex[i]]) common.vertices.push_back({g.y.edge->vertex[i], b * share[i], {}});
+    BoundaryEdges::add_velocity(scene_, g.y, b, common);
     const double whole = g.r_s + g.r_d;
     add_material_flow(scene_, g.light, b * (-g.r_d / whole), common);
     material_flow_ = common;

@@ -1,0 +1,78 @@
+#include "core/render/piercings.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace isochron {
+namespace {
+
+/// An edge of the first triangle, or of the second, goes through the other here.
+struct Hole {
+  std::array<int, 2> triangle;
+  Vec3 point;
+};
+
+bool has_vertex(const Scene& scene, int triangle, int vertex) {
+  const auto& v = scene.triangles[triangle].vertex;
+  return v[0] == vertex || v[1] == vertex || v[2] == vertex;
+}
+
+/// Goes along the edge from triangle to triangle.
+void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, std::vector<Hole>& holes) {
+  const Vec3 from = scene.positions[edge.vertex[0]], to = scene.positions[edge.vertex[1]];
+  const double whole = length(to - from);
+  if (!(whole > 2 * caster.offset())) return;
+  const Vec3 along = (to - from) / whole;
+  double passed = 0;
+  while (true) {
+    const Vec3 start = from + along * (passed + caster.offset());
+    const int t = caster.first_triangle(start, along);
+    if (t < 0) return;
+    const auto& v = scene.triangles[t].vertex;
+    const Vec3& corner = scene.positions[v[0]];
+    const Vec3 normal = cross(scene.positions[v[1]] - corner, scene.positions[v[2]] - corner);
+    // Rays close to a plane may be said to meet it anywhere: no crossing.
+    const double distance = dot(normal, corner - from) / dot(normal, along);
+    if (!(distance < whole - caster.offset())) return;
+    if (distance > passed + caster.offset() && !has_vertex(scene, t, edge.vertex[0]) &&
+        !has_vertex(scene, t, edge.vertex[1]))
+      for (const int face : edge.face)
+        if (face >= 0) holes.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance});
+    passed = std::max(distance, passed + caster.offset());
+  }
+}
+
+}  // namespace
+
+std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster) {
+  constexpr std::size_t kChunk = 1024;
+  const std::size_t edges = scene.edges.size(), chunks = (edges + kChunk - 1) / kChunk;
+  std::vector<std::vector<Hole>> found(chunks);
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
+    for (std::size_t e = chunk * kChunk; e < std::min(edges, (chunk + 1) * kChunk); ++e)
+      find_holes(scene, caster, scene.edges[e], found[chunk]);
+  });
+  std::vector<Hole> holes;
+  for (const auto& some : found) holes.insert(holes.end(), some.begin(), some.end());
+  std::stable_sort(holes.begin(), holes.end(), [](const Hole& a, const Hole& b) { return a.triangle < b.triangle; });
+
+  std::vector<Piercing> piercings;
+  for (std::size_t begin = 0, end; begin < holes.size(); begin = end) {
+    for (end = begin; end < holes.size() && holes[end].triangle == holes[begin].triangle;) ++end;
+    const auto& [a, b] = holes[begin].triangle;
+    Piercing piercing{holes[begin].triangle, {holes[begin].point, holes[begin].point}};
+    // The farthest from the first: through a vertex or an edge the same point is found several times.
+    const auto consider = [&](const Vec3& p) {
+      if (length(p - piercing.end[0]) > length(piercing.end[1] - piercing.end[0])) piercing.end[1] = p;
+    };
+    for (std::size_t i = begin + 1; i < end; ++i) consider(holes[i].point);
+    for (const int v : scene.triangles[a].vertex)
+      if (has_vertex(scene, b, v)) consider(scene.positions[v]);
+    if (length(piercing.end[1] - piercing.end[0]) > caster.offset()) piercings.push_back(piercing);
+  }
+  return piercings;
+}
+
+}  // namespace isochron

@@ -1,0 +1,138 @@
+// Runs, from their start over kills and resumes to their end.
+#include "core/image/image.h"
+#include "tests/app/program.h"
+
+namespace isochron {
+namespace {
+
+TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
+  const Result lit = run(run_command("a"));
+  ASSERT_EQ(lit.status, 0);
+  EXPECT_EQ(lit.errors, "");
+  for (const char* name : {"experiment.yaml", "log.csv", "checkpoint.yaml", "checkpoint.previous.yaml", "target.exr",
+                           "initial.exr", "final.exr", "summary.yaml"})
+    EXPECT_TRUE(folder_.has(std::string("a/") + name)) << name;
+  EXPECT_EQ(rows("a"), 7);
+  const std::string first = log("a");
+  const Result again = run(run_command("a", {"--seed", "4"}));
+  EXPECT_EQ(again.status, 0);
+  EXPECT_NE(again.errors.find("a.1"), std::string::npos) << again.errors;
+  EXPECT_EQ(log("a.1"), first);
+  EXPECT_NE(log("a"), first);
+  EXPECT_EQ(run(run_command("a", {"--force"})).status, 0);
+  EXPECT_EQ(log("a"), first);
+  EXPECT_FALSE(folder_.has("a.2"));
+}
+
+TEST_F(Program, ResultsDoNotDependOnThreads) {
+  for (const std::string method : {"adam", "lbfgs", "levenberg_marquardt"}) {
+    const std::string set = "optimizer={method: " + method + ", iterations: 4}";
+    ASSERT_EQ(run(run_command(method + "1", {"--threads", "1", "--set", set})).status, 0);
+    ASSERT_EQ(run(run_command(method + "2", {"--threads", "2", "--set", set})).status, 0);
+    expect_same_run(method + "1", method + "2");
+  }
+  ASSERT_EQ(run(run_command("seed", {"--seed", "4", "--set", "optimizer={iterations: 4}"})).status, 0);
+  EXPECT_NE(log("adam1"), log("seed"));
+}
+
+TEST_F(Program, EveryMethodResumesToTheSameBits) {
+  for (const std::string method : {"lbfgs", "levenberg_marquardt"}) {
+    const std::vector<std::string> set = {"--set", "optimizer={method: " + method + ", iterations: 6}"};
+    ASSERT_EQ(run(run_command(method, set)).status, 0);
+    for (int signal : {SIGKILL, SIGINT}) {
+      const std::string out = method + std::to_string(signal);
+      run(run_command(out, set), signal, [&] { return rows(out) >= 3; });
+      EXPECT_EQ(run({"resume", folder_.file(out), "--no-plots", "--quiet"}).status, 0);
+      expect_same_run(method, out);
+    }
+  }
+}
+
+TEST_F(Program, KilledAnywhereAndResumedGivesTheSameBits) {
+  ASSERT_EQ(run(run_command("whole")).status, 0);
+  const std::vector<std::function<bool(const std::string&)>> moments = {
+      [&](const std::string& out) { return folder_.has(out + "/experiment.yaml"); },
+      [&](const std::string& out) { return folder_.has(out + "/target.exr"); },
+      [&](const std::string& out) { return folder_.has(out + "/log.csv"); },
+      [&](const std::string& out) { return rows(out) >= 1; },
+      [&](const std::string& out) { return folder_.has(out + "/checkpoint.new.yaml"); },
+      [&](const std::string& out) { return rows(out) >= 3; },
+      [&](const std::string& out) { return rows(out) >= 5; },
+      [&](const std::string& out) { return folder_.has(out + "/final.exr"); },
+  };
+  int killed = 0;
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    const std::string out = "killed" + std::to_string(i);
+    if (run(run_command(out), SIGKILL, [&] { return moments[i](out); }).status == -SIGKILL) ++killed;
+    // Killed once more while it goes on.
+    run({"resume", folder_.file(out), "--no-plots", "--quiet"}, SIGKILL, [&] { return rows(out) >= 2; });
+    const Result result = run({"resume", folder_.file(out), "--no-plots", "--quiet"});
+    EXPECT_EQ(result.status, 0) << result.errors;
+    expect_same_run("whole", out);
+  }
+  EXPECT_GE(killed, 5);  // the others may have ended before the signal came
+}
+
+TEST_F(Program, InterruptedLeavesACheckpointAndSaysHowToGoOn) {
+  ASSERT_EQ(run(run_command("whole")).status, 0);
+  for (int signal : {SIGINT, SIGTERM}) {
+    const std::string out = "interrupted" + std::to_string(signal);
+    const Result result = run(run_command(out), signal, [&] { return rows(out) >= 1; });
+    EXPECT_EQ(result.status, 1);
+    EXPECT_NE(result.errors.find("isochron resume " + folder_.file(out)), std::string::npos) << result.errors;
+    EXPECT_NE(folder_.read(out + "/summary.yaml").find("status: interrupted"), std::string::npos);
+    EXPECT_TRUE(folder_.has(out + "/checkpoint.yaml"));
+    EXPECT_EQ(run({"resume", folder_.file(out), "--no-plots", "--quiet"}).status, 0);
+    expect_same_run("whole", out);
+  }
+}
+
+TEST_F(Program, DamagedCheckpointFallsBack) {
+  ASSERT_EQ(run(run_command("whole")).status, 0);
+  ASSERT_EQ(run(run_command("damaged")).status, 0);
+  folder_.write("damaged/checkpoint.yaml", folder_.read("damaged/checkpoint.yaml").substr(0, 100));
+  const Result result = run({"resume", folder_.file("damaged"), "--no-plots", "--quiet"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_NE(result.errors.find("damaged"), std::string::npos);
+  expect_same_run("whole", "damaged");
+}
+
+TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
+  // The square of the images overflows.
+  write_exr(folder_.file("black.exr"), GatedImage(8, 8, 2, 1));
+  const Result result =
+      run(run_command("out", {"--set", "target={images: black.exr}", "--set", "optimizer.iterations=20", "--set",
+                              "parameters[1]={name: power, type: emission, shape: lamp, initial: 1e300}"}));
+  EXPECT_EQ(result.status, 1);
+  const std::string summary = folder_.read("out/summary.yaml");
+  EXPECT_NE(summary.find("status: diverged\niterations: 4\n"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("rejected_steps: 5\n"), std::string::npos);
+  EXPECT_NE(summary.find("  height: 0.2\n  power: 1e+300\n"), std::string::npos);
+}
+
+TEST_F(Program, AnExplodedLossIsADivergence) {
+  // From an emission far below the target one step of 500 leads far above it.
+  const Result result =
+      run(run_command("out", {"--at", "height=0,power=2", "--set", "optimizer.learning_rate=500", "--set",
+                              "parameters[0].upper=0.01", "--set", "parameters[0].lower=0", "--set",
+                              "parameters[0].initial=0", "--set", "optimizer.iterations=1"}));
+  EXPECT_EQ(result.status, 1) << result.errors;
+  EXPECT_NE(folder_.read("out/summary.yaml").find("status: diverged"), std::string::npos);
+}
+
+TEST_F(Program, StopsWhenTheImagesAgree) {
+  const Result result = run(run_command("out", {"--at", "target", "--set", "optimizer.tolerance=0.5"}));
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_NE(folder_.read("out/summary.yaml").find("status: converged\niterations: 0\n"), std::string::npos);
+}
+
+TEST_F(Program, DrawsItsPlots) {
+  const Result result =
+      run({"run", folder_.file("tiny.yaml"), "-o", folder_.file("out"), "--set", "optimizer.iterations=1"});
+  EXPECT_EQ(result.status, 0) << result.errors;
+  for (const char* name : {"target.png", "initial.png", "final.png", "rmse.png"})
+    EXPECT_TRUE(folder_.has(std::string("out/") + name)) << name;
+}
+
+}  // namespace
+}  // namespace isochron
