@@ -86,7 +86,8 @@ TEST(SamplePoints, SumsOverTheImageVaryLess) {
     constexpr int kSets = 64;
     for (std::uint32_t i = 0; i < kSets; ++i) {
       double total = 0;
-      for (const double x : renderer.derive(term, {1, i, 0}, {0, 4})[0].data) total += x;
+      const auto images = renderer.derive(term, {1, i, 0}, {0, 4});
+      for (const double x : images[0].data) total += x;
       sum += total, squares += total * total;
     }
     return squares / kSets - sum * sum / (kSets * kSets);
