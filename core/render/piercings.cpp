@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace isochron {
 namespace {
@@ -22,25 +23,28 @@ bool has_vertex(const Scene& scene, int triangle, int vertex) {
 /// Goes along the edge from triangle to triangle.
 void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, std::vector<Hole>& holes) {
   const Vec3 from = scene.positions[edge.vertex[0]], to = scene.positions[edge.vertex[1]];
-  const double whole = length(to - from);
-  if (!(whole > 2 * caster.offset())) return;
-  const Vec3 along = (to - from) / whole;
-  double passed = 0;
-  while (true) {
-    const Vec3 start = from + along * (passed + caster.offset());
-    const int t = caster.first_triangle(start, along);
+  const double offset = caster.offset(), end = length(to - from) - offset;
+  if (!(end > offset)) return;
+  const Vec3 along = normalize(to - from);
+  if (!caster.occluded(from + along * offset, from + along * end)) return;
+  double passed = 0, step = offset;
+  while (passed + step < end) {
+    const int t = caster.first_triangle(from + along * (passed + step), along);
     if (t < 0) return;
     const auto& v = scene.triangles[t].vertex;
     const Vec3& corner = scene.positions[v[0]];
     const Vec3 normal = cross(scene.positions[v[1]] - corner, scene.positions[v[2]] - corner);
-    // Rays close to a plane may be said to meet it anywhere: no crossing.
-    const double distance = dot(normal, corner - from) / dot(normal, along);
-    if (!(distance < whole - caster.offset())) return;
-    if (distance > passed + caster.offset() && !has_vertex(scene, t, edge.vertex[0]) &&
-        !has_vertex(scene, t, edge.vertex[1]))
+    const double rate = dot(normal, along), distance = dot(normal, corner - from) / rate;
+    if (!(std::abs(rate) > kCoplanarAngle * length(normal) && distance > passed + 0.5 * step)) {
+      step *= 2;  // the edge runs within this triangle's plane, or has just left it
+      continue;
+    }
+    if (!(distance < end)) return;
+    if (!has_vertex(scene, t, edge.vertex[0]) && !has_vertex(scene, t, edge.vertex[1]))
       for (const int face : edge.face)
         if (face >= 0) holes.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance});
-    passed = std::max(distance, passed + caster.offset());
+    passed = distance;
+    step = offset;
   }
 }
 

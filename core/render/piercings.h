@@ -14,8 +14,8 @@ struct Piercing {
   std::array<Vec3, 2> end;
 };
 
-/// All pairs whose planes cross, by triangles. A segment ends where an edge of one triangle goes through the other; edges are
-/// found to by rays, one for each edge of the scene's. What merely touches is not found.
+/// All pairs that cross, by triangles. A segment ends where an edge of one triangle goes through the other, which a ray along
+/// each of the scene's edges finds. What merely touches is not found.
 std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster);
 
 }  // namespace isochron
