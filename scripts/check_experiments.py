@@ -29,7 +29,7 @@ EXPERIMENTS = {
     "figure1": (8192, 16),
     "height_field": (512, 8),
     "height_field_steady": (512, 8),
-    "sofa": (32768, 6, "shape[8]"),
+    "sofa": (131072, 6, "shape[8]"),
     "tree": (16384, 16),
     "validation/figure8_boxcar": (4096, 12),
     "validation/figure8_gaussian": (4096, 12),
