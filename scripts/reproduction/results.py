@@ -52,7 +52,7 @@ def _notes(runs):
             "the same for any number.")
     if runs["cube_standard"]:
         failed = sum(r.error_percent > 25 for r in runs["cube_standard"])
-        notes.append(f"`cube_standard` fails by noise, and so by chance: {failed} of {len(runs['cube_standard'])} seeds end above "
+        notes.append(f"`cube_standard` can fail by noise alone, so by chance: {failed} of {len(runs['cube_standard'])} seeds end above "
                      "25 %.")
     return "".join(f"\n{note}\n" for note in notes)
 
