@@ -100,7 +100,8 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
   }
   // The line stays in both planes: n_b = a n_0 + c n_1 moves by a n_0 . (velocity of face 0) + c n_1 . (velocity of face 1).
   const Vec3 &n0 = scene.normal[edge.face[0]], &n1 = scene.normal[edge.face[1]];
-  const double cosine = dot(n0, n1), determinant = isochron::length(cross(n0, n1)) * isochron::length(cross(n0, n1));
+  const Vec3 line = cross(n0, n1);
+  const double cosine = dot(n0, n1), determinant = dot(line, line);
   const double of[2] = {dot(n_b, n0), dot(n_b, n1)};
   for (int i = 0; i < 2; ++i) {
     const Vec3 g = scene.normal[edge.face[i]] * ((of[i] - cosine * of[1 - i]) / determinant);

@@ -36,8 +36,9 @@ class BoundaryEdges {
     /// The number that gives this point.
     double x() const { return begin + s * share; }
   };
-  /// Edges and lines of piercing triangles that the camera may see moving, by their length in the image and, inside of an outline, the angle between their
-  /// faces; the same of static ones where points beside them may follow others, in equal shares. `u` in (0, 1).
+  /// Edges and lines of piercing triangles that the camera may see moving, by their length in the image and, inside of an
+  /// outline, the angle between their faces; the same of static ones where points beside them may follow others, in equal
+  /// shares. `u` in (0, 1).
   bool has_primary() const { return !primary_.distribution.empty(); }
   Sample sample_primary(double u) const { return primary_.sample(u); }
   /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
