@@ -81,12 +81,12 @@ struct Renderer::Impl {
   EstimatorOptions options;
   const TangentBasis* basis;
   PreparedScene scene;
-  BoundaryEdges edges;
   SamplingMix mix;
   double pair_gain = 1;
   GatePick every_gate;
   mutable std::atomic<long long> rays{0}, arcs{0};
   mutable std::once_flag learned;
+  mutable std::optional<BoundaryEdges> edges;  ///< only the visibility term asks for them
   mutable BoundaryGuide guide;
 
   Impl(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent)
@@ -94,7 +94,6 @@ struct Renderer::Impl {
         options(estimator),
         basis(tangent),
         scene(source, tangent, estimator.follow_radius),
-        edges(scene, estimator.boundary.wedge),
         every_gate(gate_set) {
     const double width = gates.relative_width();
     mix = resolve(options, width);
@@ -173,6 +172,7 @@ struct Renderer::Impl {
   /// Before the visibility term is run. What is learned depends on scene, gates, basis and options alone.
   void learn() const {
     std::call_once(learned, [this] {
+      edges.emplace(scene, options.boundary.wedge);
       const long long samples = std::llround(options.guiding_samples * scene.camera.pixels());
       if (samples < kFewestLearningSamples) return;
       std::vector<std::vector<GuideRecord>> records(kMostStrands);
@@ -187,8 +187,8 @@ struct Renderer::Impl {
           cost[technique] += worker.work() - before;
         };
         const BoundaryGuide unguided;
-        PrimaryBoundary primary(worker, edges, unguided, mix.interior == 1);
-        SecondaryBoundary secondary(worker, edges, unguided, mix.interior == 1);
+        PrimaryBoundary primary(worker, *edges, unguided, mix.interior == 1);
+        SecondaryBoundary secondary(worker, *edges, unguided, mix.interior == 1);
         const double splat_scale = 1.0 / scene.camera.pixels();
         for (long long i = strand; i < samples; i += kMostStrands) {
           const int pixel = static_cast<int>(i * scene.camera.pixels() / samples) % scene.camera.pixels();
@@ -227,8 +227,8 @@ struct Renderer::Impl {
       run_paths(worker, 1, pass, strand, strands, stream, range);
     } else {
       const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
-      PrimaryBoundary primary(worker, edges, guide, mix.interior == 1);
-      SecondaryBoundary secondary(worker, edges, guide, mix.interior == 1);
+      PrimaryBoundary primary(worker, *edges, guide, mix.interior == 1);
+      SecondaryBoundary secondary(worker, *edges, guide, mix.interior == 1);
       const double edges_rate = guide.rate(BoundaryGuide::primary),
                    borders_rate = guide.rate(BoundaryGuide::pixel_border),
                    from_edge_rate = guide.rate(BoundaryGuide::from_edge);
