@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "core/math/error.h"
-#include "core/render/renderer.h"
+#include "core/render/parallel.h"
 
 namespace isochron {
 

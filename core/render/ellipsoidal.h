@@ -367,11 +367,15 @@ class EllipsoidalConnections {
     const GatePick& pick = worker_.pick;
     // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
     // densities of the length differ between the two techniques.
-    const bool same_length_pdf = kGathers || pick.uniform() || path.size() != 3;
+    const bool same_length_pdf = pick.uniform() || path.size() != 3;
+    const ConnectionRates& rates = worker_.rates;
+    const double camera_rate = target.pair ? rates.camera_pairs : rates.camera_lengths;
     const ArcDensities d = worker_.techniques.arcs(path, kGathers, [&](int from) {
-      if (same_length_pdf) return 1.0;
+      if (kGathers) return 1.0;
+      const double rate = from == 0 ? camera_rate : rates.walk;
+      if (same_length_pdf) return rate;
       const int served = from == 0 ? GatePick::kImage : pixel;
-      return (from == 0 ? 1 : pick.rate(pixel)) *
+      return rate * (from == 0 ? 1 : pick.rate(pixel)) *
              (jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]));
     });
     const double sum = d.surface + d.emitter;

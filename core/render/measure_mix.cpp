@@ -22,6 +22,12 @@ constexpr double kPaths = 300000;  ///< of standard sampling, about
 /// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
 /// can lose where it is not the best is more than what it can win.
 constexpr double kClearlyBetter[] = {0.75, 0.5};
+/// How often to use the techniques of ellipsoidal connections: each alike, or mostly the camera's own pairs, which share
+/// low-discrepancy points over the whole image; none never, as a trial may miss what is rare. The latter must look so much
+/// better than the former.
+constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1};
+constexpr double kClearlyFaster = 0.7;
+constexpr int kRateSamples = 3, kRateBatches = 12;  ///< per pixel and batch
 /// By how much standard sampling must look better than ellipsoidal, per purpose. For gradients, noise counts most where
 /// narrow gates cut, and there standard sampling, whose rare hits a trial may miss, is worse than on average. For
 /// images it may look slightly worse: low-discrepancy numbers, which trials do without, gain more for its pixels (cube,
@@ -70,9 +76,12 @@ GatedImage blocks_of(const GatedImage& image, int size) {
   return sums;
 }
 
-/// Sum over blocks of pixels and gates of the variance between batches of images, times the work behind them.
+/// Sum over blocks of pixels and gates of the variance between batches of images, and the work behind them.
+struct Trial {
+  double variance, work;
+};
 template <class Estimate>
-double variance_and_work(const Renderer& renderer, int block, int batches, int samples, Estimate&& estimate) {
+Trial run_trial(const Renderer& renderer, int block, int batches, int samples, Estimate&& estimate) {
   std::vector<double> mean, squares;
   for (int b = 0; b < batches; ++b) {
     const GatedImage image = blocks_of(estimate(SampleRange{b * samples, (b + 1) * samples}), block);
@@ -86,7 +95,22 @@ double variance_and_work(const Renderer& renderer, int block, int batches, int s
   }
   double sum = 0;
   for (double s : squares) sum += s;
-  return sum * renderer.work();
+  return {sum, renderer.work()};
+}
+
+/// The better rates of connections for a term's derivative along one column, in sums over blocks.
+ConnectionRates measure_rates(const Scene& small, const GateSet& gates, EstimatorOptions options,
+                              const TangentBasis& column, Term term, const Stream& stream, int block) {
+  const auto cost = [&](const ConnectionRates& rates) {
+    options.mix = SamplingMix{1, 1, rates, rates};
+    const Renderer renderer(small, gates, options, &column);
+    if (!renderer.has(term)) return 0.0;
+    const Trial trial = run_trial(renderer, block, kRateBatches, kRateSamples,
+                                  [&](SampleRange range) { return renderer.derive(term, stream, range)[0]; });
+    return trial.variance * trial.work;
+  };
+  const double alike = cost(kAlike);
+  return alike > 0 && cost(kMostlyCamera) < kClearlyFaster * alike ? kMostlyCamera : kAlike;
 }
 
 }  // namespace
@@ -109,10 +133,11 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
       trial.numbers = Numbers::independent;
       const Renderer renderer(small, gates, trial, moving);
-      cost[i] =
-          variance_and_work(renderer, block, batches,
-                            std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
-                            [&](SampleRange range) { return estimate(renderer, range); });
+      const Trial measured =
+          run_trial(renderer, block, batches,
+                    std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
+                    [&](SampleRange range) { return estimate(renderer, range); });
+      cost[i] = measured.variance * measured.work;
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
@@ -129,6 +154,9 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   best.interior = choose(kInterior, block, &one, [&](const Renderer& r, SampleRange range) {
     return r.derive(Term::interior, stream, range)[0];
   });
+  if (best.interior == 1)
+    best.interior_rates = measure_rates(small, gates, options, one, Term::interior, stream, block);
+  best.path_length_rates = measure_rates(small, gates, options, one, Term::path_length, stream, block);
   return best;
 }
 

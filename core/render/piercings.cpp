@@ -1,9 +1,9 @@
 #include "core/render/piercings.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
+
+#include "core/render/parallel.h"
 
 namespace isochron {
 namespace {
@@ -53,9 +53,10 @@ std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster
   constexpr std::size_t kChunk = 1024;
   const std::size_t edges = scene.edges.size(), chunks = (edges + kChunk - 1) / kChunk;
   std::vector<std::vector<Hole>> found(chunks);
-  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t chunk) {
-    for (std::size_t e = chunk * kChunk; e < std::min(edges, (chunk + 1) * kChunk); ++e)
-      find_holes(scene, caster, scene.edges[e], found[chunk]);
+  parallel(static_cast<int>(chunks), [&](int chunk) {
+    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
+    for (std::size_t e = begin; e < std::min(edges, begin + kChunk); ++e)
+      find_holes(scene, caster, scene.edges[e], found[static_cast<std::size_t>(chunk)]);
   });
   std::vector<Hole> holes;
   for (const auto& some : found) holes.insert(holes.end(), some.begin(), some.end());

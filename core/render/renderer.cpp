@@ -1,23 +1,18 @@
 #include "core/render/renderer.h"
 
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
-
 #include <atomic>
 #include <mutex>
 #include <stdexcept>
 
 #include "core/render/ellipsoidal.h"
 #include "core/render/ledger.h"
+#include "core/render/parallel.h"
 #include "core/render/primary_boundary.h"
 #include "core/render/sample_points.h"
 #include "core/render/secondary_boundary.h"
 
 namespace isochron {
 namespace {
-
-int thread_count = 0;
 
 /// Work is cut into strands, each worked through in order with accumulators of its own, and merged in order: results
 /// do not depend on which thread takes which strand. Their number depends on the accumulators' size alone.
@@ -34,35 +29,7 @@ int strand_count(std::size_t accumulator_doubles) {
   return static_cast<int>(std::clamp<std::size_t>(fitting, kFewestStrands, kMostStrands));
 }
 
-template <class F>
-void parallel(int count, F&& f) {
-  tbb::task_arena arena(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
-  arena.execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, count, 1),
-        [&](const tbb::blocked_range<int>& range) {
-          for (int i = range.begin(); i < range.end(); ++i) f(i);
-        },
-        tbb::simple_partitioner());
-  });
-}
-
-/// sum[i] += parts[0][i] + parts[1][i] + ... in that order.
-void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum) {
-  constexpr int kChunk = 1 << 14;
-  const int size = static_cast<int>(sum.size());
-  parallel((size + kChunk - 1) / kChunk, [&](int chunk) {
-    const int end = std::min(size, (chunk + 1) * kChunk);
-    for (const auto& part : parts)
-      for (int i = chunk * kChunk; i < end; ++i) sum[i] += part[i];
-  });
-}
-
 }  // namespace
-
-void set_thread_count(int threads) {
-  thread_count = threads;
-}
 
 const char* name(Term term) {
   switch (term) {
@@ -129,11 +96,13 @@ struct Renderer::Impl {
     arcs += worker.arcs;
   }
 
-  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling.
+  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling. `rates` hold where
+  /// there are no others.
   template <class Sink>
-  void run_paths(Worker<Sink>& worker, double share, const GatePass& pass, int strand, int strands,
-                 const Stream& stream, SampleRange range) const {
+  void run_paths(Worker<Sink>& worker, double share, const ConnectionRates& rates, const GatePass& pass, int strand,
+                 int strands, const Stream& stream, SampleRange range) const {
     const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
+    const ConnectionRates& used = worker.rates = share == 1 ? rates : ConnectionRates{};
     worker.ellipsoidal_share = share;
     worker.pair_gain = pair_gain;
     GatePass lengths = pass, pairs = pass;
@@ -145,13 +114,14 @@ struct Renderer::Impl {
     const PointSet of_pairs = points.of_image(Technique::camera_pairs);
     for_each_pixel(strand, strands, [&](int pixel) {
       if (pass.value)
-        points.in_image(of_lengths, pixel, share,
-                        [&](Rng& rng) { camera_lengths.sample_from_camera(splat_scale, rng); });
+        points.in_image(of_lengths, pixel, share * used.camera_lengths,
+                        [&](Rng& rng) { camera_lengths.sample_from_camera(splat_scale / used.camera_lengths, rng); });
       if (pass.pairs)
-        points.in_image(of_pairs, pixel, share, [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale, rng); });
-      const double rate = worker.pick.rate(pixel);
-      points.in_pixel(Technique::walk, pixel, rate * share,
-                      [&](Rng& rng) { connections.sample_walk(pixel, scale / rate, rng); });
+        points.in_image(of_pairs, pixel, share * used.camera_pairs,
+                        [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale / used.camera_pairs, rng); });
+      const double rate = worker.pick.rate(pixel), walks = rate * used.walk;
+      points.in_pixel(Technique::walk, pixel, walks * share,
+                      [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
       points.in_pixel(Technique::standard, pixel, rate * (1 - share),
                       [&](Rng& rng) { sample_standard(worker, pixel, scale / rate, pass.pairs, rng); });
     });
@@ -219,12 +189,12 @@ struct Renderer::Impl {
       pass.value = true;
       pass.pairs = interior_pairs();
       if (pass.pairs) pass.use = kValueOnly;
-      run_paths(worker, mix.interior, pass, strand, strands, stream, range);
+      run_paths(worker, mix.interior, mix.interior_rates, pass, strand, strands, stream, range);
     } else if (term == Term::path_length) {
       pass.pairs = true;
       pass.part = jump_part();
       pass.coupled = options.antithetic;
-      run_paths(worker, 1, pass, strand, strands, stream, range);
+      run_paths(worker, 1, mix.path_length_rates, pass, strand, strands, stream, range);
     } else {
       const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
       PrimaryBoundary primary(worker, *edges, guide, mix.interior == 1);
@@ -283,7 +253,7 @@ GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
                   PrimalSink(impl_->gates, shared ? image : own));
     GatePass pass;
     pass.value = true;
-    impl_->run_paths(worker, impl_->mix.image, pass, strand, strands, stream, range);
+    impl_->run_paths(worker, impl_->mix.image, {}, pass, strand, strands, stream, range);
     if (!shared) films[strand] = std::move(own.data);
   });
   if (!shared) merge(films, image.data);
@@ -351,7 +321,7 @@ ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) con
     Worker worker(impl.scene, impl.gates, impl.options, impl.every_gate, ImageLedgerSink(impl.scene, impl.gates, own));
     GatePass pass;
     pass.value = true;
-    impl.run_paths(worker, impl.mix.image, pass, strand, strands, stream, range);
+    impl.run_paths(worker, impl.mix.image, {}, pass, strand, strands, stream, range);
     films[strand] = std::move(own.image.data);
     shapes[strand] = std::move(own.by_shape);
   });

@@ -32,10 +32,18 @@ struct BoundaryTechniques {
   bool light_arcs = true;   ///< ellipsoidal connections beyond the segment, where gates are narrow
 };
 
+/// How often each technique of ellipsoidal sampling is used per sample, on average; all positive.
+struct ConnectionRates {
+  double camera_lengths = 1;  ///< connections of the camera itself, lengths drawn from the gates
+  double camera_pairs = 1;    ///< the same, lengths in pairs from the gates' derivative
+  double walk = 1;            ///< camera paths with connections at their vertices
+};
+
 /// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
-/// standard. Strictly between, multiple importance sampling combines the two.
+/// standard. Strictly between, multiple importance sampling combines the two. Rates hold where connections take all.
 struct SamplingMix {
   double image = 0, interior = 0;
+  ConnectionRates interior_rates = {}, path_length_rates = {};
 };
 
 struct EstimatorOptions {
@@ -130,8 +138,5 @@ class Renderer {
 inline double work(long long rays, long long arcs) {
   return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs);
 }
-
-/// Threads that renderers use; 0: all cores. Results do not depend on it.
-void set_thread_count(int threads);
 
 }  // namespace isochron

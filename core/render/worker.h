@@ -15,6 +15,7 @@ struct Worker {
   const EstimatorOptions& options;
   const GatePick& pick;
   double ellipsoidal_share = 0;  ///< of the samples; the others are standard
+  ConnectionRates rates = {};    ///< of ellipsoidal connections
   double pair_gain = 1;          ///< by how much pairs count for more than their density
   Techniques techniques;
   Sink sink;

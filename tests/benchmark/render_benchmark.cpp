@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/render/parallel.h"
 #include "core/render/renderer.h"
 #include "core/render/sinks.h"
 #include "tests/benchmark/rays.h"

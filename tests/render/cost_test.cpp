@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "core/math/cpu_time.h"
+#include "core/render/parallel.h"
 #include "scene_building.h"
 #include "support.h"
 

@@ -2,6 +2,7 @@
 // on how a range is cut.
 #include <gtest/gtest.h>
 
+#include "core/render/parallel.h"
 #include "support.h"
 
 namespace isochron::testing {

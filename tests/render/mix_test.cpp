@@ -10,6 +10,7 @@
 
 #include "core/render/gate_pick.h"
 #include "core/render/measure_mix.h"
+#include "core/render/parallel.h"
 #include "tests/render/support.h"
 
 namespace isochron::testing {

@@ -11,6 +11,7 @@
 #include <map>
 
 #include "core/math/cpu_time.h"
+#include "core/render/parallel.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 

@@ -11,6 +11,7 @@
 
 #include "core/math/cpu_time.h"
 #include "core/render/measure_mix.h"
+#include "core/render/parallel.h"
 #include "tests/render/support.h"
 #include "tests/render/width_growth.h"
 

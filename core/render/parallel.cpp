@@ -1,0 +1,42 @@
+#include "core/render/parallel.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+
+namespace isochron {
+namespace {
+
+int thread_count = 0;
+
+}  // namespace
+
+void set_thread_count(int threads) {
+  thread_count = threads;
+}
+
+void parallel(int count, const std::function<void(int)>& f) {
+  tbb::task_arena arena(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, count, 1),
+        [&](const tbb::blocked_range<int>& range) {
+          for (int i = range.begin(); i < range.end(); ++i) f(i);
+        },
+        tbb::simple_partitioner());
+  });
+}
+
+void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum) {
+  constexpr int kChunk = 1 << 14;
+  const int size = static_cast<int>(sum.size());
+  parallel((size + kChunk - 1) / kChunk, [&](int chunk) {
+    const int end = std::min(size, (chunk + 1) * kChunk);
+    for (const auto& part : parts)
+      for (int i = chunk * kChunk; i < end; ++i) sum[i] += part[i];
+  });
+}
+
+}  // namespace isochron
