@@ -1,0 +1,84 @@
+"""Cost of the loss gradient by two programs on the same experiments. Called by scripts/compare.
+
+Both take the experiments as they are here, at the initial values, each on one thread and at the same time, so that whatever
+else the machine does strikes both. `isochron gradient` makes repeats of the gradient with the experiment's own samples;
+variance times seconds of a gradient does not depend on their number and is what is compared.
+"""
+
+import argparse
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).resolve().parent.parent
+NAMES = ["cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa"]
+TERMS = ["primal", "interior", "visibility", "path_length"]
+REPEATS = 32  # the most that `isochron gradient` makes
+TARGET_SAMPLES = 256  # of the target, which the gradient's noise hardly depends on
+
+
+def start(program, name, samples, seed, folder):
+    spec = ", ".join(f"{term}: {REPEATS * samples[term]}" for term in TERMS)
+    return subprocess.Popen(
+        [program, "gradient", ROOT / "experiments" / f"{name}.yaml", "-o", folder, "--threads", "1", "--quiet",
+         "--seed", str(seed), "--set", f"target.samples={TARGET_SAMPLES}", "--set", f"samples={{{spec}}}"])
+
+
+def read(folder):
+    """Gradient, sum of the squared standard errors of one repeat, seconds of one repeat."""
+    with open(folder / "gradient.csv") as file:
+        rows = list(csv.DictReader(file))
+    cost = yaml.safe_load((folder / "gradient.yaml").read_text())
+    gradient = [float(row["gradient"]) for row in rows]
+    variance = cost["repeats"] * sum(float(row["standard_error"]) ** 2 for row in rows)
+    return gradient, variance, cost["seconds"] / cost["repeats"]
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="scripts/compare", description=__doc__.splitlines()[0])
+    parser.add_argument("commit")
+    parser.add_argument("program")
+    parser.add_argument("names", nargs="*", metavar="NAME")
+    parser.add_argument("--rounds", type=int, default=2)
+    options = parser.parse_args()
+    unknown = [name for name in options.names if name not in NAMES]
+    if unknown:
+        parser.error(f"unknown name '{unknown[0]}' ({' '.join(NAMES)})")
+    programs = {options.commit: options.program, "now": ROOT / "build" / "isochron"}
+    rows = []
+    print(f"{'':14}{'seconds of a gradient':>24}{'relative error':>24}{'variance x time':>18}")
+    print(f"{'':14}{options.commit:>14}{'now':>10}{options.commit:>14}{'now':>10}{'before / now':>18}")
+    for name in options.names or NAMES:
+        experiment = yaml.safe_load((ROOT / "experiments" / f"{name}.yaml").read_text())
+        sums = {label: [0.0, 0.0] for label in programs}
+        norm2 = 0.0
+        for seed in range(1, options.rounds + 1):
+            folders = {label: ROOT / "runs" / "compare" / f"{name}.{label}.{seed}" for label in programs}
+            running = {
+                label: start(program, name, experiment["samples"], seed, folders[label])
+                for label, program in programs.items()
+            }
+            if any([process.wait() for process in running.values()]):
+                sys.exit(f"scripts/compare: {name}: a program failed")
+            for label in programs:
+                gradient, variance, seconds = read(folders[label])
+                sums[label][0] += variance / options.rounds
+                sums[label][1] += seconds / options.rounds
+                norm2 += sum(g * g for g in gradient) / (2 * options.rounds)
+        before, now = sums[options.commit], sums["now"]
+        error = {label: (sums[label][0] / norm2) ** 0.5 for label in programs}
+        gain = before[0] * before[1] / (now[0] * now[1])
+        print(f"{name:14}{before[1]:14.3g}{now[1]:10.3g}{error[options.commit]:14.3g}{error['now']:10.3g}{gain:18.3g}",
+              flush=True)
+        rows.append([name, options.commit, before[1], now[1], error[options.commit], error["now"], gain])
+    with open(ROOT / "experiments" / "measured" / "compare.csv", "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["experiment", "commit", "seconds_before", "seconds_now", "error_before", "error_now", "gain"])
+        writer.writerows([row[:2] + [f"{value:.4g}" for value in row[2:]] for row in rows])
+
+
+if __name__ == "__main__":
+    main()
