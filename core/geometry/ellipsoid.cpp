@@ -71,11 +71,12 @@ Ellipsoid::Ellipsoid(const Vec3& focus_a, const Vec3& focus_b, double total_leng
   minor = 0.5 * std::sqrt((tau - distance) * (tau + distance));
 }
 
-double EllipseArcs::angle(double u) const {
+Vec3 EllipseArcs::point_at(double u) const {
   double rest = u * total_span;
   int i = 0;
   while (i + 1 < count && rest >= span[i]) rest -= span[i++];
-  return start[i] + rest;
+  const double c = std::cos(rest), s = std::sin(rest);
+  return point(start_cos[i] * c - start_sin[i] * s, start_sin[i] * c + start_cos[i] * s);
 }
 
 bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs) {
@@ -157,7 +158,9 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
     const double span = arc_span(edges, i);
     if (!(span > 0)) continue;
     const Vec2 start = edges[i].start_point();
-    arcs.start[arcs.count] = std::atan2(start.y, start.x);
+    const double per_length = 1 / std::sqrt(dot(start, start));
+    arcs.start_cos[arcs.count] = start.x * per_length;
+    arcs.start_sin[arcs.count] = start.y * per_length;
     arcs.span[arcs.count++] = span;
     arcs.total_span += span;
   }
@@ -166,7 +169,8 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
     const bool centre_inside = edges[0].height > 0 && edges[1].height > 0 && edges[2].height > 0;
     if (crossed || !centre_inside) return false;
     arcs.count = 1;
-    arcs.start[0] = 0;
+    arcs.start_cos[0] = 1;
+    arcs.start_sin[0] = 0;
     arcs.span[0] = arcs.total_span = kTwoPi;
   }
   arcs.center = ellipsoid.center + unmap(unit_normal * (offset / std::sqrt(support_squared)));
@@ -175,13 +179,12 @@ bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, co
   return true;
 }
 
-double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n) {
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const Vec3& q, const Vec3& n) {
   // With p = q - centre, the surface is Q(p) = p.Kp = 1 and u_a + u_b = 2 major minor^2 Kp / (|q-a| |q-b|).
   // The arcs' centre is K-conjugate to the plane, so only the part v = e1 cos + e2 sin of p has an in-plane
   // gradient; it is conjugate to w = dq/dphi, and v.Kv = r^2 with r the circle's radius gives |P_T Kv| = r^2
   // |w| / |e1 x e2|. Finally |e1 x e2| = r^2 major minor^2 / sqrt(minor^2 + (n.(b-a)/2)^2): the shrinking
   // radius drops out of the ratio.
-  const Vec3 q = arcs.point(phi);
   const double across = dot(n, ellipsoid.b - ellipsoid.a);
   return std::sqrt(length_squared(q - ellipsoid.a) * length_squared(q - ellipsoid.b) /
                    (4 * ellipsoid.minor * ellipsoid.minor + across * across));

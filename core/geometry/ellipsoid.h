@@ -28,21 +28,26 @@ struct Ellipsoid {
 struct EllipseArcs {
   Vec3 center, e1, e2;
   int count = 0;
-  double start[3], span[3];
+  double start_cos[3], start_sin[3];  ///< of the angles where arcs start
+  double span[3];
   double total_span = 0;  ///< radians; the density of a uniform pick is 1 / total_span per radian
 
-  /// Angle of the point at fraction u in (0, 1) of the total span.
-  double angle(double u) const;
-  Vec3 point(double phi) const { return center + e1 * std::cos(phi) + e2 * std::sin(phi); }
+  double start(int i) const { return std::atan2(start_sin[i], start_cos[i]); }
+  Vec3 point(double phi) const { return point(std::cos(phi), std::sin(phi)); }
+  /// The point at fraction u in (0, 1) of the total span.
+  Vec3 point_at(double u) const;
+
+ private:
+  Vec3 point(double cosine, double sine) const { return center + e1 * cosine + e2 * sine; }
 };
 
 /// Intersects the ellipsoid with triangle (v0, v1, v2). False when they do not meet in an arc of positive
 /// length, when the triangle has no area, and when a coordinate is not finite.
 bool clip_ellipse(const Ellipsoid& ellipsoid, const Vec3& v0, const Vec3& v1, const Vec3& v2, EllipseArcs& arcs);
 
-/// dA / (dphi dtau) at q(phi): |dq/dphi| / |P_T (u_a + u_b)|, in length units, with n the triangle's unit
+/// dA / (dphi dtau) at the ellipse's point q: |dq/dphi| / |P_T (u_a + u_b)|, in length units, with n the triangle's unit
 /// normal. Stays bounded where the ellipse shrinks to a point: it equals |q-a| |q-b| / sqrt(tau^2 - |P_T
 /// (b-a)|^2).
-double area_per_angle_and_length(const Ellipsoid& ellipsoid, const EllipseArcs& arcs, double phi, const Vec3& n);
+double area_per_angle_and_length(const Ellipsoid& ellipsoid, const Vec3& q, const Vec3& n);
 
 }  // namespace isochron

@@ -297,8 +297,7 @@ class EllipsoidalConnections {
                          const Rgb& factor, ArcPoint& out) const {
     EllipseArcs arcs;
     if (!clip_ellipse(ellipsoid, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs)) return;
-    const double phi = arcs.angle(along);
-    const SurfacePoint q = scene_.point_in_plane(t, arcs.point(phi));
+    const SurfacePoint q = scene_.point_in_plane(t, arcs.point_at(along));
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
     if (!scene_.outside(x, q)) return;
@@ -322,7 +321,7 @@ class EllipsoidalConnections {
     }
     if (!(carried > 0)) return;
     out.span = arcs.total_span;
-    out.area_rate = area_per_angle_and_length(ellipsoid, arcs, phi, q.n);
+    out.area_rate = area_per_angle_and_length(ellipsoid, q.p, q.n);
     out.value = factor * albedo * (carried * out.span * out.area_rate);
     out.point = q;
   }
@@ -331,7 +330,7 @@ class EllipsoidalConnections {
                          ArcPoint& out) const {
     EllipseArcs arcs;
     if (!clip_ellipse(sphere, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs)) return;
-    const SurfacePoint y = scene_.point_in_plane(t, arcs.point(arcs.angle(along)));
+    const SurfacePoint y = scene_.point_in_plane(t, arcs.point_at(along));
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
     if (!scene_.outside(x, y)) return;

@@ -105,11 +105,7 @@ class Techniques {
     if (!ellipsoid.valid() ||
         !clip_ellipse(ellipsoid, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
       return 0;
-    const Vec3 d = q.p - arcs.center;
-    const double e11 = dot(arcs.e1, arcs.e1), e12 = dot(arcs.e1, arcs.e2), e22 = dot(arcs.e2, arcs.e2);
-    const double d1 = dot(d, arcs.e1), d2 = dot(d, arcs.e2);
-    const double phi = std::atan2(d2 * e11 - d1 * e12, d1 * e22 - d2 * e12);
-    return 1 / (arcs.total_span * area_per_angle_and_length(ellipsoid, arcs, phi, q.n));
+    return 1 / (arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n));
   }
 
   const PreparedScene& scene_;

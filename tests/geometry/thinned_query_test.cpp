@@ -33,7 +33,7 @@ double carried(const Ellipsoid& e, const EllipsoidBvh::Focus& a, const Ellipsoid
                const EllipsoidBvh::Input& t) {
   EllipseArcs arcs;
   if (!clip_ellipse(e, t.vertex[0], t.vertex[1], t.vertex[2], arcs)) return 0;
-  const Vec3 p = arcs.point(arcs.angle(0.5)), to_a = p - a.p, to_b = p - b.p;
+  const Vec3 p = arcs.point_at(0.5), to_a = p - a.p, to_b = p - b.p;
   const double cos_a = dot(to_a, a.axis) / length(to_a), cos_b = dot(to_b, b.axis) / length(to_b);
   if (cos_a < a.cosine || cos_b < b.cosine) return 0;
   return arcs.total_span / (dot(to_a, to_a) * dot(to_b, to_b)) * (a.lambertian ? cos_a : 1) *
