@@ -17,14 +17,16 @@ ROOT = Path(__file__).resolve().parent.parent
 NAMES = ["cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa"]
 TERMS = ["primal", "interior", "visibility", "path_length"]
 REPEATS = 32  # the most that `isochron gradient` makes
-TARGET_SAMPLES = 256  # of the target, which the gradient's noise hardly depends on
+MOST_TARGET_SAMPLES = 131072  # what the target's noise adds to the residual is then a small part of it
 
 
-def start(program, name, samples, seed, folder):
+def start(program, name, experiment, seed, folder):
+    samples = experiment["samples"]
+    target = min(experiment["target"]["samples"], MOST_TARGET_SAMPLES)
     spec = ", ".join(f"{term}: {REPEATS * samples[term]}" for term in TERMS)
     return subprocess.Popen(
         [program, "gradient", ROOT / "experiments" / f"{name}.yaml", "-o", folder, "--threads", "1", "--quiet",
-         "--seed", str(seed), "--set", f"target.samples={TARGET_SAMPLES}", "--set", f"samples={{{spec}}}"])
+         "--seed", str(seed), "--set", f"target.samples={target}", "--set", f"samples={{{spec}}}"])
 
 
 def read(folder):
@@ -58,7 +60,7 @@ def main():
         for seed in range(1, options.rounds + 1):
             folders = {label: ROOT / "runs" / "compare" / f"{name}.{label}.{seed}" for label in programs}
             running = {
-                label: start(program, name, experiment["samples"], seed, folders[label])
+                label: start(program, name, experiment, seed, folders[label])
                 for label, program in programs.items()
             }
             if any([process.wait() for process in running.values()]):
