@@ -39,6 +39,22 @@ def read(folder):
     return gradient, variance, cost["seconds"] / cost["repeats"]
 
 
+def store(rows):
+    """Rows of experiments that were not measured now stay."""
+    file = ROOT / "experiments" / "measured" / "compare.csv"
+    table = {name: None for name in NAMES}
+    if file.exists():
+        with open(file) as old:
+            table |= {row[0]: row for row in list(csv.reader(old))[1:]}
+    table |= {row[0]: row[:2] + [f"{value:.4g}" for value in row[2:]] for row in rows}
+    temporary = file.with_suffix(".tmp")
+    with open(temporary, "w", newline="") as new:
+        writer = csv.writer(new, lineterminator="\n")
+        writer.writerow(["experiment", "commit", "seconds_before", "seconds_now", "error_before", "error_now", "gain"])
+        writer.writerows(row for row in table.values() if row)
+    temporary.replace(file)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="scripts/compare", description=__doc__.splitlines()[0])
     parser.add_argument("commit")
@@ -76,10 +92,7 @@ def main():
         print(f"{name:14}{before[1]:14.3g}{now[1]:10.3g}{error[options.commit]:14.3g}{error['now']:10.3g}{gain:18.3g}",
               flush=True)
         rows.append([name, options.commit, before[1], now[1], error[options.commit], error["now"], gain])
-    with open(ROOT / "experiments" / "measured" / "compare.csv", "w", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(["experiment", "commit", "seconds_before", "seconds_now", "error_before", "error_now", "gain"])
-        writer.writerows([row[:2] + [f"{value:.4g}" for value in row[2:]] for row in rows])
+    store(rows)
 
 
 if __name__ == "__main__":
