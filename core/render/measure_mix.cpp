@@ -154,6 +154,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   best.interior = choose(kInterior, block, &one, [&](const Renderer& r, SampleRange range) {
     return r.derive(Term::interior, stream, range)[0];
   });
+  // Paths of more bounces are found by walks alone, and what rare ones carry a trial cannot tell.
+  if (options.max_bounces != 1) return best;
   if (best.interior == 1)
     best.interior_rates = measure_rates(small, gates, options, one, Term::interior, stream, block);
   best.path_length_rates = measure_rates(small, gates, options, one, Term::path_length, stream, block);
