@@ -76,12 +76,9 @@ GatedImage blocks_of(const GatedImage& image, int size) {
   return sums;
 }
 
-/// Sum over blocks of pixels and gates of the variance between batches of images, and the work behind them.
-struct Trial {
-  double variance, work;
-};
+/// Sum over blocks of pixels and gates of the variance between batches of images, times the work behind them.
 template <class Estimate>
-Trial run_trial(const Renderer& renderer, int block, int batches, int samples, Estimate&& estimate) {
+double variance_and_work(const Renderer& renderer, int block, int batches, int samples, Estimate&& estimate) {
   std::vector<double> mean, squares;
   for (int b = 0; b < batches; ++b) {
     const GatedImage image = blocks_of(estimate(SampleRange{b * samples, (b + 1) * samples}), block);
@@ -95,7 +92,7 @@ Trial run_trial(const Renderer& renderer, int block, int batches, int samples, E
   }
   double sum = 0;
   for (double s : squares) sum += s;
-  return {sum, renderer.work()};
+  return sum * renderer.work();
 }
 
 /// The better rates of connections for a term's derivative along one column, in sums over blocks.
@@ -105,9 +102,8 @@ ConnectionRates measure_rates(const Scene& small, const GateSet& gates, Estimato
     options.mix = SamplingMix{1, 1, rates, rates};
     const Renderer renderer(small, gates, options, &column);
     if (!renderer.has(term)) return 0.0;
-    const Trial trial = run_trial(renderer, block, kRateBatches, kRateSamples,
-                                  [&](SampleRange range) { return renderer.derive(term, stream, range)[0]; });
-    return trial.variance * trial.work;
+    return variance_and_work(renderer, block, kRateBatches, kRateSamples,
+                             [&](SampleRange range) { return renderer.derive(term, stream, range)[0]; });
   };
   const double alike = cost(kAlike);
   return alike > 0 && cost(kMostlyCamera) < kClearlyFaster * alike ? kMostlyCamera : kAlike;
@@ -133,11 +129,10 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
       trial.numbers = Numbers::independent;
       const Renderer renderer(small, gates, trial, moving);
-      const Trial measured =
-          run_trial(renderer, block, batches,
-                    std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
-                    [&](SampleRange range) { return estimate(renderer, range); });
-      cost[i] = measured.variance * measured.work;
+      cost[i] =
+          variance_and_work(renderer, block, batches,
+                            std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
+                            [&](SampleRange range) { return estimate(renderer, range); });
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }

@@ -3,7 +3,7 @@
 //
 // Statistics: z-tests at 4.5 standard errors of the difference, of 21 figures (false alarms: 7e-6 each, 2e-4 for the
 // file), fixed seeds. Standard errors must be below 7 % of a derivative's scale, so that a technique that is counted
-// by the wrong rate fails: none brings less than a third of both terms.
+// by the wrong rate fails (seen for each of the three).
 #include <gtest/gtest.h>
 
 #include "core/render/measure_mix.h"
