@@ -27,7 +27,7 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, bool
     bool seen[2], dark = true;
     for (int i = 0; i < 2; ++i) {
       const Material& material = scene.material_of(edge.face[i]);
-      seen[i] = dot(scene.normal[edge.face[i]], a) <= kCoplanarAngle * isochron::length(a);
+      seen[i] = dot(scene.normal(edge.face[i]), a) <= kCoplanarAngle * isochron::length(a);
       dark &= !seen[i] && !material.two_sided && !scene.is_dielectric(edge.face[i]);
     }
     if (dark) return 0;
@@ -47,7 +47,7 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
     b.end = scene.scene.positions[e.vertex[1]];
     b.length = isochron::length(b.end - b.origin);
     bool degenerate = !(b.length > 0);
-    for (int i = 0; i < b.faces(); ++i) degenerate |= !(scene.area[b.face[i]] > 0);
+    for (int i = 0; i < b.faces(); ++i) degenerate |= !(scene.area(b.face[i]) > 0);
     if (degenerate) continue;
     b.tangent = (b.end - b.origin) / b.length;
     for (int i = 0; i < b.faces(); ++i) b.inward[i] = inward_direction(scene, b.face[i], e, b.tangent);
@@ -77,7 +77,7 @@ void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
     bool moves = false;
     for (int i = 0; i < 2; ++i) {
       b.face[i] = p.triangle[i];
-      b.inward[i] = normalize(cross(scene.normal[b.face[i]], b.tangent));
+      b.inward[i] = normalize(cross(scene.normal(b.face[i]), b.tangent));
       for (int v : scene.scene.triangles[b.face[i]].vertex) moves |= scene.moving.vertex[v] != 0;
     }
     // The angle between the planes takes the place of the wedge.
@@ -99,16 +99,16 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
     return;
   }
   // The line stays in both planes: n_b = a n_0 + c n_1 moves by a n_0 . (velocity of face 0) + c n_1 . (velocity of face 1).
-  const Vec3 &n0 = scene.normal[edge.face[0]], &n1 = scene.normal[edge.face[1]];
+  const Vec3 &n0 = scene.normal(edge.face[0]), &n1 = scene.normal(edge.face[1]);
   const Vec3 line = cross(n0, n1);
   const double cosine = dot(n0, n1), determinant = dot(line, line);
   const double of[2] = {dot(n_b, n0), dot(n_b, n1)};
   for (int i = 0; i < 2; ++i) {
-    const Vec3 g = scene.normal[edge.face[i]] * ((of[i] - cosine * of[1 - i]) / determinant);
-    const SurfacePoint y = scene.point_in_plane(edge.face[i], point.y);
+    const Vec3 g = scene.normal(edge.face[i]) * ((of[i] - cosine * of[1 - i]) / determinant);
+    const auto b = scene.barycentrics({point.y, {}, edge.face[i]});
     for (int k = 0; k < 3; ++k)
       if (const int v = scene.scene.triangles[edge.face[i]].vertex[k]; scene.moving.vertex[v])
-        out.vertices.push_back({v, g * y.b[k], {}});
+        out.vertices.push_back({v, g * b[k], {}});
   }
 }
 

@@ -216,6 +216,7 @@ class EllipsoidalConnections {
       bvh.query_surfaces(worker_.path.back().p, other.p, low, high, worker_.candidates);
     else
       bvh.sample_surfaces(focus(), other, low, high, thinning, worker_.candidates, worker_.inverse_probability);
+    for (const int t : worker_.candidates) scene_.prefetch(t);
     worker_.arcs += 1 + worker_.candidates.size();
   }
   /// The path's last vertex with the half space that it scatters into; the camera with its field of view.
@@ -245,7 +246,7 @@ class EllipsoidalConnections {
     const Ellipsoid spheres[2] = {{x.p, x.p, 2 * (target.tau[0] - before)}, {x.p, x.p, 2 * (target.tau[1] - before)}};
     ArcPair chosen;
     const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
-      if (!(dot(scene_.normal[t], x.p - scene_.corner(t, 0)) > 0) || ends_are_static(t)) return;
+      if (!(scene_.height_over(t, x.p) > 0) || ends_are_static(t)) return;
       for (int i = 0; i < 2; ++i)
         if (target.present[i] && spheres[i].valid())
           emitter_arc_point(spheres[i], t, along, pixel, throughput, arcs.side[i]);
@@ -296,8 +297,8 @@ class EllipsoidalConnections {
   void surface_arc_point(const Ellipsoid& ellipsoid, int t, const SurfacePoint& y, double along, int pixel,
                          const Rgb& factor, ArcPoint& out) const {
     EllipseArcs arcs;
-    if (!clip_ellipse(ellipsoid, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs)) return;
-    const SurfacePoint q = scene_.point_in_plane(t, arcs.point_at(along));
+    if (!scene_.clip(ellipsoid, t, arcs)) return;
+    const SurfacePoint q{arcs.point_at(along), scene_.normal(t), t};
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
     if (!scene_.outside(x, q)) return;
@@ -329,8 +330,8 @@ class EllipsoidalConnections {
   void emitter_arc_point(const Ellipsoid& sphere, int t, double along, int pixel, const Rgb& throughput,
                          ArcPoint& out) const {
     EllipseArcs arcs;
-    if (!clip_ellipse(sphere, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs)) return;
-    const SurfacePoint y = scene_.point_in_plane(t, arcs.point_at(along));
+    if (!scene_.clip(sphere, t, arcs)) return;
+    const SurfacePoint y{arcs.point_at(along), scene_.normal(t), t};
     const Path& path = worker_.path;
     const SurfacePoint& x = path.back();
     if (!scene_.outside(x, y)) return;

@@ -41,7 +41,7 @@ class PathOrigin {
 
  private:
   void add_shape(int triangle) {
-    const int shape = scene_.scene.triangles[triangle].shape;
+    const int shape = scene_.shape_index(triangle);
     if (std::find(shapes.begin(), shapes.end(), shape) == shapes.end()) shapes.push_back(shape);
   }
   const PreparedScene& scene_;

@@ -62,8 +62,8 @@ struct Path {
 
 /// Whether a path that ends at emitter point y after `path` can have a derivative.
 inline bool can_move(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
-  return path.moves[last] || scene.moving.triangle[emitter_triangle] ||
-         scene.moving.emission[scene.scene.triangles[emitter_triangle].shape];
+  return path.moves[last] || scene.has_moving_vertex(emitter_triangle) ||
+         scene.moving.emission[scene.shape_index(emitter_triangle)];
 }
 
 /// Cosines at a scattering vertex x between the neighbours `before` (camera side) and `after` (light side).

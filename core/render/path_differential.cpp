@@ -56,20 +56,20 @@ void let_flow(const CameraFlow::Follow& follow, const Vec3& ray, const Vec3& for
 /// Carries position and normal gradients of a vertex to its triangle's vertices.
 void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, bool material,
                  bool length_only, LocalDifferential& out) {
-  if (!scene.moving.triangle[x.triangle]) return;
+  if (!scene.has_moving_vertex(x.triangle)) return;
   const auto& vertex = scene.scene.triangles[x.triangle].vertex;
   // Rotation of the face normal, and d ln A of material points (paper Eq. 11).
   Vec3 through_cross = g.normal - x.n * dot(g.normal, x.n);
   if (material) through_cross += x.n;
-  through_cross = through_cross / (2 * scene.area[x.triangle]);
+  through_cross = through_cross / (2 * scene.area(x.triangle));
+  const auto b = scene.barycentrics(x);
+  const auto& edge = scene.edges(x.triangle);
+  const Vec3 opposite[3] = {edge[0] - edge[1], edge[1], -edge[0]};  // from the next but one corner to the next
   for (int i = 0; i < 3; ++i) {
     const int v = vertex[i];
     if (!scene.moving.vertex[v]) continue;
-    VertexGradient entry{v, g.position * x.b[i], g.length * x.b[i]};
-    if (!length_only) {
-      const Vec3 opposite = scene.scene.positions[vertex[(i + 1) % 3]] - scene.scene.positions[vertex[(i + 2) % 3]];
-      entry.log_f += cross(opposite, through_cross);
-    }
+    VertexGradient entry{v, g.position * b[i], g.length * b[i]};
+    if (!length_only) entry.log_f += cross(opposite[i], through_cross);
     out.vertices.push_back(entry);
   }
 }
@@ -116,7 +116,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
         for (int c = 0; c < 3; ++c)
           if (material.albedo[c] > 0) out.scalars.push_back({scene.layout.albedo(m, c), c, 1 / material.albedo[c]});
     }
-    const int s = scene.scene.triangles[x[count - 1].triangle].shape;
+    const int s = scene.shape_index(x[count - 1].triangle);
     if (scene.moving.emission[s])
       for (int c = 0; c < 3; ++c)
         if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
@@ -129,10 +129,11 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
 }
 
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
-  if (!scene.moving.triangle[x.triangle]) return;
+  if (!scene.has_moving_vertex(x.triangle)) return;
   const auto& vertex = scene.scene.triangles[x.triangle].vertex;
+  const auto b = scene.barycentrics(x);
   for (int i = 0; i < 3; ++i)
-    if (scene.moving.vertex[vertex[i]]) out.vertices.push_back({vertex[i], g * x.b[i], {}});
+    if (scene.moving.vertex[vertex[i]]) out.vertices.push_back({vertex[i], g * b[i], {}});
 }
 
 }  // namespace isochron

@@ -4,23 +4,6 @@
 
 namespace isochron {
 
-DiscreteDistribution::DiscreteDistribution(const std::vector<double>& weights) {
-  cumulative_.reserve(weights.size());
-  double sum = 0;
-  for (double w : weights) cumulative_.push_back(sum += w);
-}
-
-int DiscreteDistribution::sample(double& u) const {
-  const double target = u * total();
-  auto it = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-  // Rounding can carry the target to the very end, where trailing entries may have no weight.
-  if (it == cumulative_.end()) it = std::lower_bound(cumulative_.begin(), cumulative_.end(), total());
-  const int i = static_cast<int>(it - cumulative_.begin());
-  const double below = i ? cumulative_[i - 1] : 0;
-  u = std::clamp((target - below) / (cumulative_[i] - below), 0x1p-53, 1 - 0x1p-53);
-  return i;
-}
-
 MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
     : vertex(scene.positions.size(), 0),
       triangle(scene.triangles.size(), 0),
@@ -59,41 +42,37 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
       camera_flow(source, camera, moving, follow_radius),
       caster(source) {
   const std::size_t count = scene.triangles.size();
-  normal.resize(count);
-  area.resize(count);
   records_.resize(count);
-  emitter_pdf_.assign(count, 0);
   std::vector<EllipsoidBvh::Input> all, moved, emitting;
   all.reserve(count);
   std::vector<double> power;
   for (std::size_t i = 0; i < count; ++i) {
     const int t = static_cast<int>(i);
-    const Vec3 e1 = corner(t, 1) - corner(t, 0), e2 = corner(t, 2) - corner(t, 0), m = cross(e1, e2);
-    const double doubled = length(m);
-    area[t] = 0.5 * doubled;
+    const auto& v = scene.triangles[t].vertex;
+    const EllipsoidBvh::Input input{{scene.positions[v[0]], scene.positions[v[1]], scene.positions[v[2]]}, t};
     TriangleRecord& record = records_[t];
-    record.origin = corner(t, 0);
+    record.origin = input.vertex[0];
+    for (int k = 0; k < 2; ++k) record.edge[k] = input.vertex[k + 1] - record.origin;
+    const Vec3 normal = cross(record.edge[0], record.edge[1]);
+    const double doubled = length(normal);
+    record.area = 0.5 * doubled;
     record.shape = scene.triangles[t].shape;
     record.material = &scene.materials[scene.shapes[record.shape].material];
     if (is_dielectric(t)) {
       has_dielectric_ = true;
       least_index_ = std::min(least_index_, record.material->ior);
     }
-    record.moves = moving.triangle[t] || moving.scatters[t];
+    record.has_moving = moving.triangle[t];
+    record.moves = record.has_moving || moving.scatters[t];
     // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
-    if (doubled > 0) {
-      normal[t] = record.normal = m / doubled;
-      record.to_b1 = cross(e2, record.normal) / doubled;
-      record.to_b2 = cross(record.normal, e1) / doubled;
-    }
-    const EllipsoidBvh::Input input{{corner(t, 0), corner(t, 1), corner(t, 2)}, t};
+    if (doubled > 0) record.normal = normal / doubled;
     all.push_back(input);
     if (record.moves) moved.push_back(input);
-    if (!shape_of(t).emission.is_black() && area[t] > 0) {
+    if (!shape_of(t).emission.is_black() && record.area > 0) {
       record.emits = true;
       emitters.push_back(t);
       emitting.push_back(input);
-      power.push_back(area[t] * shape_of(t).emission.max());
+      power.push_back(record.area * shape_of(t).emission.max());
     }
   }
   all_triangles = EllipsoidBvh(all);
@@ -102,27 +81,13 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
 
   emitter_distribution_ = DiscreteDistribution(power);
   for (std::size_t i = 0; i < emitters.size(); ++i)
-    emitter_pdf_[emitters[i]] = emitter_distribution_.probability(static_cast<int>(i)) / area[emitters[i]];
+    records_[emitters[i]].emitter_pdf = emitter_distribution_.probability(static_cast<int>(i)) / area(emitters[i]);
   for (const Shape& shape : scene.shapes) {
     if (shape.emission.is_black()) continue;
     Bounds bounds;
     for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) bounds.add(scene.positions[v]);
     emitter_bounds_.push_back(bounds);
   }
-}
-
-SurfacePoint PreparedScene::sample_emitter(double u0, double u1, double u2, double& pdf) const {
-  const int t = emitters[emitter_distribution_.sample(u0)];
-  const double root = std::sqrt(u1);
-  SurfacePoint y;
-  y.triangle = t;
-  y.b[0] = 1 - root;
-  y.b[1] = root * (1 - u2);
-  y.b[2] = root * u2;
-  y.p = corner(t, 0) * y.b[0] + corner(t, 1) * y.b[1] + corner(t, 2) * y.b[2];
-  y.n = normal[t];
-  pdf = emitter_pdf_[t];
-  return y;
 }
 
 double PreparedScene::distance_to_emitters(const Vec3& p) const {

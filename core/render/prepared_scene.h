@@ -1,11 +1,15 @@
 // What the estimators need of a scene at one value of the parameters, computed once.
 #pragma once
+#include <algorithm>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "core/geometry/bounds.h"
+#include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
+#include "core/math/discrete_distribution.h"
 #include "core/render/camera_flow.h"
 #include "core/render/camera_model.h"
 #include "core/render/ray_caster.h"
@@ -13,41 +17,26 @@
 
 namespace isochron {
 
-/// A point on a triangle; barycentrics weigh the triangle's three vertices.
+/// A point on a triangle.
 struct SurfacePoint {
   Vec3 p;
   Vec3 n;  ///< unit face normal
   int triangle = -1;
-  double b[3] = {0, 0, 0};
 };
 
-/// What a ray that meets a triangle asks for, side by side in memory: two cache lines, the first of which decides
-/// where the ray ends and how it goes on.
+/// What paths ask of a triangle, side by side in memory: two cache lines, the first of which decides where a ray ends and how
+/// it goes on. On a fine mesh each is a wait for main memory.
 struct alignas(64) TriangleRecord {
   Vec3 normal;  ///< unit; zero when the triangle has no area
   Vec3 origin;  ///< corner 0
   const Material* material = nullptr;
   int shape = -1;
   bool emits = false;
-  bool moves = false;  ///< a path through the triangle can have a derivative
-  Vec3 to_b1, to_b2;   ///< barycentrics of p in the plane: b[i] = to_bi . (p - origin)
-};
-
-/// Discrete distribution by cumulative sums.
-class DiscreteDistribution {
- public:
-  DiscreteDistribution() = default;
-  explicit DiscreteDistribution(const std::vector<double>& weights);
-  bool empty() const { return total() <= 0; }
-  double total() const { return cumulative_.empty() ? 0 : cumulative_.back(); }
-  /// Probability of all indices before i.
-  double below(int i) const { return (i ? cumulative_[i - 1] : 0) / total(); }
-  double probability(int i) const { return (cumulative_[i] - (i ? cumulative_[i - 1] : 0)) / total(); }
-  /// Index drawn in proportion to its weight; `u` in (0, 1) is replaced by a fresh uniform number.
-  int sample(double& u) const;
-
- private:
-  std::vector<double> cumulative_;
+  bool moves = false;       ///< a path through the triangle can have a derivative
+  bool has_moving = false;  ///< vertices
+  Vec3 edge[2];             ///< corners 1 and 2 from corner 0
+  double area = 0;
+  double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
 };
 
 /// Which degrees of freedom move. Everything else is skipped by the derivative passes.
@@ -72,14 +61,12 @@ class PreparedScene {
   MovingParts moving;
   CameraFlow camera_flow;
   RayCaster caster;
-  std::vector<Vec3> normal;   ///< per triangle, unit
-  std::vector<double> area;   ///< per triangle
   std::vector<int> emitters;  ///< triangles that emit
   EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
 
-  const Shape& shape_of(int triangle) const { return scene.shapes[records_[triangle].shape]; }
+  int shape_index(int triangle) const { return records_[triangle].shape; }
+  const Shape& shape_of(int triangle) const { return scene.shapes[shape_index(triangle)]; }
   const Material& material_of(int triangle) const { return *records_[triangle].material; }
-  const Vec3& corner(int triangle, int i) const { return scene.positions[scene.triangles[triangle].vertex[i]]; }
 
   /// Radiance that leaves the point towards the unit direction w; black on the back of an emitter.
   Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
@@ -106,14 +93,53 @@ class PreparedScene {
   /// Lower bound of the optical length of any path over the distance between its ends.
   double least_index() const { return least_index_; }
 
+  /// Unit; zero when the triangle has no area.
+  const Vec3& normal(int triangle) const { return records_[triangle].normal; }
+  double area(int triangle) const { return records_[triangle].area; }
   bool emits(int triangle) const { return records_[triangle].emits; }
   /// Whether a path through the triangle can have a derivative because of it.
   bool moves(int triangle) const { return records_[triangle].moves; }
+  /// Whether one of its vertices moves.
+  bool has_moving_vertex(int triangle) const { return records_[triangle].has_moving; }
 
   /// Uniform by area x radiance over the emitters; `pdf` per area.
-  SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const;
-  double emitter_pdf(int triangle) const { return emitter_pdf_[triangle]; }
+  SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const {
+    const int t = pick_emitter(u0);
+    pdf = emitter_pdf(t);
+    return point_on_emitter(t, u1, u2);
+  }
+  /// The same in two steps, so that the emitter's record is on its way from memory while something else is done.
+  int pick_emitter(double u) const {
+    const int t = emitters[emitter_distribution_.sample(u)];
+    prefetch(t);
+    return t;
+  }
+  SurfacePoint point_on_emitter(int triangle, double u1, double u2) const {
+    const TriangleRecord& r = records_[triangle];
+    return {r.origin + (r.edge[0] * (1 - u2) + r.edge[1] * u2) * std::sqrt(u1), r.normal, triangle};
+  }
+  /// Asks for the triangle's record early.
+  void prefetch(int triangle) const {
+    const char* address = reinterpret_cast<const char*>(&records_[triangle]);
+    __builtin_prefetch(address);
+    __builtin_prefetch(address + 64);
+  }
+  double emitter_pdf(int triangle) const { return records_[triangle].emitter_pdf; }
 
+  /// Edges from corner 0 to corners 1 and 2.
+  const Vec3 (&edges(int triangle) const)[2] { return records_[triangle].edge; }
+  /// Weights of the triangle's three vertices at x.
+  std::array<double, 3> barycentrics(const SurfacePoint& x) const {
+    const TriangleRecord& r = records_[x.triangle];
+    const Vec3 d = x.p - r.origin, n = r.normal / (2 * r.area);
+    const double b1 = dot(cross(d, r.edge[1]), n), b2 = dot(cross(r.edge[0], d), n);
+    return {1 - b1 - b2, b1, b2};
+  }
+  /// What the ellipsoid's surface leaves on the triangle; false for nothing.
+  bool clip(const Ellipsoid& ellipsoid, int triangle, EllipseArcs& arcs) const {
+    const TriangleRecord& r = records_[triangle];
+    return clip_ellipse(ellipsoid, r.origin, r.origin + r.edge[0], r.origin + r.edge[1], arcs);
+  }
   /// Signed distance of p from the triangle's plane, positive on the normal's side.
   double height_over(int triangle, const Vec3& p) const {
     const TriangleRecord& r = records_[triangle];
@@ -123,14 +149,7 @@ class PreparedScene {
   SurfacePoint point_on_triangle(int triangle, const Vec3& origin, const Vec3& direction) const {
     const TriangleRecord& r = records_[triangle];
     const double distance = dot(r.normal, r.origin - origin) / dot(r.normal, direction);
-    return point_in_plane(triangle, origin + direction * distance);
-  }
-  /// The triangle's point nearest to being p: barycentrics of p, which lies in its plane.
-  SurfacePoint point_in_plane(int triangle, const Vec3& p) const {
-    const TriangleRecord& r = records_[triangle];
-    const Vec3 d = p - r.origin;
-    const double b1 = dot(r.to_b1, d), b2 = dot(r.to_b2, d);
-    return {p, r.normal, triangle, {1 - b1 - b2, b1, b2}};
+    return {origin + direction * distance, r.normal, triangle};
   }
 
   /// First surface point from `x` (offset off its surface) along the unit direction w.
@@ -170,7 +189,6 @@ class PreparedScene {
   }
 
   std::vector<TriangleRecord> records_;
-  std::vector<double> emitter_pdf_;
   std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;
   bool has_dielectric_ = false;

@@ -24,18 +24,18 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
     const Vec3 inward = edge.inward[i] * sign;
     const double across = dot(inward, side);
     // A face seen edge-on takes no part of the image: what lies behind it is seen beside the edge.
-    if (!(across > 0) || std::abs(dot(scene.normal[edge.face[i]], d)) <= kCoplanarAngle) continue;
+    if (!(across > 0) || std::abs(dot(scene.normal(edge.face[i]), d)) <= kCoplanarAngle) continue;
     const double slope = dot(inward, d) / across;  // depth gained per distance beside the edge
     if (front < 0 || slope < front_slope) front = edge.face[i], front_slope = slope, into_front = inward;
   }
   // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the
   // edge start within a surface, or behind one.
   const double offset = scene.caster.offset();
-  if (front >= 0) return scene.point_in_plane(front, y + into_front * offset);
+  if (front >= 0) return SurfacePoint{y + into_front * offset, scene.normal(front), front};
   ++worker.rays;
   const Vec3 beside = normalize(y + side * offset - scene.camera.position);
   const int t = scene.caster.first_triangle(scene.camera.position, beside);
-  if (t < 0 || dot(scene.normal[t], beside) == 0) return std::nullopt;
+  if (t < 0 || dot(scene.normal(t), beside) == 0) return std::nullopt;
   return scene.point_on_triangle(t, scene.camera.position, beside);
 }
 
@@ -80,7 +80,7 @@ class PrimaryBoundary {
     // Off the faces, to the camera's side of each, so that the edge does not hide itself.
     Vec3 off = -d;
     for (int i = 0; i < edge->faces(); ++i)
-      off += scene_.normal[edge->face[i]] * std::copysign(1.0, -dot(scene_.normal[edge->face[i]], d));
+      off += scene_.normal(edge->face[i]) * std::copysign(1.0, -dot(scene_.normal(edge->face[i]), d));
     ++worker_.rays;
     if (scene_.caster.occluded(scene_.camera.position, y + off * scene_.caster.offset())) return;
 

@@ -284,26 +284,17 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
   if (!impl_->has(term)) return;
   if (term == Term::visibility) impl_->learn();
-  std::vector<int> active(impl_->scene.layout.size(), -1);
-  std::vector<int> dofs;
-  for (int dof = 0; dof < impl_->scene.layout.size(); ++dof)
-    if (impl_->basis->moves(dof)) {
-      active[dof] = static_cast<int>(dofs.size());
-      dofs.push_back(dof);
-    }
   const GatePick pick(impl_->gates, adjoint);
-  const int strands = strand_count(dofs.size());
-  std::vector<std::vector<double>> gradients(strands);
+  const int strands = strand_count(dof_gradient.size());
+  std::vector<SparseSum> gradients(strands);
   parallel(strands, [&](int strand) {
-    std::vector<double> own(dofs.size(), 0.0);
+    SparseSum own(dof_gradient.size());
     Worker worker(impl_->scene, impl_->gates, impl_->options, pick,
-                  AdjointSink(impl_->gates, impl_->scene.layout, active, adjoint, own));
+                  AdjointSink(impl_->gates, impl_->scene.layout, *impl_->basis, adjoint, own));
     impl_->run_term(term, worker, strand, strands, stream, range);
     gradients[strand] = std::move(own);
   });
-  std::vector<double> sum(dofs.size(), 0.0);
-  merge(gradients, sum);
-  for (std::size_t i = 0; i < dofs.size(); ++i) dof_gradient[dofs[i]] += sum[i];
+  merge(gradients, dof_gradient);
 }
 
 ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) const {

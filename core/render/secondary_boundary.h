@@ -124,7 +124,7 @@ class SecondaryBoundary {
   }
 
   bool faces(int triangle, const Vec3& w) const {
-    return dot(scene_.normal[triangle], w) > 0 || scene_.material_of(triangle).two_sided ||
+    return dot(scene_.normal(triangle), w) > 0 || scene_.material_of(triangle).two_sided ||
            scene_.is_dielectric(triangle);
   }
 
@@ -285,10 +285,10 @@ class SecondaryBoundary {
     Vec3 n, a, c;
     double height;  ///< of D above the plane
     ShadowLine(const PreparedScene& scene, const Vec3& d, const BoundaryEdge& edge, int emitter)
-        : n(scene.normal[emitter]),
+        : n(scene.normal(emitter)),
           a(edge.origin - d),
           c(edge.end - edge.origin),
-          height(dot(n, d - scene.corner(emitter, 0))) {}
+          height(scene.height_over(emitter, d)) {}
     /// The edge lies between D and the plane.
     bool casts(double s) const {
       const double towards = -dot(n, a + c * s);
@@ -310,7 +310,7 @@ class SecondaryBoundary {
     const int t = g.light.triangle;
     const Warp& warp = camera_warp(c.pixel, c.bounces);
     const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
-    return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area[t] *
+    return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area(t) *
            worker_.pick.length_pdf(c.pixel, c.length + g.r_d + g.r_s) * line.distance_rate(g.y.s);
   }
 

@@ -10,6 +10,7 @@
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/render/path_differential.h"
+#include "core/render/sparse_sum.h"
 
 namespace isochron {
 
@@ -124,10 +125,10 @@ class TangentSink {
 class AdjointSink {
  public:
   static constexpr bool kDifferential = true;
-  /// `active[dof]` is the dof's place in `gradient`, or -1 where it does not move. `adjoint` is dLoss/dImage.
-  AdjointSink(const GateSet& gates, const DofLayout& layout, const std::vector<int>& active, const GatedImage& adjoint,
-              std::span<double> gradient)
-      : gates_(gates), layout_(layout), active_(active), adjoint_(adjoint), gradient_(gradient) {}
+  /// `adjoint` is dLoss/dImage; `gradient` gets the degrees of freedom that the basis moves.
+  AdjointSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, const GatedImage& adjoint,
+              SparseSum& gradient)
+      : gates_(gates), layout_(layout), basis_(basis), adjoint_(adjoint), gradient_(gradient) {}
 
   void bind(const LocalDifferential& differential) { differential_ = &differential; }
 
@@ -158,18 +159,18 @@ class AdjointSink {
     if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
     for (const VertexGradient& v : differential_->vertices)
       for (int axis = 0; axis < 3; ++axis)
-        if (const int i = active_[layout_.vertex(v.vertex, axis)]; i >= 0)
-          gradient_[i] += sum * v.log_f[axis] + slope_weight * v.length[axis];
+        if (const int dof = layout_.vertex(v.vertex, axis); basis_.moves(dof))
+          gradient_.add(dof, sum * v.log_f[axis] + slope_weight * v.length[axis]);
     for (const ScalarGradient& s : differential_->scalars)
-      if (const int i = active_[s.dof]; i >= 0)
-        gradient_[i] += (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length;
+      if (basis_.moves(s.dof))
+        gradient_.add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
   }
 
   const GateSet& gates_;
   const DofLayout layout_;
-  const std::vector<int>& active_;
+  const TangentBasis& basis_;
   const GatedImage& adjoint_;
-  std::span<double> gradient_;
+  SparseSum& gradient_;
   const LocalDifferential* differential_ = nullptr;
 };
 

@@ -33,15 +33,15 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
   };
 
   if (scene.emits(path.back().triangle)) seen_emission(1);
+  int light = scene.pick_emitter(rng.uniform());
   for (int bounce = 1; bounce <= max_bounces; ++bounce) {
     if (path.length.back() + scene.distance_to_emitters(path.back().p) > reach.upper) break;
     const SurfacePoint& x = path.back();
     const Material& material = scene.material_of(x.triangle);
 
     // Next-event estimation.
-    const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-    double pdf_area;
-    const SurfacePoint y = scene.sample_emitter(u0, u1, u2, pdf_area);
+    const double u1 = rng.uniform(), u2 = rng.uniform();
+    const SurfacePoint y = scene.point_on_emitter(light, u1, u2);
     const Scattering s(x, w_o, distance_o, y.p);
     const double scattered = s.lobe(material) * std::abs(s.cos_i);
     const double cos_y = -dot(y.n, s.w_i);
@@ -51,19 +51,22 @@ void walk_standard(W& worker, Path& path, int max_bounces, LengthRange reach, Rn
       path.push(scene, y, s.distance_i);
       if (visitor.wants() && worker.visible(x, y))
         visitor.take(throughput * material.albedo * scene.shape_of(y.triangle).emission *
-                     (scattered * to_area / (pdf_area + pdf_bsdf)));
+                     (scattered * to_area / (scene.emitter_pdf(light) + pdf_bsdf)));
       path.pop();
     }
 
     // BSDF sampling.
-    const auto next = step(worker, x, w_o, throughput, rng);
+    const auto next = turn(scene, x, w_o, throughput, rng);
     if (!next) break;
+    if (bounce < max_bounces) light = scene.pick_emitter(rng.uniform());
+    const auto hit = worker.trace(x, next->direction);
+    if (!hit) break;
     w_o = -next->direction;
-    distance_o = length(next->point.p - x.p);
-    path.push(scene, next->point, distance_o);
-    if (scene.emits(next->point.triangle)) {
-      const double pdf_bsdf = next->pdf * std::abs(dot(next->point.n, w_o)) / (distance_o * distance_o);
-      seen_emission(pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(next->point.triangle)));
+    distance_o = length(hit->p - x.p);
+    path.push(scene, *hit, distance_o);
+    if (scene.emits(hit->triangle)) {
+      const double pdf_bsdf = next->pdf * std::abs(dot(hit->n, w_o)) / (distance_o * distance_o);
+      seen_emission(pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(hit->triangle)));
     }
     if (bounce < max_bounces && !survives(throughput, bounce, rng)) break;
   }

@@ -91,9 +91,7 @@ class Techniques {
   double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const {
     const double distance = length(y.p - q.p);
     EllipseArcs arcs;
-    const int t = y.triangle;
-    if (!clip_ellipse({q.p, q.p, 2 * distance}, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
-      return 0;
+    if (!scene_.clip({q.p, q.p, 2 * distance}, y.triangle, arcs)) return 0;
     return 1 / (arcs.total_span * distance);
   }
 
@@ -101,10 +99,7 @@ class Techniques {
   double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const {
     const Ellipsoid ellipsoid(x.p, y.p, length(q.p - x.p) + length(q.p - y.p));
     EllipseArcs arcs;
-    const int t = q.triangle;
-    if (!ellipsoid.valid() ||
-        !clip_ellipse(ellipsoid, scene_.corner(t, 0), scene_.corner(t, 1), scene_.corner(t, 2), arcs))
-      return 0;
+    if (!ellipsoid.valid() || !scene_.clip(ellipsoid, q.triangle, arcs)) return 0;
     return 1 / (arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n));
   }
 

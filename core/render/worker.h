@@ -90,23 +90,36 @@ struct Worker {
   }
 };
 
-struct Step {
-  SurfacePoint point;
-  Vec3 direction;  ///< unit, from the vertex before to the point
+struct Turn {
+  Vec3 direction;  ///< unit
   double pdf;      ///< per solid angle
 };
 
-/// Goes on from x, which looks back along the unit vector w_back, by BSDF sampling. Empty when the walk ends.
-template <class W>
-std::optional<Step> step(W& worker, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput, Rng& rng,
-                         Walk walk = Walk::towards_light) {
-  const Material& material = worker.scene.material_of(x.triangle);
+/// How a walk goes on from x, which looks back along the unit vector w_back, by BSDF sampling. Empty where it ends.
+inline std::optional<Turn> turn(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput,
+                                Rng& rng, Walk walk = Walk::towards_light) {
+  const Material& material = scene.material_of(x.triangle);
   const double u0 = rng.uniform(), u1 = rng.uniform();
   const double u2 = material.type == MaterialType::rough_dielectric ? rng.uniform() : 0;
   const auto next = sample_direction(material, x.n, w_back, u0, u1, u2, walk);
   if (!next) return std::nullopt;
   throughput *= material.albedo * next->weight;
   if (throughput.is_black()) return std::nullopt;
+  return Turn{next->direction, next->pdf};
+}
+
+struct Step {
+  SurfacePoint point;
+  Vec3 direction;  ///< unit, from the vertex before to the point
+  double pdf;      ///< per solid angle
+};
+
+/// The same with the point that the walk arrives at.
+template <class W>
+std::optional<Step> step(W& worker, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput, Rng& rng,
+                         Walk walk = Walk::towards_light) {
+  const auto next = turn(worker.scene, x, w_back, throughput, rng, walk);
+  if (!next) return std::nullopt;
   const auto hit = worker.trace(x, next->direction);
   if (!hit) return std::nullopt;
   return Step{*hit, next->direction, next->pdf};

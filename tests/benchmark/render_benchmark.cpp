@@ -118,7 +118,7 @@ class FourVertices {
       const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
       const SurfacePoint y = prepared.sample_emitter(u0, u1, u2, pdf);
       const auto& between = points[static_cast<std::size_t>(rng.uniform() * static_cast<double>(points.size()))];
-      if (prepared.moving.triangle[x.triangle] || prepared.moving.triangle[between.triangle])
+      if (prepared.has_moving_vertex(x.triangle) || prepared.has_moving_vertex(between.triangle))
         paths.push_back({eye_, x, between, y});
     }
   }
@@ -152,12 +152,11 @@ void BM_AdjointScatter(benchmark::State& state) {
   std::vector<LocalDifferential> differentials(four.paths.size());
   for (std::size_t i = 0; i < four.paths.size(); ++i)
     differentiate_path(four.prepared, four.paths[i].data(), 4, false, differentials[i]);
-  std::vector<int> active(static_cast<std::size_t>(four.prepared.layout.size()));
-  for (std::size_t dof = 0; dof < active.size(); ++dof) active[dof] = static_cast<int>(dof);
+  const TangentBasis basis = all_vertices(scene);
   GatedImage adjoint(scene.camera.width, scene.camera.height, gates.size(), 1);
   std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
-  std::vector<double> gradient(active.size());
-  AdjointSink sink(gates, four.prepared.layout, active, adjoint, gradient);
+  SparseSum gradient(static_cast<std::size_t>(four.prepared.layout.size()));
+  AdjointSink sink(gates, four.prepared.layout, basis, adjoint, gradient);
   std::size_t i = 0;
   for (auto _ : state) {
     sink.bind(differentials[i]);
@@ -165,7 +164,11 @@ void BM_AdjointScatter(benchmark::State& state) {
              GateWeights{});
     i = (i + 1) % four.paths.size();
   }
-  benchmark::DoNotOptimize(gradient.data());
+  std::vector<SparseSum> parts(1);
+  parts[0] = std::move(gradient);
+  std::vector<double> sum(static_cast<std::size_t>(four.prepared.layout.size()));
+  merge(parts, sum);
+  benchmark::DoNotOptimize(sum.data());
 }
 BENCHMARK(BM_AdjointScatter)->ArgName("large")->Arg(0)->Arg(1);
 

@@ -51,7 +51,7 @@ TEST(BoundaryEdges, OfACube) {
     for (int i = 0; i < 2; ++i) {
       // Along the face, off the edge, towards the cube's middle.
       EXPECT_NEAR(dot(e.inward[i], e.tangent), 0, 1e-14);
-      EXPECT_NEAR(dot(e.inward[i], prepared.normal[e.face[i]]), 0, 1e-14);
+      EXPECT_NEAR(dot(e.inward[i], prepared.normal(e.face[i])), 0, 1e-14);
       EXPECT_NEAR(length(e.inward[i]), 1, 1e-14);
       EXPECT_LT(dot(e.inward[i], s.y), -0.9);
     }

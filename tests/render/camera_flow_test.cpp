@@ -71,7 +71,7 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
     SurfacePoint x[3];
     x[0].p = camera.position;
     x[1] = prepared.point_on_triangle(0, camera.position, camera.direction(at_image[0], at_image[1]));
-    x[2] = prepared.point_in_plane(1, second(scene.positions));
+    x[2] = {second(scene.positions), prepared.normal(1), 1};
     const double distance = length(x[2].p - x[1].p), depth = dot(x[1].p - x[0].p, camera.forward);
     const double expected_weight =
         std::pow(std::max(0.0, 1 - std::pow(distance / (radius * camera.pixel_size() * depth), 2)), 2);

@@ -142,13 +142,9 @@ std::vector<SurfacePoint> surface_points(const PreparedScene& scene, const PathS
   x.push_back(scene.point_on_triangle(spec.triangle[0], spec.camera, spec.ray));
   for (std::size_t k = 1; k < spec.triangle.size(); ++k) {
     const int t = spec.triangle[k];
-    SurfacePoint p;
-    for (int i = 0; i < 3; ++i) {
-      p.b[i] = spec.b[k][i];
-      p.p += scene.corner(t, i) * p.b[i];
-    }
-    p.n = scene.normal[t];
-    p.triangle = t;
+    SurfacePoint p{{}, scene.normal(t), t};
+    for (int i = 0; i < 3; ++i) p.p += scene.scene.positions[scene.scene.triangles[t].vertex[i]] * spec.b[k][i];
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(scene.barycentrics(p)[i], spec.b[k][i], 1e-12);
     x.push_back(p);
   }
   return x;
@@ -324,7 +320,7 @@ TEST_P(PathDifferential, AgreesWithJets) {
       const PreparedScene prepared(scene, &basis);
       for (int k = 0; k + 1 < count; ++k) {
         rough += prepared.material_of(spec.triangle[k]).type != MaterialType::diffuse;
-        if (k == 0) from_behind += dot(prepared.normal[spec.triangle[0]], spec.ray) > 0;
+        if (k == 0) from_behind += dot(prepared.normal(spec.triangle[0]), spec.ray) > 0;
       }
 
       const Gradients expected = by_jets(scene, spec);

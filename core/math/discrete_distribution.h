@@ -1,0 +1,59 @@
+// A random choice in proportion to given weights.
+#pragma once
+#include <algorithm>
+#include <vector>
+
+namespace isochron {
+
+/// Discrete distribution by cumulative sums. A larger random number draws the same or a larger index, so that points that
+/// are spread evenly stay so.
+class DiscreteDistribution {
+ public:
+  DiscreteDistribution() = default;
+  /// Weights are finite and not negative.
+  explicit DiscreteDistribution(const std::vector<double>& weights) {
+    below_.reserve(weights.size() + 1);
+    for (double w : weights) below_.push_back(below_.back() + w);
+  }
+  bool empty() const { return total() <= 0; }
+  double total() const { return below_.back(); }
+  /// Probability of all indices before i.
+  double below(int i) const { return below_[i] / total(); }
+  double probability(int i) const { return (below_[i + 1] - below_[i]) / total(); }
+
+  /// Index drawn in proportion to its weight, of a distribution that is not empty; `u` in (0, 1) is replaced by a fresh
+  /// uniform number.
+  int sample(double& u) const {
+    const double target = u * total();
+    // Were all weights alike it would be this one: then a draw waits for memory once, not for every step of a search.
+    int i = std::min(static_cast<int>(u * size()), size() - 1);
+    if (!(below_[i] <= target && target < below_[i + 1])) i = search(target, i);
+    u = std::clamp((target - below_[i]) / (below_[i + 1] - below_[i]), 0x1p-53, 1 - 0x1p-53);
+    return i;
+  }
+
+ private:
+  int size() const { return static_cast<int>(below_.size()) - 1; }
+
+  /// The index whose share holds `target`, looked for in steps that double away from `guess`.
+  int search(double target, int guess) const {
+    int low = guess, high = guess;  // below_[low] <= target < below_[high], or `high` is the end
+    for (int step = 1; low > 0 && target < below_[low]; step *= 2) {
+      high = low;
+      low = std::max(low - step, 0);
+    }
+    for (int step = 1; high < size() && below_[high] <= target; step *= 2) {
+      low = high;
+      high = std::min(high + step, size());
+    }
+    const auto begin = below_.begin();
+    auto after = std::upper_bound(begin + low, begin + high + 1, target);
+    // Rounding can carry the target to the very end, where trailing entries may have no weight.
+    if (after == below_.end()) after = std::lower_bound(begin, below_.end(), total());
+    return static_cast<int>(after - begin) - 1;
+  }
+
+  std::vector<double> below_{0.0};  ///< [i]: sum of the weights before index i; one more than weights
+};
+
+}  // namespace isochron
