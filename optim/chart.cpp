@@ -52,9 +52,8 @@ double best_of(const Chart& chart) {
   return best;
 }
 
-ChartMethod climb(const Experiment& experiment, const Method& method, const std::vector<double>& theta,
-                  const GatedImage& target, double core_seconds, const Poll& poll) {
-  MethodRun run(experiment, method);
+ChartMethod climb(MethodRun& run, const Method& method, const std::vector<double>& theta, const GatedImage& target,
+                  double core_seconds, const Poll& poll) {
   const int unknowns = run.problem().parameters().size();
   if (method.gradient != Method::Gradient::adjoint) run.set_components(spread_components(unknowns, kMostComponents));
   const SampleTrial trial = try_samples(run, theta, target, kRepeats, core_seconds, poll);
@@ -129,10 +128,20 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
                     "another point (--at), or more time (--seconds)",
                     chart.reference.norm2.value, chart.reference.norm2.standard_error));
   const std::vector<Method> methods = methods_for(experiment, options.steps, chart.notes);
-  const double each = (1 - kReferenceShare) * options.core_seconds / static_cast<double>(methods.size());
-  for (const Method& method : methods) {
-    options.progress(method.name);
-    ChartMethod row = climb(experiment, method, theta, target, each, options.poll);
+  std::deque<MethodRun> runs;
+  for (const Method& method : methods) runs.emplace_back(experiment, method);
+  const std::vector<std::size_t> first = first_alike(runs, methods, "", chart.notes);
+  std::size_t different = 0;
+  for (std::size_t m = 0; m < runs.size(); ++m) different += first[m] == m;
+  const double each = (1 - kReferenceShare) * options.core_seconds / static_cast<double>(different);
+  for (std::size_t m = 0; m < runs.size(); ++m) {
+    if (first[m] < m) {
+      chart.methods.push_back(chart.methods[first[m]]);
+      chart.methods.back().name = methods[m].name;
+      continue;
+    }
+    options.progress(methods[m].name);
+    ChartMethod row = climb(runs[m], methods[m], theta, target, each, options.poll);
     const std::vector<int> components = spread_components(chart.unknowns, row.components);
     const double scale = static_cast<double>(chart.unknowns) / row.components;
     // A squared loss has a gradient whose mean does not depend on the number of samples.

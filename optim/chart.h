@@ -1,10 +1,10 @@
 // The work-precision chart: what each way to the loss gradient costs on one experiment, at one point.
 //
-// Every method climbs a ladder of sample counts, each rung twice the one below (the experiment's samples
-// times a power of two), with as many independent repeats as the rung's share of the time allows. All see one
-// target image, and are compared with one reference: `auto` with other random numbers and far more samples.
-// Costs are CPU seconds of the process, all threads; the renderings of the target and the trial by which
-// `auto` chooses are not counted.
+// Every method climbs a ladder of sample counts, each rung twice the one below (the experiment's samples times a power of
+// two), with as many independent repeats as the rung's share of the time allows. Methods that come down to the same
+// estimator, as `auto` may to another one, are measured once. All see one target image, and are compared with one reference:
+// `auto` with other random numbers and far more samples. Costs are CPU seconds of the process, all threads; the renderings of
+// the target and the trial by which `auto` chooses are not counted.
 #pragma once
 #include <string>
 #include <vector>

@@ -110,6 +110,30 @@ MethodRun::MethodRun(Experiment experiment, const Method& method)
   problem_.estimator();  // its trial is no part of a gradient's time
 }
 
+bool MethodRun::same_as(const MethodRun& other) const {
+  if (kind_ != Method::Gradient::adjoint || other.kind_ != kind_) return false;
+  const auto settled = [](const Problem& problem) {
+    EstimatorOptions options = problem.estimator();
+    options.mix = sampling_mix(options, problem.gates());
+    options.sampling = Sampling::automatic;
+    return options;
+  };
+  return settled(problem_) == settled(other.problem_);
+}
+
+std::vector<std::size_t> first_alike(const std::deque<MethodRun>& runs, const std::vector<Method>& methods,
+                                     const std::string& where, std::vector<std::string>& notes) {
+  std::vector<std::size_t> first;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    std::size_t j = 0;
+    while (j < i && !runs[i].same_as(runs[j])) ++j;
+    first.push_back(j);
+    if (j < i)
+      notes.push_back(fmt::format("{}{} comes down to {}: measured once", where, methods[i].name, methods[j].name));
+  }
+  return first;
+}
+
 double MethodRun::least_factor() const {
   int least = samples_.primal;
   if (kind_ != Method::Gradient::finite_difference)

@@ -1,6 +1,7 @@
 // Ways to a gradient, to be compared on one experiment: settings of the same renderer.
 #pragma once
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -45,6 +46,8 @@ class MethodRun {
   MethodRun(Experiment experiment, const Method& method);
 
   Problem& problem() { return problem_; }
+  /// Whether the two give the same estimates: adjoint gradients by estimators that come down to the same settings.
+  bool same_as(const MethodRun& other) const;
   /// The smallest factor at which every term that is not left out still has a sample.
   double least_factor() const;
   /// From now on every term takes `factor` times the experiment's samples, rounded, 1 at least.
@@ -78,6 +81,11 @@ class MethodRun {
   SampleSpec samples_;
   std::vector<int> components_;
 };
+
+/// For each the first that is the same, itself where none is before it. Names those that are not themselves in `notes`,
+/// after `where`.
+std::vector<std::size_t> first_alike(const std::deque<MethodRun>& runs, const std::vector<Method>& methods,
+                                     const std::string& where, std::vector<std::string>& notes);
 
 /// Core-seconds of a gradient with the least number of samples, twice as many and so on.
 struct SampleTrial {

@@ -170,28 +170,32 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     map.notes.push_back(fmt::format("{} unknowns: no finite differences", theta.size()));
   }
   const double of_width = options.core_seconds / static_cast<double>(options.widths.size());
-  const double of_gradient = (1 - kReferenceShare - kTargetShare) * of_width / static_cast<double>(methods.size()) /
-                             (kEstimates + options.iterations);
   for (double width : options.widths) {
     options.progress(fmt::format("width {:.3g}", width));
     Experiment narrow = experiment;
     narrow.gates = with_relative_width(experiment.gates, width);
     const GatedImage target = quick_target(narrow, kTargetShare * of_width, options.poll);
     const Reference reference = make_reference(narrow, theta, target, kReferenceShare * of_width, options.poll);
-    // All take the time that the slowest needs for its least number of samples, if that is more.
     std::deque<MethodRun> runs;
-    double time = of_gradient;
-    for (const Method& method : methods) {
-      MethodRun& run = runs.emplace_back(narrow, method);
-      run.set_factor(run.least_factor());
-      time = std::max(time, run.gradient(theta, target, 0, options.poll).core_seconds);
-    }
+    for (const Method& method : methods) runs.emplace_back(narrow, method);
+    const std::vector<std::size_t> first = first_alike(runs, methods, fmt::format("width {:.3g}: ", width), map.notes);
+    // All take the time that the slowest needs for its least number of samples, if that is more than their share.
+    double different = 0, slowest = 0;
     for (std::size_t m = 0; m < methods.size(); ++m) {
-      StabilityCell cell = map_cell(runs[m], target, reference, time, options);
-      cell.method = methods[m].name;
-      cell.width = width;
-      map.cells.push_back(std::move(cell));
+      if (first[m] < m) continue;
+      ++different;
+      runs[m].set_factor(runs[m].least_factor());
+      slowest = std::max(slowest, runs[m].gradient(theta, target, 0, options.poll).core_seconds);
     }
+    const double of_methods = (1 - kReferenceShare - kTargetShare) * of_width;
+    const double time = std::max(slowest, of_methods / different / (kEstimates + options.iterations));
+    std::vector<StabilityCell> cells;
+    for (std::size_t m = 0; m < methods.size(); ++m) {
+      cells.push_back(first[m] < m ? cells[first[m]] : map_cell(runs[m], target, reference, time, options));
+      cells.back().method = methods[m].name;
+      cells.back().width = width;
+    }
+    map.cells.insert(map.cells.end(), cells.begin(), cells.end());
   }
   return map;
 }

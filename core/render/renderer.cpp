@@ -43,6 +43,16 @@ const char* name(Term term) {
   return "";
 }
 
+SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates) {
+  // Narrow gates: below this share of the path length, standard sampling throws too many paths away.
+  constexpr double kNarrow = 0.02;
+  const double width = gates.relative_width();
+  if (std::isinf(width) || options.sampling == Sampling::standard) return {0, 0};
+  if (options.sampling == Sampling::ellipsoidal) return {1, 1};
+  if (options.mix) return *options.mix;
+  return width < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
+}
+
 struct Renderer::Impl {
   const GateSet& gates;
   EstimatorOptions options;
@@ -63,19 +73,10 @@ struct Renderer::Impl {
         scene(source, tangent, estimator.follow_radius),
         every_gate(gate_set) {
     const double width = gates.relative_width();
-    mix = resolve(options, width);
+    mix = sampling_mix(options, gates);
     // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
     // (measured on the cube and the box, 0.1 % to 10 %).
     if (options.antithetic) pair_gain = 1 + 0.1 / width;
-  }
-
-  static SamplingMix resolve(const EstimatorOptions& options, double width) {
-    // Narrow gates: below this share of the path length, standard sampling throws too many paths away.
-    constexpr double kNarrow = 0.02;
-    if (std::isinf(width) || options.sampling == Sampling::standard) return {0, 0};
-    if (options.sampling == Sampling::ellipsoidal) return {1, 1};
-    if (options.mix) return *options.mix;
-    return width < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
   }
 
   GatedImage blank() const {

@@ -30,6 +30,7 @@ struct BoundaryTechniques {
   bool from_camera = true;  ///< edge points seen from vertices of camera paths
   bool at_length = true;    ///< the same at lengths drawn from the gates, where they are narrow
   bool light_arcs = true;   ///< ellipsoidal connections beyond the segment, where gates are narrow
+  bool operator==(const BoundaryTechniques&) const = default;
 };
 
 /// How often each technique of ellipsoidal sampling is used per sample, on average; all positive.
@@ -37,6 +38,7 @@ struct ConnectionRates {
   double camera_lengths = 1;  ///< connections of the camera itself, lengths drawn from the gates
   double camera_pairs = 1;    ///< the same, lengths in pairs from the gates' derivative
   double walk = 1;            ///< camera paths with connections at their vertices
+  bool operator==(const ConnectionRates&) const = default;
 };
 
 /// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
@@ -44,6 +46,7 @@ struct ConnectionRates {
 struct SamplingMix {
   double image = 0, interior = 0;
   ConnectionRates interior_rates = {}, path_length_rates = {};
+  bool operator==(const SamplingMix&) const = default;
 };
 
 struct EstimatorOptions {
@@ -58,7 +61,11 @@ struct EstimatorOptions {
   double follow_radius = 4;
   /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.
   double guiding_samples = 0;
+  bool operator==(const EstimatorOptions&) const = default;
 };
+
+/// What a renderer makes of `sampling` and `mix`.
+SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates);
 
 /// The terms of the derivative (paper Eq. 13).
 enum class Term { interior, visibility, path_length };

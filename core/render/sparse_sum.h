@@ -27,18 +27,24 @@ class SparseSum {
     values_[i] += value;
   }
 
-  /// sum[i] += parts[0][i] + parts[1][i] + ... in that order, with parts of the size of `sum`.
+  /// sum[i] += (parts[0][i] + parts[1][i] + ...), in that order, with parts of the size of `sum`.
   friend void merge(const std::vector<SparseSum>& parts, std::span<double> sum) {
     constexpr std::size_t kChunk = 256;  // blocks
     const std::size_t blocks = (sum.size() + kBlock - 1) / kBlock;
     parallel(static_cast<int>((blocks + kChunk - 1) / kChunk), [&](int chunk) {
       const std::size_t first = chunk * kChunk, last = std::min(blocks, first + kChunk);
-      for (const SparseSum& part : parts)
-        for (std::size_t block = first; block < last; ++block) {
+      for (std::size_t block = first; block < last; ++block) {
+        double total[kBlock] = {};
+        bool touched = false;
+        for (const SparseSum& part : parts) {
           if (!part.touched_[block]) continue;
-          const std::size_t end = std::min(sum.size(), (block + 1) * kBlock);
-          for (std::size_t i = block * kBlock; i < end; ++i) sum[i] += part.values_[i];
+          touched = true;
+          for (std::size_t i = 0; i < kBlock; ++i) total[i] += part.values_[block * kBlock + i];
         }
+        if (!touched) continue;
+        const std::size_t begin = block * kBlock, count = std::min(kBlock, sum.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) sum[begin + i] += total[i];
+      }
     });
   }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/render/standard_walk.h"
@@ -69,7 +70,7 @@ inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const Ga
 }
 
 /// Hands the rays to Embree one by one; returns how many met something.
-inline long long trace_bare(RTCScene scene, const std::vector<RecordedRay>& rays) {
+inline long long trace_bare(RTCScene scene, std::span<const RecordedRay> rays) {
   long long met = 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);

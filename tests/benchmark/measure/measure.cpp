@@ -177,7 +177,7 @@ struct Load {
 void measure_load(const std::string& figure, const std::string& what, Sampling sampling, const Load& first,
                   const Load& second, int rounds, const char* goal, Report& report) {
   const EstimatorOptions options{.max_bounces = 3, .sampling = sampling};
-  const SampleRange samples{0, sampling == Sampling::ellipsoidal ? 2 : 64};
+  const SampleRange samples{0, sampling == Sampling::ellipsoidal ? 8 : 64};
   struct Side {
     Renderer renderer;
     GatedImage adjoint;
@@ -244,6 +244,17 @@ void measure_threads(const NamedScene& s, int rounds, Report& report) {
     return measure_pair(rounds, CLOCK_MONOTONIC, with(1), with(2)).ratio;
   };
   const SampleRange samples{0, 64};
+  // What the machine's second core is worth at the time.
+  const PreparedScene prepared(s.scene, nullptr);
+  const auto rays = record_rays(prepared, gates, 8, samples.count());
+  constexpr int kParts = 64;
+  report.add("one thread / two", s.name + " Embree alone", speed_up([&] {
+               parallel(kParts, [&](int part) {
+                 const std::size_t begin = rays.size() * part / kParts, end = rays.size() * (part + 1) / kParts;
+                 trace_bare(prepared.caster.embree_scene(), std::span(rays).subspan(begin, end - begin));
+               });
+             }),
+             "");
   report.add("one thread / two", s.name + " render", speed_up([&] { renderer.render({.seed = 3}, samples); }), "",
              ">= 1.9");
   report.add("one thread / two", s.name + " interior gradient", speed_up([&] {

@@ -1,0 +1,47 @@
+// Methods that are the same by another name.
+#include "optim/methods.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "optim/experiment.h"
+#include "tests/optim/tiny_scene.h"
+
+namespace isochron {
+namespace {
+
+struct Case {
+  std::string gates, alike;  ///< `alike`: what `auto` comes down to
+};
+
+// Steady gates leave standard sampling alone, gates of a tenth of a percent leave ellipsoidal connections.
+TEST(Methods, KnowsWhatAutomaticSamplingComesDownTo) {
+  TemporaryFolder folder;
+  write_tiny_scene(folder);
+  folder.write("tiny.yaml", tiny_experiment());
+  for (const Case& c : {Case{"gates={kind: steady}", "standard"},
+                        Case{"gates={kind: gaussian, centers: [4.5], sigma: 0.005}", "ellipsoidal_coupled"}}) {
+    SCOPED_TRACE(c.gates);
+    const Experiment experiment = load_experiment(folder.file("tiny.yaml"), {c.gates});
+    std::vector<std::string> notes;
+    const std::vector<Method> methods = methods_for(experiment, {0.05}, notes);
+    std::deque<MethodRun> runs;
+    for (const Method& method : methods) runs.emplace_back(experiment, method);
+    notes.clear();
+    const std::vector<std::size_t> first = first_alike(runs, methods, "here: ", notes);
+    const std::size_t automatic = std::ranges::find(methods, "auto", &Method::name) - methods.begin();
+    const std::size_t alike = std::ranges::find(methods, c.alike, &Method::name) - methods.begin();
+    for (std::size_t i = 0; i < methods.size(); ++i) EXPECT_EQ(first[i], i == automatic ? alike : i) << methods[i].name;
+    EXPECT_EQ(notes, std::vector<std::string>{"here: auto comes down to " + c.alike + ": measured once"});
+
+    const std::vector<double> theta = runs[0].problem().parameters().initial();
+    const Poll poll = [] {};
+    const GatedImage target = runs[0].problem().make_target(poll);
+    EXPECT_EQ(runs[automatic].gradient(theta, target, 5, poll).gradient,
+              runs[alike].gradient(theta, target, 5, poll).gradient);
+  }
+}
+
+}  // namespace
+}  // namespace isochron
