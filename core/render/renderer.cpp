@@ -286,7 +286,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   if (!impl_->has(term)) return;
   if (term == Term::visibility) impl_->learn();
   const GatePick pick(impl_->gates, adjoint);
-  const int strands = strand_count(dof_gradient.size());
+  const int strands = strand_count(impl_->basis->entries.size());  // at least as many as are touched
   std::vector<SparseSum> gradients(strands);
   parallel(strands, [&](int strand) {
     SparseSum own(dof_gradient.size());
