@@ -27,7 +27,9 @@ constexpr double kClearlyBetter[] = {0.75, 0.5};
 /// better than the former.
 constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1};
 constexpr double kClearlyFaster = 0.7;
-constexpr int kRateSamples = 2, kRateBatches = 8;  ///< per pixel and batch
+/// Per pixel and batch: a batch's points cover the whole image, so that its blocks vary together, and only more batches say
+/// more about the variance.
+constexpr int kRateSamples = 1, kRateBatches = 16;
 /// By how much standard sampling must look better than ellipsoidal, per purpose. For gradients, noise counts most where
 /// narrow gates cut, and there standard sampling, whose rare hits a trial may miss, is worse than on average. For
 /// images it may look slightly worse: low-discrepancy numbers, which trials do without, gain more for its pixels (cube,

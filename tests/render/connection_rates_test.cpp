@@ -99,11 +99,12 @@ TEST(ConnectionRates, AutomaticSamplingFindsWhatPays) {
   };
   options.mix = SamplingMix{1, 1};
   const double alike = cost(75);
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  // A trial of as many samples in fewer batches missed it at times.
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     options.mix = measure_mix(scene, gates, {.max_bounces = 1}, &basis, {seed, 0, 0}, Purpose::gradients);
     EXPECT_GT(options.mix->interior_rates.camera_pairs, 5 * options.mix->interior_rates.walk) << seed;
-    EXPECT_GT(alike, 1.5 * cost(75 + seed)) << seed;
   }
+  for (const std::uint64_t seed : {1, 2, 3}) EXPECT_GT(alike, 1.5 * cost(75 + seed)) << seed;
   // Explicit sampling is what it says.
   const SamplingMix plain = measure_mix(scene, gates, {.max_bounces = 1, .sampling = Sampling::ellipsoidal}, &basis,
                                         {1, 0, 0}, Purpose::gradients);
