@@ -26,7 +26,7 @@ constexpr double kClearlyBetter[] = {0.75, 0.5};
 /// low-discrepancy points over the whole image; none never, as a trial may miss what is rare. The latter must look so much
 /// better than the former.
 constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1};
-constexpr double kClearlyFaster = 0.7;
+constexpr double kClearlyFaster = 0.9;
 /// Per pixel and batch: a batch's points cover the whole image, so that its blocks vary together, and only more batches say
 /// more about the variance.
 constexpr int kRateSamples = 1, kRateBatches = 16;
