@@ -43,9 +43,12 @@ double reconstruct(const Problem& problem, const GatedImage& target, int iterati
   const Parameters& parameters = problem.parameters();
   if (!parameters.target_known()) return std::numeric_limits<double>::quiet_NaN();
   const OptimizerSpec& spec = problem.experiment().optimizer;
-  // As far in all as the experiment's own iterations would lead.
-  const double rate = spec.learning_rate * std::max(1.0, static_cast<double>(spec.iterations) / iterations);
-  const std::unique_ptr<Optimizer> optimizer = make_adam(rate, problem.preconditioner());
+  // The experiment's own schedule in fewer, larger steps, which lead as far in all.
+  const double larger = std::max(1.0, static_cast<double>(spec.iterations) / iterations);
+  RateDecay decay = spec.decay;
+  decay.start = static_cast<int>(std::lround(decay.start / larger));
+  decay.half_life /= larger;
+  const std::unique_ptr<Optimizer> optimizer = make_adam(spec.learning_rate * larger, problem.preconditioner(), decay);
   const RenderedObjective objective(problem, target, poll);
   LoopOptions options;
   options.iterations = iterations;
