@@ -22,10 +22,10 @@ constexpr double kPaths = 300000;  ///< of standard sampling, about
 /// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
 /// can lose where it is not the best is more than what it can win.
 constexpr double kClearlyBetter[] = {0.75, 0.5};
-/// How often to use the techniques of ellipsoidal connections: each alike, or mostly those of the camera itself, which share
+/// How often to use the techniques of ellipsoidal connections: each alike, or mostly the camera's own pairs, which share
 /// low-discrepancy points over the whole image; none never, as a trial may miss what is rare. The latter must look so much
 /// better than the former.
-constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1}, kMostlyCameraForImages{2, 2, 0.1};
+constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1};
 constexpr double kClearlyFaster = 0.9;
 /// Per pixel and batch: a batch's points cover the whole image, so that its blocks vary together, and only more batches say
 /// more about the variance.
@@ -97,19 +97,18 @@ double variance_and_work(const Renderer& renderer, int block, int batches, int s
   return sum * renderer.work();
 }
 
-/// The better rates of connections, kAlike or `others`, for what `estimate` does with a renderer, in sums over blocks.
-template <class Estimate>
+/// The better rates of connections for a term's derivative along one column, in sums over blocks.
 ConnectionRates measure_rates(const Scene& small, const GateSet& gates, EstimatorOptions options,
-                              const TangentBasis* moving, const ConnectionRates& others, int block,
-                              Estimate&& estimate) {
+                              const TangentBasis& column, Term term, const Stream& stream, int block) {
   const auto cost = [&](const ConnectionRates& rates) {
-    options.mix = SamplingMix{1, 1, rates, rates, rates};
-    const Renderer renderer(small, gates, options, moving);
+    options.mix = SamplingMix{1, 1, rates, rates};
+    const Renderer renderer(small, gates, options, &column);
+    if (!renderer.has(term)) return 0.0;
     return variance_and_work(renderer, block, kRateBatches, kRateSamples,
-                             [&](SampleRange range) { return estimate(renderer, range); });
+                             [&](SampleRange range) { return renderer.derive(term, stream, range)[0]; });
   };
   const double alike = cost(kAlike);
-  return alike > 0 && cost(others) < kClearlyFaster * alike ? others : kAlike;
+  return alike > 0 && cost(kMostlyCamera) < kClearlyFaster * alike ? kMostlyCamera : kAlike;
 }
 
 }  // namespace
@@ -143,24 +142,20 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     const int alone = cost[0] <= kClearlyHits[gradients] * cost[2] ? 0 : 2;
     return kShares[cost[1] < kClearlyBetter[gradients] * cost[alone] ? 1 : alone];
   };
-  const auto image = [&](const Renderer& r, SampleRange range) { return r.render(stream, range); };
-  const auto term = [&](Term t) {
-    return [&, t](const Renderer& r, SampleRange range) { return r.derive(t, stream, range)[0]; };
-  };
-  const int block = purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
-  // Paths of more bounces are found by walks alone, and what rare ones carry a trial cannot tell.
-  const bool rates = options.max_bounces == 1;
   SamplingMix best;
-  best.image = choose(kImage, 1, nullptr, image);
-  if (rates && best.image == 1)
-    best.image_rates = measure_rates(small, gates, options, nullptr, kMostlyCameraForImages, block, image);
+  best.image =
+      choose(kImage, 1, nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
-  best.interior = choose(kInterior, block, &one, term(Term::interior));
-  if (!rates) return best;
+  const int block = purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
+  best.interior = choose(kInterior, block, &one, [&](const Renderer& r, SampleRange range) {
+    return r.derive(Term::interior, stream, range)[0];
+  });
+  // Paths of more bounces are found by walks alone, and what rare ones carry a trial cannot tell.
+  if (options.max_bounces != 1) return best;
   if (best.interior == 1)
-    best.interior_rates = measure_rates(small, gates, options, &one, kMostlyCamera, block, term(Term::interior));
-  best.path_length_rates = measure_rates(small, gates, options, &one, kMostlyCamera, block, term(Term::path_length));
+    best.interior_rates = measure_rates(small, gates, options, one, Term::interior, stream, block);
+  best.path_length_rates = measure_rates(small, gates, options, one, Term::path_length, stream, block);
   return best;
 }
 

@@ -13,9 +13,8 @@ enum class Purpose { images, gradients };
 /// pixels, some hundred thousand paths each), and, where `basis` has columns, the interior term of the derivative
 /// along a random combination of them. Depends on the arguments alone. For gradients, variance is that of
 /// sums over blocks of a quarter of the image's width. Gates much wider or narrower than where the techniques
-/// cross need no trial; other sampling than automatic none either. Where connections find all of an image or a term and
-/// paths bounce once, so that each technique could find them all, rates are chosen by a trial of the image, or of that
-/// term's derivative.
+/// cross need no trial; other sampling than automatic none either. Where connections find all of a term and paths
+/// bounce once, so that each technique could find them all, rates are chosen by a trial of that term's derivative.
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
                         const TangentBasis* basis, const Stream& stream, Purpose purpose);
 

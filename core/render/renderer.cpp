@@ -254,7 +254,7 @@ GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
                   PrimalSink(impl_->gates, shared ? image : own));
     GatePass pass;
     pass.value = true;
-    impl_->run_paths(worker, impl_->mix.image, impl_->mix.image_rates, pass, strand, strands, stream, range);
+    impl_->run_paths(worker, impl_->mix.image, {}, pass, strand, strands, stream, range);
     if (!shared) films[strand] = std::move(own.data);
   });
   if (!shared) merge(films, image.data);
@@ -313,7 +313,7 @@ ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) con
     Worker worker(impl.scene, impl.gates, impl.options, impl.every_gate, ImageLedgerSink(impl.scene, impl.gates, own));
     GatePass pass;
     pass.value = true;
-    impl.run_paths(worker, impl.mix.image, impl.mix.image_rates, pass, strand, strands, stream, range);
+    impl.run_paths(worker, impl.mix.image, {}, pass, strand, strands, stream, range);
     films[strand] = std::move(own.image.data);
     shapes[strand] = std::move(own.by_shape);
   });

@@ -45,7 +45,7 @@ struct ConnectionRates {
 /// standard. Strictly between, multiple importance sampling combines the two. Rates hold where connections take all.
 struct SamplingMix {
   double image = 0, interior = 0;
-  ConnectionRates image_rates = {}, interior_rates = {}, path_length_rates = {};
+  ConnectionRates interior_rates = {}, path_length_rates = {};
   bool operator==(const SamplingMix&) const = default;
 };
 

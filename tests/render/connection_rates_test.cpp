@@ -1,7 +1,7 @@
 // How often ellipsoidal sampling uses each of its techniques: any rates give the same means, and automatic sampling finds
 // the ones that pay.
 //
-// Statistics: z-tests at 4.5 standard errors of the difference, of 27 figures (false alarms: 7e-6 each, 2e-4 for the
+// Statistics: z-tests at 4.5 standard errors of the difference, of 21 figures (false alarms: 7e-6 each, 2e-4 for the
 // file), fixed seeds. Standard errors must be below 7 % of a derivative's scale, so that a technique that is counted
 // by the wrong rate fails (seen for each of the three).
 #include <gtest/gtest.h>
@@ -14,7 +14,7 @@ namespace {
 
 EstimatorOptions with_rates(const ConnectionRates& rates) {
   EstimatorOptions options{.max_bounces = 2};
-  options.mix = SamplingMix{1, 1, rates, rates, rates};
+  options.mix = SamplingMix{1, 1, rates, rates};
   return options;
 }
 
@@ -47,29 +47,6 @@ TEST(ConnectionRates, KeepTheMeansOfDerivatives) {
         EXPECT_LT(std::hypot(found[g].standard_error, exact[g].standard_error), 0.07 * scale)
             << name(term) << ", walks " << rates.walk << ", gate " << g;
       }
-    }
-  }
-}
-
-TEST(ConnectionRates, KeepTheMeansOfImages) {
-  const Scene scene = small_scene(16);
-  const GateSet gates(GateShape::truncated_gaussian(0.2, 0.25), {5.0, 6.0});
-  const auto means = [&](const ConnectionRates& rates, std::uint64_t seed) {
-    const Renderer renderer(scene, gates, with_rates(rates));
-    std::vector<Batches> of_gate(2);
-    for (int b = 0; b < 32; ++b) {
-      const GatedImage image = renderer.render({seed, 0, 0}, {b * 8, (b + 1) * 8});
-      for (int g = 0; g < 2; ++g) of_gate[g].add(image.mean(g));
-    }
-    return std::array{of_gate[0].estimate(), of_gate[1].estimate()};
-  };
-  const auto exact = means(kAlike, 76);
-  for (const ConnectionRates& rates : kUneven) {
-    const auto found = means(rates, 77);
-    for (int g = 0; g < 2; ++g) {
-      EXPECT_LT(std::abs(z_score(found[g], exact[g])), 4.5)
-          << "walks " << rates.walk << ", gate " << g << ": " << found[g].mean << ", alike " << exact[g].mean;
-      EXPECT_LT(std::hypot(found[g].standard_error, exact[g].standard_error), 0.03 * exact[g].mean) << g;
     }
   }
 }
@@ -128,13 +105,6 @@ TEST(ConnectionRates, AutomaticSamplingFindsWhatPays) {
     EXPECT_GT(options.mix->interior_rates.camera_pairs, 5 * options.mix->interior_rates.walk) << seed;
   }
   for (const std::uint64_t seed : {1, 2, 3}) EXPECT_GT(alike, 1.5 * cost(75 + seed)) << seed;
-  // Images under the gates of experiments/cube.yaml, where it starts.
-  for (int v = 0; v < cube.vertex_count; ++v) scene.positions[cube.first_vertex + v].y += 0.2;
-  const GateSet four(GateShape::gaussian(0.0108), {5.0, 5.15, 5.3, 5.45});
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
-    const SamplingMix mix = measure_mix(scene, four, {.max_bounces = 1}, nullptr, {seed, 0, 0}, Purpose::gradients);
-    EXPECT_GT(mix.image_rates.camera_lengths, 5 * mix.image_rates.walk) << seed;
-  }
   // Explicit sampling is what it says.
   const SamplingMix plain = measure_mix(scene, gates, {.max_bounces = 1, .sampling = Sampling::ellipsoidal}, &basis,
                                         {1, 0, 0}, Purpose::gradients);
