@@ -23,7 +23,7 @@ constexpr double kPaths = 300000;  ///< of standard sampling, about
 /// can lose where it is not the best is more than what it can win.
 constexpr double kClearlyBetter[] = {0.75, 0.5};
 /// How often to use the techniques of ellipsoidal connections: each alike, or mostly the camera's own pairs, which share
-/// low-discrepancy points over the whole image; none never, as a trial may miss what is rare. The latter must look so much
+/// low-discrepancy points over the whole image; none never, as a trial may miss what is rare. The latter must look a tenth
 /// better than the former.
 constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1};
 constexpr double kClearlyFaster = 0.9;
