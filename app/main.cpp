@@ -10,6 +10,7 @@
 
 #include "app/commands.h"
 #include "core/math/error.h"
+#include "core/render/parallel.h"
 #include "optim/problem.h"
 
 namespace {
@@ -22,6 +23,7 @@ std::string one_line(std::string text) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  isochron::keep_freed_memory();
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   CLI::App app("Differentiable time-gated rendering and optimisation", "isochron");

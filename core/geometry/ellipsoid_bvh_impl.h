@@ -2,6 +2,7 @@
 #pragma once
 #include "core/geometry/bounds.h"
 #include "core/geometry/ellipsoid_bvh.h"
+#include "core/math/large_array.h"
 
 namespace isochron {
 
@@ -31,8 +32,8 @@ struct EllipsoidBvh::Impl {
     int child[kWidth];
   };
 
-  std::vector<Node> nodes;  ///< the root first; empty for a flat list of blocks
-  std::vector<Block> blocks;
+  LargeArray<Node> nodes;  ///< the root first; empty for a flat list of blocks
+  LargeArray<Block> blocks;
   Bounds bounds;
 
   struct Item {

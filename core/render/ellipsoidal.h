@@ -37,7 +37,7 @@ class EllipsoidalConnections {
 
   /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`.
   void sample_from_camera(double scale, Rng& rng) {
-    worker_.start_path_at_camera();
+    worker_.start_at_camera(worker_.path);
     draw_targets(GatePick::kImage, rng);
     for (const Target& target : targets_) {
       connect_emitter(target, GatePick::kImage, Rgb(scale), rng);

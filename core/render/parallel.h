@@ -9,6 +9,10 @@ namespace isochron {
 /// Threads that renderers use; 0: all cores. Results do not depend on it.
 void set_thread_count(int threads);
 
+/// From now on, memory that one pass frees stays with the process for the next: fresh pages can cost more than what they
+/// are filled with. For programs to call first.
+void keep_freed_memory();
+
 /// f(0) ... f(count - 1), in any order, on as many threads as set.
 void parallel(int count, const std::function<void(int)>& f);
 

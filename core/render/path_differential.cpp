@@ -57,7 +57,6 @@ void let_flow(const CameraFlow::Follow& follow, const Vec3& ray, const Vec3& for
 void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, bool material,
                  bool length_only, LocalDifferential& out) {
   if (!scene.has_moving_vertex(x.triangle)) return;
-  const auto& vertex = scene.scene.triangles[x.triangle].vertex;
   // Rotation of the face normal, and d ln A of material points (paper Eq. 11).
   Vec3 through_cross = g.normal - x.n * dot(g.normal, x.n);
   if (material) through_cross += x.n;
@@ -65,13 +64,11 @@ void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumu
   const auto b = scene.barycentrics(x);
   const auto& edge = scene.edges(x.triangle);
   const Vec3 opposite[3] = {edge[0] - edge[1], edge[1], -edge[0]};  // from the next but one corner to the next
-  for (int i = 0; i < 3; ++i) {
-    const int v = vertex[i];
-    if (!scene.moving.vertex[v]) continue;
-    VertexGradient entry{v, g.position * b[i], g.length * b[i]};
+  scene.for_each_moving_corner(x.triangle, [&](int i, int vertex) {
+    VertexGradient entry{vertex, g.position * b[i], g.length * b[i]};
     if (!length_only) entry.log_f += cross(opposite[i], through_cross);
     out.vertices.push_back(entry);
-  }
+  });
 }
 
 }  // namespace
@@ -130,10 +127,8 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
 
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
   if (!scene.has_moving_vertex(x.triangle)) return;
-  const auto& vertex = scene.scene.triangles[x.triangle].vertex;
   const auto b = scene.barycentrics(x);
-  for (int i = 0; i < 3; ++i)
-    if (scene.moving.vertex[vertex[i]]) out.vertices.push_back({vertex[i], g * b[i], {}});
+  scene.for_each_moving_corner(x.triangle, [&](int i, int vertex) { out.vertices.push_back({vertex, g * b[i], {}}); });
 }
 
 }  // namespace isochron

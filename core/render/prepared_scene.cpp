@@ -41,6 +41,7 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
       moving(source, basis),
       camera_flow(source, camera, moving, follow_radius),
       caster(source) {
+  for (const Shape& shape : scene.shapes) shapes_.push_back({&scene.materials[shape.material]});
   const std::size_t count = scene.triangles.size();
   records_.resize(count);
   std::vector<EllipsoidBvh::Input> all, moved, emitting;
@@ -57,13 +58,13 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
     const double doubled = length(normal);
     record.area = 0.5 * doubled;
     record.shape = scene.triangles[t].shape;
-    record.material = &scene.materials[scene.shapes[record.shape].material];
+    record.vertex = v;
     if (is_dielectric(t)) {
       has_dielectric_ = true;
-      least_index_ = std::min(least_index_, record.material->ior);
+      least_index_ = std::min(least_index_, material_of(t).ior);
     }
-    record.has_moving = moving.triangle[t];
-    record.moves = record.has_moving || moving.scatters[t];
+    for (int k = 0; k < 3; ++k) record.moving_corners |= (moving.vertex[v[k]] != 0) << k;
+    record.moves = record.moving_corners || moving.scatters[t];
     // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
     if (doubled > 0) record.normal = normal / doubled;
     all.push_back(input);
@@ -80,10 +81,10 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
   emitter_triangles = EllipsoidBvh(emitting);
 
   emitter_distribution_ = DiscreteDistribution(power);
-  for (std::size_t i = 0; i < emitters.size(); ++i)
-    records_[emitters[i]].emitter_pdf = emitter_distribution_.probability(static_cast<int>(i)) / area(emitters[i]);
-  for (const Shape& shape : scene.shapes) {
+  for (std::size_t i = 0; i < shapes_.size(); ++i) {
+    const Shape& shape = scene.shapes[i];
     if (shape.emission.is_black()) continue;
+    if (!emitters.empty()) shapes_[i].emitter_pdf = shape.emission.max() / emitter_distribution_.total();
     Bounds bounds;
     for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) bounds.add(scene.positions[v]);
     emitter_bounds_.push_back(bounds);

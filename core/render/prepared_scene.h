@@ -10,6 +10,7 @@
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
 #include "core/math/discrete_distribution.h"
+#include "core/math/large_array.h"
 #include "core/render/camera_flow.h"
 #include "core/render/camera_model.h"
 #include "core/render/ray_caster.h"
@@ -29,13 +30,19 @@ struct SurfacePoint {
 struct alignas(64) TriangleRecord {
   Vec3 normal;  ///< unit; zero when the triangle has no area
   Vec3 origin;  ///< corner 0
-  const Material* material = nullptr;
+  double area = 0;
   int shape = -1;
   bool emits = false;
-  bool moves = false;       ///< a path through the triangle can have a derivative
-  bool has_moving = false;  ///< vertices
-  Vec3 edge[2];             ///< corners 1 and 2 from corner 0
-  double area = 0;
+  bool moves = false;               ///< a path through the triangle can have a derivative
+  std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
+  Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
+  std::array<int, 3> vertex = {};
+};
+static_assert(sizeof(TriangleRecord) == 128);
+
+/// What paths ask of a shape.
+struct ShapeRecord {
+  const Material* material = nullptr;
   double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
 };
 
@@ -66,7 +73,7 @@ class PreparedScene {
 
   int shape_index(int triangle) const { return records_[triangle].shape; }
   const Shape& shape_of(int triangle) const { return scene.shapes[shape_index(triangle)]; }
-  const Material& material_of(int triangle) const { return *records_[triangle].material; }
+  const Material& material_of(int triangle) const { return *shapes_[shape_index(triangle)].material; }
 
   /// Radiance that leaves the point towards the unit direction w; black on the back of an emitter.
   Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
@@ -100,7 +107,14 @@ class PreparedScene {
   /// Whether a path through the triangle can have a derivative because of it.
   bool moves(int triangle) const { return records_[triangle].moves; }
   /// Whether one of its vertices moves.
-  bool has_moving_vertex(int triangle) const { return records_[triangle].has_moving; }
+  bool has_moving_vertex(int triangle) const { return records_[triangle].moving_corners != 0; }
+  /// f(corner, vertex) for each of the triangle's vertices that move.
+  template <class F>
+  void for_each_moving_corner(int triangle, F&& f) const {
+    const TriangleRecord& r = records_[triangle];
+    for (int i = 0; i < 3; ++i)
+      if (r.moving_corners >> i & 1) f(i, r.vertex[i]);
+  }
 
   /// Uniform by area x radiance over the emitters; `pdf` per area.
   SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const {
@@ -108,7 +122,12 @@ class PreparedScene {
     pdf = emitter_pdf(t);
     return point_on_emitter(t, u1, u2);
   }
-  /// The same in two steps, so that the emitter's record is on its way from memory while something else is done.
+  /// The same in steps, so that what each reads is on its way from memory while something else is done; the first may be
+  /// left out.
+  void expect_emitter(double u) const {
+    const int i = emitter_distribution_.expect(u);
+    __builtin_prefetch(&emitters[i]);
+  }
   int pick_emitter(double u) const {
     const int t = emitters[emitter_distribution_.sample(u)];
     prefetch(t);
@@ -124,7 +143,8 @@ class PreparedScene {
     __builtin_prefetch(address);
     __builtin_prefetch(address + 64);
   }
-  double emitter_pdf(int triangle) const { return records_[triangle].emitter_pdf; }
+  /// Of a triangle that emits.
+  double emitter_pdf(int triangle) const { return shapes_[shape_index(triangle)].emitter_pdf; }
 
   /// Edges from corner 0 to corners 1 and 2.
   const Vec3 (&edges(int triangle) const)[2] { return records_[triangle].edge; }
@@ -152,13 +172,22 @@ class PreparedScene {
     return {origin + direction * distance, r.normal, triangle};
   }
 
-  /// First surface point from `x` (offset off its surface) along the unit direction w.
-  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const {
-    return first_point(leave(x, w), x.p, w);
+  /// The triangle that the ray from `x` (offset off its surface) along the unit direction w meets first, or -1. Its record is
+  /// on its way from memory: who has other things to do meanwhile does not wait for it.
+  int cast(const SurfacePoint& x, const Vec3& w) const { return met(leave(x, w), w); }
+  /// The same of a ray from the camera.
+  int cast_camera(const Vec3& direction) const { return met(camera.position, direction); }
+  /// Where the ray from `origin` along w, which meets `triangle` (-1: none), ends; empty also for a face along which it runs.
+  std::optional<SurfacePoint> end_point(int triangle, const Vec3& origin, const Vec3& w) const {
+    if (triangle < 0 || dot(records_[triangle].normal, w) == 0) return std::nullopt;
+    return point_on_triangle(triangle, origin, w);
   }
-  /// First surface point along a ray from the camera.
+  /// First surface point of such rays.
+  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const {
+    return end_point(cast(x, w), x.p, w);
+  }
   std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
-    return first_point(camera.position, camera.position, direction);
+    return end_point(cast_camera(direction), camera.position, direction);
   }
   bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
     const Vec3 d = y.p - x.p;
@@ -181,14 +210,14 @@ class PreparedScene {
   bool is_behind(const SurfacePoint& x, const Vec3& d) const {
     return x.triangle >= 0 && is_dielectric(x.triangle) && dot(x.n, d) < 0;
   }
-  /// First point on the ray that starts at `lifted`; it is put on the line through `origin`.
-  std::optional<SurfacePoint> first_point(const Vec3& lifted, const Vec3& origin, const Vec3& w) const {
-    const int t = caster.first_triangle(lifted, w);
-    if (t < 0 || dot(records_[t].normal, w) == 0) return std::nullopt;
-    return point_on_triangle(t, origin, w);
+  int met(const Vec3& from, const Vec3& w) const {
+    const int t = caster.first_triangle(from, w);
+    if (t >= 0) prefetch(t);
+    return t;
   }
 
-  std::vector<TriangleRecord> records_;
+  LargeArray<TriangleRecord> records_;
+  std::vector<ShapeRecord> shapes_;
   std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;
   bool has_dielectric_ = false;

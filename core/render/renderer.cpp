@@ -110,6 +110,7 @@ struct Renderer::Impl {
     lengths.pairs = false;
     pairs.value = false;
     EllipsoidalConnections connections(worker, pass), camera_lengths(worker, lengths), camera_pairs(worker, pairs);
+    StandardPaths standard(worker, pass.pairs);
     const SamplePoints points(stream, range, options.numbers);
     const PointSet of_lengths = points.of_image(Technique::camera_lengths);
     const PointSet of_pairs = points.of_image(Technique::camera_pairs);
@@ -124,8 +125,9 @@ struct Renderer::Impl {
       points.in_pixel(Technique::walk, pixel, walks * share,
                       [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
       points.in_pixel(Technique::standard, pixel, rate * (1 - share),
-                      [&](Rng& rng) { sample_standard(worker, pixel, scale / rate, pass.pairs, rng); });
+                      [&](Rng& rng) { standard.start(pixel, scale / rate, rng); });
     });
+    standard.finish();
     count(worker);
   }
 

@@ -46,6 +46,14 @@ struct Worker {
     ++rays;
     return scene.visible_from_camera(x);
   }
+  int cast(const SurfacePoint& x, const Vec3& w) {
+    ++rays;
+    return scene.cast(x, w);
+  }
+  int cast_camera(const Vec3& direction) {
+    ++rays;
+    return scene.cast_camera(direction);
+  }
   std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) {
     ++rays;
     return scene.trace(x, w);
@@ -55,19 +63,24 @@ struct Worker {
     return scene.trace_camera(direction);
   }
 
-  /// Starts `path` with the camera and the surface point seen through a random point of the pixel.
-  bool start_camera_path(int pixel, Rng& rng) {
+  /// Of a ray from the camera through a random point of the pixel; unit.
+  Vec3 direction_through(int pixel, Rng& rng) const {
     const CameraModel& camera = scene.camera;
     const double u = pixel % camera.width + rng.uniform(), v = pixel / camera.width + rng.uniform();
-    start_path_at_camera();
-    const auto hit = trace_camera(camera.direction(u, v));
-    if (hit) path.push(scene, *hit);
-    return hit.has_value();
+    return camera.direction(u, v);
   }
-  void start_path_at_camera() {
+  /// Starts `camera_path` with the camera.
+  void start_at_camera(Path& camera_path) const {
     SurfacePoint eye;
     eye.p = scene.camera.position;
-    path.start(eye, 0);
+    camera_path.start(eye, 0);
+  }
+  /// Starts `path` with the camera and the surface point seen through a random point of the pixel.
+  bool start_camera_path(int pixel, Rng& rng) {
+    start_at_camera(path);
+    const auto point = trace_camera(direction_through(pixel, rng));
+    if (point) path.push(scene, *point);
+    return point.has_value();
   }
 
   /// Whether the path, the last vertex on an emitter, matters to the sink.

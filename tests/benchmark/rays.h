@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -37,9 +36,9 @@ struct RayRecorder {
     record(from, scene.leave(y, -d) - from, 1.0f);
     return scene.visible(x, y);
   }
-  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) {
+  int cast(const SurfacePoint& x, const Vec3& w) {
     record(scene.leave(x, w), w, std::numeric_limits<float>::infinity());
-    return scene.trace(x, w);
+    return scene.cast(x, w);
   }
 };
 

@@ -66,7 +66,7 @@ BENCHMARK_CAPTURE(BM_RayCaster, occluded, Kind::occluded)->ArgName("large")->Arg
 struct Tracer {
   const PreparedScene& scene;
   bool visible(const SurfacePoint& x, const SurfacePoint& y) { return scene.visible(x, y); }
-  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) { return scene.trace(x, w); }
+  int cast(const SurfacePoint& x, const Vec3& w) { return scene.cast(x, w); }
 };
 
 /// Point seen by every pixel's centre; leaves out pixels that see nothing.

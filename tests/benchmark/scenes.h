@@ -1,10 +1,7 @@
 // What the benchmarks run on: a small and a large scene, their gates, and what moves in them.
 #pragma once
-#include <array>
 #include <cmath>
-#include <map>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "core/gates/gate.h"
@@ -12,8 +9,11 @@
 #include "core/scene/mesh.h"
 #include "core/scene/scene.h"
 #include "core/scene/scene_loader.h"
+#include "tests/render/subdivision.h"
 
 namespace isochron::benchmarks {
+
+using testing::subdivided;
 
 /// The reference box: two dozen triangles.
 inline Scene small_scene() {
@@ -72,56 +72,6 @@ inline Scene large_scene() {
     scene.edges.push_back(e);
   }
   return scene;
-}
-
-/// The same surfaces with every triangle cut in four, `levels` times.
-inline Scene subdivided(const Scene& scene, int levels) {
-  Scene fine = scene;
-  fine.positions.clear();
-  fine.triangles.clear();
-  fine.edges.clear();
-  for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
-    const Shape& shape = scene.shapes[s];
-    Mesh mesh;
-    mesh.positions.assign(scene.positions.begin() + shape.first_vertex,
-                          scene.positions.begin() + shape.first_vertex + shape.vertex_count);
-    for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
-      auto face = scene.triangles[t].vertex;
-      for (int& v : face) v -= shape.first_vertex;
-      mesh.faces.push_back(face);
-    }
-    for (int level = 0; level < levels; ++level) {
-      std::map<std::pair<int, int>, int> middles;
-      const auto middle = [&](int a, int b) {
-        const auto [place, fresh] = middles.try_emplace(std::minmax(a, b), static_cast<int>(mesh.positions.size()));
-        if (fresh) mesh.positions.push_back((mesh.positions[a] + mesh.positions[b]) * 0.5);
-        return place->second;
-      };
-      std::vector<std::array<int, 3>> faces;
-      for (const auto& f : mesh.faces) {
-        const int m[3] = {middle(f[0], f[1]), middle(f[1], f[2]), middle(f[2], f[0])};
-        faces.insert(faces.end(), {{f[0], m[0], m[2]}, {m[0], f[1], m[1]}, {m[2], m[1], f[2]}, {m[0], m[1], m[2]}});
-      }
-      mesh.faces = std::move(faces);
-    }
-    Shape& out = fine.shapes[s];
-    out.first_vertex = static_cast<int>(fine.positions.size());
-    out.vertex_count = static_cast<int>(mesh.positions.size());
-    out.first_triangle = static_cast<int>(fine.triangles.size());
-    out.triangle_count = static_cast<int>(mesh.faces.size());
-    for (Edge e : build_edges(mesh)) {
-      for (int& v : e.vertex) v += out.first_vertex;
-      for (int& f : e.face)
-        if (f >= 0) f += out.first_triangle;
-      fine.edges.push_back(e);
-    }
-    for (auto f : mesh.faces) {
-      for (int& v : f) v += out.first_vertex;
-      fine.triangles.push_back({f, static_cast<int>(s)});
-    }
-    fine.positions.insert(fine.positions.end(), mesh.positions.begin(), mesh.positions.end());
-  }
-  return fine;
 }
 
 /// Ten gates that reach most paths through the box.

@@ -202,7 +202,8 @@ void measure_load(const std::string& figure, const std::string& what, Sampling s
 
 /// What more unknowns, gates and triangles cost.
 void measure_loads(int rounds, Report& report) {
-  const Scene small = small_scene(), large = large_scene(), coarse = subdivided(small, 3), fine = subdivided(small, 8);
+  const Scene small = small_scene(), large = large_scene(), coarse = subdivided(small, 6),
+              fine = subdivided(small, 204);
   const GateSet wide = wide_gates(), narrow = narrow_gates();
   std::vector<double> centers;
   for (int g = 0; g < 256; ++g) centers.push_back(5 + 4.5 * g / 255);
@@ -210,7 +211,9 @@ void measure_loads(int rounds, Report& report) {
   const GateShape narrow_shape = GateShape::gaussian(0.05);
   const double wider = (2.25 + narrow_shape.upper()) / narrow_shape.upper();
   const GateSet many(narrow_shape, centers), one(GateShape::gaussian(0.05 * wider), {7.25});
-  measure_bare("1.7 million triangles / 1700", fine, coarse, std::min(rounds, 5), report);
+  const std::string a_million =
+      std::to_string(fine.triangles.size()) + " triangles / " + std::to_string(coarse.triangles.size());
+  measure_bare(a_million, fine, coarse, std::min(rounds, 5), report);
   for (const Sampling sampling : {Sampling::standard, Sampling::ellipsoidal}) {
     const bool standard = sampling == Sampling::standard;
     const std::string how = standard ? "standard" : "ellipsoidal";
@@ -221,8 +224,8 @@ void measure_loads(int rounds, Report& report) {
     const TangentBasis box = translation(small);
     measure_load("256 gates / one", how, sampling, {small, many, box}, {small, one, box}, rounds, "<= 1.5", report);
     const TangentBasis of_fine = translation(fine), of_coarse = translation(coarse);
-    measure_load("1.7 million triangles / 1700", how, sampling, {fine, gates, of_fine}, {coarse, gates, of_coarse},
-                 std::min(rounds, 5), "<= 3", report);
+    measure_load(a_million, how, sampling, {fine, gates, of_fine}, {coarse, gates, of_coarse}, std::min(rounds, 5),
+                 "<= 3", report);
   }
 }
 
@@ -275,6 +278,7 @@ int main(int argc, char** argv) {
   }
   const int rounds = argc > 2 ? std::max(std::atoi(argv[2]), 1) : 15;
   isochron::set_thread_count(1);
+  isochron::keep_freed_memory();
   Report report(argv[1]);
   const std::vector<NamedScene> scenes{{"small", small_scene()}, {"large", large_scene()}};
   for (const NamedScene& s : scenes) measure_forward(s, rounds, report);
