@@ -78,7 +78,7 @@ void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
     for (int i = 0; i < 2; ++i) {
       b.face[i] = p.triangle[i];
       b.inward[i] = normalize(cross(scene.normal(b.face[i]), b.tangent));
-      for (int v : scene.scene.triangles[b.face[i]].vertex) moves |= scene.moving.vertex[v] != 0;
+      moves |= scene.has_moving_vertex(b.face[i]);
     }
     // The angle between the planes takes the place of the wedge.
     const double angle =
@@ -105,10 +105,7 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
   const double of[2] = {dot(n_b, n0), dot(n_b, n1)};
   for (int i = 0; i < 2; ++i) {
     const Vec3 g = scene.normal(edge.face[i]) * ((of[i] - cosine * of[1 - i]) / determinant);
-    const auto b = scene.barycentrics({point.y, {}, edge.face[i]});
-    for (int k = 0; k < 3; ++k)
-      if (const int v = scene.scene.triangles[edge.face[i]].vertex[k]; scene.moving.vertex[v])
-        out.vertices.push_back({v, g * b[k], {}});
+    add_material_flow(scene, {point.y, scene.normal(edge.face[i]), edge.face[i]}, g, out);
   }
 }
 

@@ -55,12 +55,10 @@ struct Worker {
     return scene.cast_camera(direction);
   }
   std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) {
-    ++rays;
-    return scene.trace(x, w);
+    return scene.end_point(cast(x, w), x.p, w);
   }
   std::optional<SurfacePoint> trace_camera(const Vec3& direction) {
-    ++rays;
-    return scene.trace_camera(direction);
+    return scene.end_point(cast_camera(direction), scene.camera.position, direction);
   }
 
   /// Of a ray from the camera through a random point of the pixel; unit.
