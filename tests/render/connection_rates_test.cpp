@@ -100,7 +100,7 @@ TEST(ConnectionRates, AutomaticSamplingFindsWhatPays) {
   options.mix = SamplingMix{1, 1};
   const double alike = cost(75);
   // A trial of as many samples in fewer batches missed it at times.
-  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     options.mix = measure_mix(scene, gates, {.max_bounces = 1}, &basis, {seed, 0, 0}, Purpose::gradients);
     EXPECT_GT(options.mix->interior_rates.camera_pairs, 5 * options.mix->interior_rates.walk) << seed;
   }
