@@ -59,13 +59,16 @@ double arc_span(const EdgeCrossing (&edges)[3], int i) {
 
 }  // namespace
 
-Ellipsoid::Ellipsoid(const Vec3& focus_a, const Vec3& focus_b, double total_length)
-    : a(focus_a), b(focus_b), tau(total_length), center((focus_a + focus_b) * 0.5), axis{0, 0, 1} {
-  const Vec3 d = focus_b - focus_a;
-  const double distance = length(d);
-  if (!(tau > distance) || !std::isfinite(tau)) return;
-  if (distance > 0) axis = d / distance;
+Foci::Foci(const Vec3& focus_a, const Vec3& focus_b)
+    : a(focus_a), b(focus_b), center((focus_a + focus_b) * 0.5), axis{0, 0, 1} {
+  const Vec3 d = b - a;
+  distance = length(d);
+  if (distance > 0 && std::isfinite(distance)) axis = d / distance;
   complete_frame(axis, side, up);
+}
+
+Ellipsoid::Ellipsoid(const Foci& foci, double total_length) : Foci(foci), tau(total_length) {
+  if (!(tau > distance) || !std::isfinite(tau)) return;
   major = 0.5 * tau;
   // The product keeps the error equivalent to one round-off of tau, however thin the ellipsoid.
   minor = 0.5 * std::sqrt((tau - distance) * (tau + distance));

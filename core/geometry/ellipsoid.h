@@ -5,17 +5,25 @@
 
 namespace isochron {
 
-/// Ellipsoid of revolution with foci a and b (they may coincide: a sphere) and total length tau >= |a-b|.
-struct Ellipsoid {
+/// What ellipsoids of revolution with foci a and b (they may coincide: spheres) have in common.
+struct Foci {
   Vec3 a, b;
-  double tau = 0;
+  double distance = 0;
+  Vec3 center, axis;  ///< unit axis; any unit vector when the foci coincide
+  Vec3 side, up;      ///< complete the axis to an orthonormal frame
 
-  Vec3 center, axis;            ///< unit axis; any unit vector when the foci coincide
-  Vec3 side, up;                ///< complete the axis to an orthonormal frame
+  Foci(const Vec3& focus_a, const Vec3& focus_b);
+};
+
+/// Ellipsoid of revolution of total length tau >= |a-b|.
+struct Ellipsoid : Foci {
+  double tau = 0;
   double major = 0, minor = 0;  ///< semi-axes
 
   /// Empty (valid() false) when tau <= |a-b| or is not finite.
-  Ellipsoid(const Vec3& focus_a, const Vec3& focus_b, double total_length);
+  Ellipsoid(const Foci& foci, double total_length);
+  Ellipsoid(const Vec3& focus_a, const Vec3& focus_b, double total_length)
+      : Ellipsoid(Foci(focus_a, focus_b), total_length) {}
   bool valid() const { return minor > 0; }
 };
 

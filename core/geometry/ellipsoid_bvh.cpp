@@ -43,18 +43,19 @@ struct QuadraticForm {
 }  // namespace
 
 struct EllipsoidBvh::Shell {
-  Vec3 center, axis;
+  Foci foci;
   QuadraticForm high, low;
   double inside;   ///< Q_high of points that may be inside the outer ellipsoid is at most this
   double outside;  ///< Q_low of points that may be outside the inner ellipsoid is at least this
   /// Where Q_low exceeds the first and Q_high is below the second, points are strictly between the two ellipsoids.
   double between_low, between_high;
-  Ellipsoid outer;  ///< the outer ellipsoid, grown by the round-off of positions
+  double outer_tau;   ///< total length of the outer ellipsoid, grown by the round-off of positions
+  bool exact = true;  ///< leave out triangles that come close to the outer ellipsoid, but do not reach into it
 };
 
 template <bool kSurfaces>
 void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std::vector<int>& ids) const {
-  const Vec3 c = shell.center, u = shell.axis;
+  const Vec3 c = shell.foci.center, u = shell.foci.axis;
   const QuadraticForm high = shell.high, low = shell.low;
   Wide lowest_bound, lowest_vertex, highest_vertex, lowest_of_low, highest_of_high;
   for (int i = 0; i < kWidth; ++i) {
@@ -87,14 +88,15 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
     reported[i] = (lowest_bound.lane[i] <= shell.inside) & (highest_vertex.lane[i] >= shell.outside);
     if constexpr (kSurfaces)
       reported[i] &= !((lowest_of_low.lane[i] > shell.between_low) & (highest_of_high.lane[i] < shell.between_high));
-    uncertain += reported[i] & (lowest_vertex.lane[i] > shell.inside);
+    uncertain += reported[i] & shell.exact & (lowest_vertex.lane[i] > shell.inside);
   }
+  std::optional<Ellipsoid> outer;
   for (int i = 0; uncertain > 0; ++i) {
     if (!reported[i] || !(lowest_vertex.lane[i] > shell.inside)) continue;
     // No vertex inside the outer ellipsoid: they cross only if the triangle's plane or edges reach into it.
+    if (!outer) outer.emplace(shell.foci, shell.outer_tau);
     EllipseArcs arcs;
-    reported[i] =
-        clip_ellipse(shell.outer, block.vertex[0].get(i), block.vertex[1].get(i), block.vertex[2].get(i), arcs);
+    reported[i] = clip_ellipse(*outer, block.vertex[0].get(i), block.vertex[1].get(i), block.vertex[2].get(i), arcs);
     --uncertain;
   }
   int found[kWidth], count = 0;
@@ -107,7 +109,7 @@ void EllipsoidBvh::Impl::test_block(const Block& block, const Shell& shell, std:
 
 template <bool kSurfaces>
 int EllipsoidBvh::Impl::test_node(const Node& node, const Shell& shell, int* lanes) const {
-  const Vec3 c = shell.center, u = shell.axis;
+  const Vec3 c = shell.foci.center, u = shell.foci.axis;
   const QuadraticForm high = shell.high, low = shell.low;
   Wide lowest, highest, lowest_of_low, highest_of_high;
   for (int i = 0; i < kWidth; ++i) {
@@ -273,38 +275,40 @@ int EllipsoidBvh::query_surfaces(const Vec3& a, const Vec3& b, double tau_low, d
                                  std::vector<int>& ids) const {
   const auto shell = make_shell(a, b, tau_low, tau_high);
   if (!shell) return 0;
-  // Nothing is between equal lengths, and of a coarse mesh's triangles few are: the simpler tests do.
-  const bool fine = impl_->blocks.size() > Impl::kWidth;
-  return tau_low < tau_high && fine ? impl_->visit<true>(*shell, ids) : impl_->visit<false>(*shell, ids);
+  return impl_->has_between(tau_low, tau_high) ? impl_->visit<true>(*shell, ids) : impl_->visit<false>(*shell, ids);
 }
 
 void EllipsoidBvh::sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u,
                                    std::vector<int>& ids, std::vector<double>& inverse_probability) const {
-  if (!impl_ || impl_->blocks.size() <= kKept) {
-    query_surfaces(a.p, b.p, tau_low, tau_high, ids);
+  auto shell = make_shell(a.p, b.p, tau_low, tau_high);
+  if (!shell) return;
+  shell->exact = false;
+  const bool surfaces = impl_->has_between(tau_low, tau_high);
+  if (impl_->blocks.size() <= kKept) {
+    surfaces ? impl_->visit<true>(*shell, ids) : impl_->visit<false>(*shell, ids);
     inverse_probability.resize(ids.size(), 1.0);
-  } else if (const auto shell = make_shell(a.p, b.p, tau_low, tau_high)) {
-    if (tau_low < tau_high)
-      impl_->visit_some<true>(*shell, a, b, u, ids, inverse_probability);
-    else
-      impl_->visit_some<false>(*shell, a, b, u, ids, inverse_probability);
+  } else if (surfaces) {
+    impl_->visit_some<true>(*shell, a, b, u, ids, inverse_probability);
+  } else {
+    impl_->visit_some<false>(*shell, a, b, u, ids, inverse_probability);
   }
 }
 
 std::optional<EllipsoidBvh::Shell> EllipsoidBvh::make_shell(const Vec3& a, const Vec3& b, double tau_low,
                                                             double tau_high) const {
-  const Ellipsoid outer(a, b, tau_high);
-  const Ellipsoid inner(a, b, tau_low);
-  if (!impl_ || !(outer.valid() || tau_high == kInfinity)) return std::nullopt;
-  const Vec3& axis = outer.valid() ? outer.axis : inner.axis;
-  Shell shell{outer.center, axis, QuadraticForm(outer), QuadraticForm(inner), 0, 0, 0, 0, outer};
+  if (!impl_) return std::nullopt;
+  const Foci foci(a, b);
+  const Ellipsoid outer(foci, tau_high), inner(foci, tau_low);
+  if (!(outer.valid() || tau_high == kInfinity)) return std::nullopt;
+  const QuadraticForm high(outer);
+  Shell shell{foci, high, tau_low == tau_high ? high : QuadraticForm(inner), 0, 0, 0, 0, 0};
 
   // Positions relative to the centre carry the round-off of all coordinates involved, here counted generously
   // as a change of tau; |dQ/dtau| <= major / minor^2 on the surface turns it into a change of Q, and the
   // evaluation of Q cancels terms of size reach^2 / minor^2.
   const Vec3 middle = impl_->bounds.center();
   const double radius = length(impl_->bounds.high - middle);
-  const double reach = length(middle - outer.center) + radius + outer.major;
+  const double reach = length(middle - foci.center) + radius + outer.major;
   const double magnitude = reach + length(middle) + radius + length(a) + length(b);
   const double round_off = 64 * std::numeric_limits<double>::epsilon();
   const auto slack = [&](const QuadraticForm& form) { return 4 * round_off * reach * magnitude * form.inverse_minor2; };
@@ -312,7 +316,7 @@ std::optional<EllipsoidBvh::Shell> EllipsoidBvh::make_shell(const Vec3& a, const
   shell.outside = inner.valid() ? 1 - slack(shell.low) : -kInfinity;
   shell.between_low = inner.valid() ? 1 + slack(shell.low) : -kInfinity;
   shell.between_high = 1 - slack(shell.high);
-  shell.outer = Ellipsoid(a, b, tau_high + round_off * magnitude);
+  shell.outer_tau = tau_high + round_off * magnitude;
   return shell;
 }
 

@@ -52,6 +52,9 @@ struct EllipsoidBvh::Impl {
     double weight;               ///< what the paths through it may carry, over the probability
     double inverse_probability;  ///< of having been kept so far
   };
+  /// Whether it pays to look for triangles strictly between the two ellipsoids: nothing is between equal lengths, and of a
+  /// coarse mesh's triangles few are.
+  bool has_between(double tau_low, double tau_high) const { return tau_low < tau_high && blocks.size() > kWidth; }
   // With `kSurfaces` what lies strictly between the two ellipsoids is left out.
   template <bool kSurfaces>
   int visit(const Shell& shell, std::vector<int>& ids) const;

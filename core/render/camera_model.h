@@ -37,13 +37,13 @@ class CameraModel {
     return static_cast<int>(v) * width + static_cast<int>(u);
   }
 
-  /// Whether the straight line from a to b lies beyond one border of the image, or behind the camera.
-  bool misses_image(const Vec3& a, const Vec3& b) const {
-    const Vec3 from_a = a - position, from_b = b - position;
+  /// Whether all of what lies between the points is beyond one border of the image, or behind the camera.
+  template <class... Points>
+  bool misses_image(const Points&... points) const {
     const double across = 0.5 * width * pixel_size_, down = 0.5 * height * pixel_size_;
     for (const Vec3& outwards :
          {-forward, right_ - forward * across, -right_ - forward * across, up_ - forward * down, -up_ - forward * down})
-      if (dot(from_a, outwards) > 0 && dot(from_b, outwards) > 0) return true;
+      if (((dot(points - position, outwards) > 0) && ...)) return true;
     return false;
   }
 

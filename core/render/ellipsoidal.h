@@ -40,7 +40,7 @@ class EllipsoidalConnections {
     worker_.start_at_camera(worker_.path);
     draw_targets(GatePick::kImage, rng);
     for (const Target& target : targets_) {
-      connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
+      if (scene_.camera_sees_emitters) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
       if (worker_.options.max_bounces >= 1) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
     }
   }
@@ -107,8 +107,8 @@ class EllipsoidalConnections {
   /// One sampled point on an arc, before its visibility is known.
   struct ArcPoint {
     SurfacePoint point;
-    double span = 0, area_rate = 0;  ///< density of the point: 1 / (span * area_rate) per area and length
-    Rgb value;                       ///< contribution over density, unshadowed, without MIS weight
+    double pdf = 0;  ///< of the point on its triangle's arc, per area and length
+    Rgb value;       ///< contribution over density, unshadowed, without MIS weight
     int pixel = -1;
   };
   struct ArcPair {
@@ -176,9 +176,10 @@ class EllipsoidalConnections {
     const SurfacePoint& x = path.back();
     const double before = path.length.back();
     const double high = target.longest() - before, low = target.shortest() - before;
-    if (!(high > length(x.p - y.p))) return;
 
-    const Ellipsoid ellipsoids[2] = {{x.p, y.p, target.tau[0] - before}, {x.p, y.p, target.tau[1] - before}};
+    const Foci foci(x.p, y.p);
+    if (!(high > foci.distance)) return;
+    const Ellipsoid ellipsoids[2] = {{foci, target.tau[0] - before}, {foci, target.tau[1] - before}};
     const EllipsoidBvh& bvh = ends_are_static(y.triangle) ? scene_.moving_triangles : scene_.all_triangles;
     find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
 
@@ -200,7 +201,7 @@ class EllipsoidalConnections {
       if (!seen || !worker_.visible(q.point, y)) continue;
       worker_.path.push(scene_, q.point);
       worker_.path.push(scene_, y);
-      deliver(target, i, q.pixel, q.value * inverse_probability, &ArcDensities::surface);
+      deliver(target, i, q, inverse_probability, &ArcDensities::surface);
       worker_.path.pop();
       worker_.path.pop();
     }
@@ -243,7 +244,8 @@ class EllipsoidalConnections {
     const EllipsoidBvh::Focus anywhere{x.p, {0, 0, 0}, 0, 1, false};
     find_candidates(scene_.emitter_triangles, anywhere, low, high, thinning);
 
-    const Ellipsoid spheres[2] = {{x.p, x.p, 2 * (target.tau[0] - before)}, {x.p, x.p, 2 * (target.tau[1] - before)}};
+    const Foci foci(x.p, x.p);
+    const Ellipsoid spheres[2] = {{foci, 2 * (target.tau[0] - before)}, {foci, 2 * (target.tau[1] - before)}};
     ArcPair chosen;
     const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
       if (!(scene_.height_over(t, x.p) > 0) || ends_are_static(t)) return;
@@ -257,7 +259,7 @@ class EllipsoidalConnections {
       if (y.value.is_black()) continue;
       if (!(path.size() == 1 ? worker_.visible_from_camera(y.point) : worker_.visible(x, y.point))) continue;
       worker_.path.push(scene_, y.point);
-      deliver(target, i, y.pixel, y.value * inverse_probability, &ArcDensities::emitter);
+      deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
       worker_.path.pop();
     }
   }
@@ -321,9 +323,9 @@ class EllipsoidalConnections {
       albedo *= material_x.albedo;
     }
     if (!(carried > 0)) return;
-    out.span = arcs.total_span;
-    out.area_rate = area_per_angle_and_length(ellipsoid, q.p, q.n);
-    out.value = factor * albedo * (carried * out.span * out.area_rate);
+    const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n);
+    out.pdf = 1 / area;
+    out.value = factor * albedo * (carried * area);
     out.point = q;
   }
 
@@ -353,24 +355,26 @@ class EllipsoidalConnections {
       albedo = material.albedo;
     }
     if (!(carried > 0)) return;
-    out.span = arcs.total_span;
-    out.area_rate = distance;  // on a circle about the foot of x in the plane, dA = r dr dphi with r the distance
-    out.value = throughput * albedo * scene_.shape_of(t).emission * (carried * out.span * out.area_rate);
+    // About the foot of x in the plane, dA = r dr dphi with r the distance.
+    const double area = arcs.total_span * distance;
+    out.pdf = 1 / area;
+    out.value = throughput * albedo * scene_.shape_of(t).emission * (carried * area);
     out.point = y;
   }
 
   /// Share of a contribution found by `technique`, over the connections' share of the samples.
-  double mis_weight(const Target& target, int i, int pixel, double ArcDensities::*technique) const {
+  double mis_weight(const Target& target, int i, const ArcPoint& found, double ArcDensities::*technique) const {
     // No other technique finds lengths at a jump, and these serve one gate.
     const bool jump = target.jump[i];
     const Path& path = worker_.path;
     const GatePick& pick = worker_.pick;
+    const int pixel = found.pixel;
     // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
     // densities of the length differ between the two techniques.
     const bool same_length_pdf = pick.uniform() || path.size() != 3;
     const ConnectionRates& rates = worker_.rates;
     const double camera_rate = target.pair ? rates.camera_pairs : rates.camera_lengths;
-    const ArcDensities d = worker_.techniques.arcs(path, kGathers, [&](int from) {
+    const ArcDensities d = worker_.techniques.arcs(path, technique, found.pdf, kGathers, [&](int from) {
       if (kGathers) return 1.0;
       const double rate = from == 0 ? camera_rate : rates.walk;
       if (same_length_pdf) return rate;
@@ -387,21 +391,22 @@ class EllipsoidalConnections {
     return ours / share * (d.*technique / sum);
   }
 
-  /// The worker's path is complete and as long as side i of the target says.
-  void deliver(const Target& target, int i, int pixel, const Rgb& unweighted, double ArcDensities::*technique) {
+  /// The worker's path is complete, by the point `found`, and as long as side i of the target says.
+  void deliver(const Target& target, int i, const ArcPoint& found, double inverse_probability,
+               double ArcDensities::*technique) {
     if constexpr (!kGathers)
       if (!worker_.matters(worker_.path)) return;
-    const Rgb value = unweighted * (mis_weight(target, i, pixel, technique) * target.scale);
+    const Rgb value = found.value * (inverse_probability * mis_weight(target, i, found, technique) * target.scale);
     if constexpr (kGathers) {
       receiver_.take(target.index, worker_.path.size() - 2, value);
     } else if (!target.pair) {
-      worker_.emit(worker_.path, pixel, value, target.tau[0], pass_.use);
+      worker_.emit(worker_.path, found.pixel, value, target.tau[0], pass_.use);
     } else if constexpr (Sink::kDifferential) {
       note_path(worker_.sink, worker_.path);
       differentiate_path(scene_, worker_.path.vertex.data(), worker_.path.size(), true, worker_.differential);
       if (worker_.differential.empty()) return;
       worker_.sink.bind(worker_.differential);
-      worker_.sink.add_length_rate(pixel, target.gate, i == 0 ? value : value * -1.0);
+      worker_.sink.add_length_rate(found.pixel, target.gate, i == 0 ? value : value * -1.0);
     }
   }
 

@@ -73,6 +73,8 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
       record.emits = true;
       emitters.push_back(t);
       emitting.push_back(input);
+      const auto& [a, b, c] = input.vertex;
+      camera_sees_emitters |= height_over(t, camera.position) > 0 && !camera.misses_image(a, b, c);
       power.push_back(record.area * shape_of(t).emission.max());
     }
   }

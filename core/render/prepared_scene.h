@@ -68,7 +68,8 @@ class PreparedScene {
   MovingParts moving;
   CameraFlow camera_flow;
   RayCaster caster;
-  std::vector<int> emitters;  ///< triangles that emit
+  std::vector<int> emitters;          ///< triangles that emit
+  bool camera_sees_emitters = false;  ///< may, if nothing is in between
   EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
 
   int shape_index(int triangle) const { return records_[triangle].shape; }

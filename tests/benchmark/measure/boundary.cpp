@@ -158,7 +158,7 @@ Scene ball_scene() {
 int main(int argc, char** argv) {
   using namespace isochron;
   using namespace isochron::benchmarks;
-  if (argc < 2 || argc > 3) {
+  if (argc < 2 || argc > 3 || argv[1][0] == '-') {
     std::fprintf(stderr, "usage: isochron_boundary CSV [BATCHES]\n");
     return 2;
   }

@@ -229,41 +229,46 @@ void measure_loads(int rounds, Report& report) {
   }
 }
 
-/// Wall time with one thread over that with two.
+/// Wall time with one thread over that with two, and how much of the two threads' time is spent at work: what is lost
+/// besides is the machine's.
 void measure_threads(const NamedScene& s, int rounds, Report& report) {
   const TangentBasis basis = all_vertices(s.scene);
   const GateSet gates = wide_gates();
   const Renderer renderer(s.scene, gates, {.max_bounces = 8, .sampling = Sampling::standard}, &basis);
   const GatedImage adjoint = unit_adjoint(s.scene, gates);
   std::vector<double> gradient(DofLayout(s.scene).size());
-  const auto speed_up = [&](const std::function<void()>& work) {
-    const auto with = [&](int threads) {
-      return [&work, threads] {
-        set_thread_count(threads);
-        work();
-        return 1.0;
-      };
+  const auto add = [&](const std::string& what, const char* goal, const std::function<void()>& work) {
+    std::vector<double> busy;
+    const auto with_one = [&] {
+      set_thread_count(1);
+      work();
+      return 1.0;
     };
-    return measure_pair(rounds, CLOCK_MONOTONIC, with(1), with(2)).ratio;
+    const auto with_two = [&] {
+      set_thread_count(2);
+      const double wall = seconds(CLOCK_MONOTONIC), cpu = seconds(CLOCK_PROCESS_CPUTIME_ID);
+      work();
+      busy.push_back((seconds(CLOCK_PROCESS_CPUTIME_ID) - cpu) / (2 * (seconds(CLOCK_MONOTONIC) - wall)));
+      return 1.0;
+    };
+    const double ratio = measure_pair(rounds, CLOCK_MONOTONIC, with_one, with_two).ratio;
+    report.add("one thread / two", s.name + " " + what, ratio, "", goal);
+    report.add("two threads at work", s.name + " " + what, median(busy), "of their time");
   };
   const SampleRange samples{0, 64};
   // What the machine's second core is worth at the time.
   const PreparedScene prepared(s.scene, nullptr);
   const auto rays = record_rays(prepared, gates, 8, samples.count());
   constexpr int kParts = 64;
-  report.add("one thread / two", s.name + " Embree alone", speed_up([&] {
-               parallel(kParts, [&](int part) {
-                 const std::size_t begin = rays.size() * part / kParts, end = rays.size() * (part + 1) / kParts;
-                 trace_bare(prepared.caster.embree_scene(), std::span(rays).subspan(begin, end - begin));
-               });
-             }),
-             "");
-  report.add("one thread / two", s.name + " render", speed_up([&] { renderer.render({.seed = 3}, samples); }), "",
-             ">= 1.9");
-  report.add("one thread / two", s.name + " interior gradient", speed_up([&] {
-               renderer.add_gradient(Term::interior, adjoint, {.seed = 3, .pass = 1}, samples, gradient);
-             }),
-             "", ">= 1.9");
+  add("Embree alone", "", [&] {
+    parallel(kParts, [&](int part) {
+      const std::size_t begin = rays.size() * part / kParts, end = rays.size() * (part + 1) / kParts;
+      trace_bare(prepared.caster.embree_scene(), std::span(rays).subspan(begin, end - begin));
+    });
+  });
+  add("render", ">= 1.9", [&] { renderer.render({.seed = 3}, samples); });
+  add("interior gradient", ">= 1.9",
+      [&] { renderer.add_gradient(Term::interior, adjoint, {.seed = 3, .pass = 1}, samples, gradient); });
   set_thread_count(1);
 }
 
@@ -272,11 +277,11 @@ void measure_threads(const NamedScene& s, int rounds, Report& report) {
 
 int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
-  if (argc < 2 || argc > 3) {
+  const int rounds = argc > 2 ? std::atoi(argv[2]) : 15;
+  if (argc < 2 || argc > 3 || argv[1][0] == '-' || rounds < 1) {
     std::fprintf(stderr, "usage: isochron_measure CSV [ROUNDS]\n");
     return 2;
   }
-  const int rounds = argc > 2 ? std::max(std::atoi(argv[2]), 1) : 15;
   isochron::set_thread_count(1);
   isochron::keep_freed_memory();
   Report report(argv[1]);
