@@ -297,6 +297,7 @@ void read_settings(YamlMap& map, Experiment& experiment) {
       experiment.gradient.step = step->number(NumberRange::positive());
       experiment.gradient.step_given = true;
     }
+    if (const auto common = gradient.find("common_numbers")) experiment.gradient.common_numbers = common->boolean();
     gradient.reject_unknown();
   }
   if (const auto value = map.find("loss")) experiment.loss = read_loss(*value);

@@ -6,7 +6,7 @@
 //   samples: 64 for each of primal, interior, visibility, path_length
 //   estimator: sampling auto, antithetic true, pick contribution, numbers low_discrepancy, guiding true,
 //     follow_radius 4
-//   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter)
+//   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter; common_numbers true)
 //   loss: kind squared                (huber, cauchy: scale 1)
 //   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);
 //     lbfgs: inner_iterations 5
@@ -107,6 +107,8 @@ struct GradientSpec {
   GradientMethod method = GradientMethod::analytic;
   double step = 0.01;       ///< finite_difference: half the distance of the two images, in units of the parameter
   bool step_given = false;  ///< whether the file gives it
+  /// finite_difference: whether both images take the same random numbers, so that most of their noise cancels.
+  bool common_numbers = true;
 };
 
 enum class LossKind { squared, huber, cauchy };

@@ -118,6 +118,7 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
   // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.
   if (!analytic || e.gradient.step_given) fmt::format_to(out, "  step: {}\n", e.gradient.step);
+  if (!e.gradient.common_numbers) fmt::format_to(out, "  common_numbers: false\n");
   constexpr const char* kLosses[] = {"squared", "huber", "cauchy"};
   fmt::format_to(out, "loss:\n  kind: {}\n", kLosses[static_cast<int>(e.loss.kind)]);
   if (e.loss.kind != LossKind::squared) fmt::format_to(out, "  scale: {}\n", e.loss.scale);

@@ -32,6 +32,18 @@ Method with_sampling(const std::string& name, Sampling sampling, bool antithetic
           }};
 }
 
+/// Central differences of images as auto.
+Method differences(const std::string& name, double step, bool common_numbers) {
+  return {name,
+          [=](Experiment& e) {
+            set_automatic(e);
+            e.gradient.method = GradientMethod::finite_difference;
+            e.gradient.step = step;
+            e.gradient.common_numbers = common_numbers;
+          },
+          Method::Gradient::finite_difference};
+}
+
 Experiment changed(Experiment experiment, const Method& method) {
   method.change(experiment);
   return experiment;
@@ -54,14 +66,7 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
     methods.push_back(with_sampling("ellipsoidal_coupled", Sampling::ellipsoidal, true));
   }
   methods.push_back(automatic_method());
-  for (double step : steps)
-    methods.push_back({fmt::format("finite_difference_{:.3g}", step),
-                       [step](Experiment& e) {
-                         set_automatic(e);
-                         e.gradient.method = GradientMethod::finite_difference;
-                         e.gradient.step = step;
-                       },
-                       Method::Gradient::finite_difference});
+  for (double step : steps) methods.push_back(differences(fmt::format("finite_difference_{:.3g}", step), step, true));
   if (experiment.estimator.max_bounces > kFewBounces)
     methods.push_back({fmt::format("{}_bounces", kFewBounces), [](Experiment& e) {
                          set_automatic(e);
@@ -79,6 +84,10 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
                      },
                      Method::Gradient::forward});
   return methods;
+}
+
+Method independent_differences(double step) {
+  return differences(fmt::format("finite_difference_{:.3g}_independent", step), step, false);
 }
 
 std::vector<double> default_steps(const Problem& problem, const std::vector<double>& theta) {

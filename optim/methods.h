@@ -32,6 +32,10 @@ Method automatic_method();
 std::vector<Method> methods_for(const Experiment& experiment, const std::vector<double>& steps,
                                 std::vector<std::string>& notes);
 
+/// finite_difference_STEP_independent: finite differences of images whose random numbers have nothing in common, as a
+/// renderer without control of them gives.
+Method independent_differences(double step);
+
 /// Three steps for finite differences: 4, 1 and 1/4 times the smallest check_step of the parameters, or
 /// gradient.step where the experiment gives one.
 std::vector<double> default_steps(const Problem& problem, const std::vector<double>& theta);

@@ -186,7 +186,9 @@ GatedImage Problem::finite_difference(const std::vector<double>& theta, int comp
   above[component] = std::min(theta[component] + step, parameters_->upper()[component]);
   below[component] = std::max(theta[component] - step, parameters_->lower()[component]);
   GatedImage difference = render(above, stream, range);
-  const GatedImage lower = render(below, stream, range);
+  Stream of_lower = stream;
+  if (!experiment_.gradient.common_numbers) of_lower.pass = pass_number(Pass::other_side);
+  const GatedImage lower = render(below, of_lower, range);
   const double distance = above[component] - below[component];
   for (std::size_t i = 0; i < difference.data.size(); ++i)
     difference.data[i] = (difference.data[i] - lower.data[i]) / distance;

@@ -28,7 +28,8 @@ enum class Pass : std::uint32_t {
   target = 4,
   finite_difference = 5,
   photon_noise = 6,
-  mix = 7
+  mix = 7,
+  other_side = 8  ///< of a finite difference, where its images take random numbers of their own
 };
 
 /// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.

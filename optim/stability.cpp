@@ -163,6 +163,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
   Stability map;
   std::vector<Method> methods = methods_for(experiment, options.steps, map.notes);
   methods.pop_back();  // `paper` differs in cost, not in where it fails
+  if (!options.steps.empty()) methods.push_back(independent_differences(options.steps[options.steps.size() / 2]));
   std::vector<double> theta;
   {
     const Problem problem(experiment);
@@ -218,9 +219,10 @@ std::string stability_csv(const Stability& map) {
 
 std::string stability_table(const Stability& map) {
   std::string text;
-  constexpr int kWidth = 26;
+  std::size_t column = 26;
+  for (const StabilityCell& cell : map.cells) column = std::max(column, cell.method.size());
   for (std::size_t i = 0; i < map.cells.size() && map.cells[i].width == map.cells[0].width; ++i)
-    text += fmt::format("  {:<{}}", map.cells[i].method, kWidth);
+    text += fmt::format("  {:<{}}", map.cells[i].method, column);
   text = fmt::format("{:<9}{}\n", "width", text);
   for (std::size_t i = 0; i < map.cells.size(); ++i) {
     const StabilityCell& c = map.cells[i];
@@ -229,7 +231,7 @@ std::string stability_table(const Stability& map) {
     if (first) text += fmt::format("{:<9.3g}", c.width);
     text += fmt::format("  {:<{}}",
                         fmt::format("{:.0f} % {:.3g} {}", 100 * c.direction.positive, c.error_ratio, name(c.failure)),
-                        kWidth);
+                        column);
     if (last) text += "\n";
   }
   text += fmt::format(

@@ -56,7 +56,8 @@ def styles(methods):
 
 def plain(method):
     """A method's name for people."""
-    return method.replace("finite_difference_", "finite differences, step ").replace("_", " ")
+    method = method.replace("finite_difference_", "finite differences, step ")
+    return method.replace("_independent", ", independent images").replace("_", " ")
 
 
 

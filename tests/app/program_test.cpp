@@ -161,8 +161,9 @@ TEST_F(Program, StabilityMapsWidthsAndMethods) {
                       0),
             0u)
       << csv;
-  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 * 5);
+  EXPECT_EQ(std::count(csv.begin(), csv.end(), '\n'), 1 + 2 * 6);
   EXPECT_NE(csv.find("\n0.001,finite_difference_0.05,"), std::string::npos);
+  EXPECT_NE(csv.find("\n0.001,finite_difference_0.05_independent,"), std::string::npos);
   const Result steady = run({"stability", file, "-o", out, "--set", "gates={kind: steady}"});
   EXPECT_NE(steady.errors.find("steady gates have no width"), std::string::npos) << steady.errors;
 }

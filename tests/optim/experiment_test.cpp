@@ -196,7 +196,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
   const std::string vertices =
       "seed: 9007199254740993\nestimator: {sampling: ellipsoidal, antithetic: false, pick: uniform, "
       "numbers: independent, guiding: false, follow_radius: 2.5}\n"
-      "gradient: {method: finite_difference, step: 0.003}\nresolution: [12, 9]\n";
+      "gradient: {method: finite_difference, step: 0.003, common_numbers: false}\nresolution: [12, 9]\n";
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
   for (const char* other : {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
                             "{kind: boxcar, centers: {start: 1, stop: 2, count: 4}, width: 0.7}",
@@ -239,6 +239,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_FALSE(back.guiding);
     EXPECT_EQ(back.estimator.follow_radius, 2.5);
     EXPECT_EQ(back.gradient.step, 0.003);
+    EXPECT_FALSE(back.gradient.common_numbers);
     EXPECT_EQ(back.resolution, (std::array<int, 2>{12, 9}));
     EXPECT_EQ(back.target.max_bounces, 3);
     ASSERT_EQ(back.parameters.size(), 7u);

@@ -36,6 +36,27 @@ TEST(Gradient, AgreesWithFiniteDifferences) {
   }
 }
 
+TEST(Gradient, DifferencesOfIndependentImagesAreAsRightAndNoisier) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string file = folder.write("tiny.yaml", tiny_experiment());
+  const Poll go_on = [] {};
+  const auto estimate = [&](const std::string& method) {
+    const Problem problem(load_experiment(file, {"samples={primal: 512, interior: 0, visibility: 0, path_length: 0}",
+                                                 "parameters[1].initial=2", method}));
+    return estimate_gradient(problem, problem.parameters().initial(), problem.make_target(go_on), go_on).gradient;
+  };
+  const auto common = estimate("gradient={method: finite_difference, step: 0.05}"),
+             independent = estimate("gradient={method: finite_difference, step: 0.05, common_numbers: false}");
+  for (int i = 0; i < 2; ++i) {
+    // Student's t of 31 degrees of freedom exceeds 5 with probability 2e-5.
+    EXPECT_NEAR(common.mean[i], independent.mean[i],
+                5 * std::hypot(common.standard_error[i], independent.standard_error[i]));
+  }
+  // By the emission, in proportion to which images are: common numbers leave next to none of their noise.
+  EXPECT_GT(independent.standard_error[1], 3 * common.standard_error[1]);
+}
+
 TEST(Gradient, OfAnEmissionIsKnown) {
   // Radiance is linear in the lamp's emission e: dI/de = I / e, so dLoss/de = (2/N) sum (I - T) I / e.
   const TemporaryFolder folder;
