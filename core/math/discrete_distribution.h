@@ -14,6 +14,12 @@ class DiscreteDistribution {
   explicit DiscreteDistribution(const std::vector<double>& weights) {
     below_.reserve(weights.size() + 1);
     for (double w : weights) below_.push_back(below_.back() + w);
+    first_.reserve(weights.size());
+    for (int part = 0, i = 0; part < size(); ++part) {
+      const double begin = total() * part / size();
+      while (i + 1 < size() && below_[i + 1] <= begin) ++i;
+      first_.push_back(i);
+    }
   }
   bool empty() const { return total() <= 0; }
   double total() const { return below_.back(); }
@@ -31,9 +37,9 @@ class DiscreteDistribution {
   /// uniform number.
   int sample(double& u) const {
     const double target = u * total();
-    // Were all weights alike it would be this one: then a draw waits for memory once, not for every step of a search.
+    // Were all weights alike it would be this one: then a draw waits for memory once. Else a table tells about where it is.
     int i = guess(u);
-    if (!(below_[i] <= target && target < below_[i + 1])) i = search(target, i);
+    if (!(below_[i] <= target && target < below_[i + 1])) i = search(target, first_[i]);
     u = std::clamp((target - below_[i]) / (below_[i + 1] - below_[i]), 0x1p-53, 1 - 0x1p-53);
     return i;
   }
@@ -62,6 +68,7 @@ class DiscreteDistribution {
   }
 
   std::vector<double> below_{0.0};  ///< [i]: sum of the weights before index i; one more than weights
+  std::vector<int> first_;          ///< [k]: the index whose share holds k of size() equal parts of the sum
 };
 
 }  // namespace isochron
