@@ -16,25 +16,26 @@ Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const
 }
 
 /// How often an edge is to be looked at from the camera: by its length in the image, and between two faces that are both
-/// seen, where light changes little, by the angle between them. Zero where it makes no difference to any image.
-double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, bool wedge) {
+/// seen, where light changes little, by the angle between them, `wedge` (without it, pi). Zero where it makes no difference
+/// to any image.
+double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, double wedge) {
   const Vec3 a = edge.origin - scene.camera.position, b = edge.end - scene.camera.position;
   if (scene.camera.misses_image(edge.origin, edge.end)) return 0;
   const Vec3 middle = (a + b) * 0.5;
-  const double r = isochron::length(middle);
-  bool within_outline = edge.pierced;
-  if (edge.faces() == 2 && !edge.pierced) {
+  const double r = length(middle);
+  bool within_outline = edge.pierced();
+  if (edge.faces() == 2 && !edge.pierced()) {
     bool seen[2], dark = true;
     for (int i = 0; i < 2; ++i) {
       const Material& material = scene.material_of(edge.face[i]);
-      seen[i] = dot(scene.normal(edge.face[i]), a) <= kCoplanarAngle * isochron::length(a);
+      seen[i] = dot(scene.normal(edge.face[i]), a) <= kCoplanarAngle * length(a);
       dark &= !seen[i] && !material.two_sided && !scene.is_dielectric(edge.face[i]);
     }
     if (dark) return 0;
     within_outline = seen[0] == seen[1];
   }
-  const double in_image = isochron::length(cross(a, b)) / (r * (r * r + edge.length * edge.length));
-  return in_image * (wedge && within_outline ? std::min(1.0, edge.wedge()) : 1.0);
+  const double in_image = length(cross(a, b)) / (r * (r * r + length_squared(b - a)));
+  return in_image * (within_outline ? std::min(1.0, wedge) : 1.0);
 }
 
 }  // namespace
@@ -45,21 +46,22 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
     for (int i = 0; i < 2; ++i) b.vertex[i] = e.vertex[i], b.face[i] = e.face[i];
     b.origin = scene.scene.positions[e.vertex[0]];
     b.end = scene.scene.positions[e.vertex[1]];
-    b.length = isochron::length(b.end - b.origin);
-    bool degenerate = !(b.length > 0);
+    const double edge_length = length(b.end - b.origin);
+    bool degenerate = !(edge_length > 0);
     for (int i = 0; i < b.faces(); ++i) degenerate |= !(scene.area(b.face[i]) > 0);
     if (degenerate) continue;
-    b.tangent = (b.end - b.origin) / b.length;
-    for (int i = 0; i < b.faces(); ++i) b.inward[i] = inward_direction(scene, b.face[i], e, b.tangent);
+    const Vec3 tangent = (b.end - b.origin) / edge_length;
+    for (int i = 0; i < b.faces(); ++i) b.inward[i] = inward_direction(scene, b.face[i], e, tangent);
+    double angle = kPi;
     if (b.faces() == 2) {
-      b.opening = std::atan2(isochron::length(cross(b.inward[0], b.inward[1])), dot(b.inward[0], b.inward[1]));
-      if (b.wedge() < kCoplanarAngle) continue;
+      angle -= std::atan2(length(cross(b.inward[0], b.inward[1])), dot(b.inward[0], b.inward[1]));
+      if (angle < kCoplanarAngle) continue;
     }
-    const bool moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
-    if (moves || scene.camera_flow.possible())
-      if (const double weight = primary_weight(scene, b, wedge); weight > 0) primary_.add(b, weight, moves);
-    b.azimuths = wedge ? b.wedge() : kPi;
-    secondary_.add(b, b.length * b.azimuths, moves);
+    b.azimuths = wedge ? angle : kPi;
+    b.moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
+    if (b.moves || scene.camera_flow.possible())
+      if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
+    secondary_.add(b, edge_length * b.azimuths);
   }
   if (scene.moving.geometry) add_piercings(scene, wedge);
   primary_.finish();
@@ -69,30 +71,25 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
 void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
   for (const Piercing& p : find_piercings(scene.scene, scene.caster)) {
     BoundaryEdge b;
-    b.pierced = true;
     b.origin = p.end[0];
     b.end = p.end[1];
-    b.length = isochron::length(b.end - b.origin);
-    b.tangent = (b.end - b.origin) / b.length;
-    bool moves = false;
     for (int i = 0; i < 2; ++i) {
       b.face[i] = p.triangle[i];
-      b.inward[i] = normalize(cross(scene.normal(b.face[i]), b.tangent));
-      moves |= scene.has_moving_vertex(b.face[i]);
+      b.inward[i] = normalize(cross(scene.normal(b.face[i]), b.end - b.origin));
+      b.moves |= scene.has_moving_vertex(b.face[i]);
     }
     // The angle between the planes takes the place of the wedge.
-    const double angle =
-        std::atan2(isochron::length(cross(b.inward[0], b.inward[1])), std::abs(dot(b.inward[0], b.inward[1])));
-    b.opening = kPi - angle;
-    if (angle < kCoplanarAngle || !(moves || scene.camera_flow.possible())) continue;
-    if (const double weight = primary_weight(scene, b, wedge); weight > 0) primary_.add(b, weight, moves);
+    const double angle = std::atan2(length(cross(b.inward[0], b.inward[1])), std::abs(dot(b.inward[0], b.inward[1])));
+    b.azimuths = wedge ? angle : kPi;
+    if (angle < kCoplanarAngle || !(b.moves || scene.camera_flow.possible())) continue;
+    if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
   }
 }
 
 void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b,
                                  LocalDifferential& out) {
   const BoundaryEdge& edge = *point.edge;
-  if (!edge.pierced) {
+  if (!edge.pierced()) {
     const double share[2] = {1 - point.s, point.s};
     for (int i = 0; i < 2; ++i)
       if (scene.moving.vertex[edge.vertex[i]]) out.vertices.push_back({edge.vertex[i], n_b * share[i], {}});
@@ -109,30 +106,31 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
   }
 }
 
-void BoundaryEdges::Choice::add(const BoundaryEdge& edge, double weight, bool moves) {
+void BoundaryEdges::Choice::add(const BoundaryEdge& edge, double weight) {
   edges.push_back(edge);
   weights.push_back(weight);
-  moving.push_back(moves);
 }
 
 void BoundaryEdges::Choice::finish() {
   double sum[2] = {0, 0};
-  for (std::size_t i = 0; i < edges.size(); ++i) sum[moving[i] ? 1 : 0] += weights[i];
+  for (std::size_t i = 0; i < edges.size(); ++i) sum[edges[i].moves] += weights[i];
   if (sum[0] > 0 && sum[1] > 0)
-    for (std::size_t i = 0; i < edges.size(); ++i) weights[i] /= sum[moving[i] ? 1 : 0];
+    for (std::size_t i = 0; i < edges.size(); ++i) weights[i] /= sum[edges[i].moves];
   distribution = DiscreteDistribution(weights);
 }
 
-BoundaryEdges::Sample BoundaryEdges::Choice::sample(double u) const {
-  Sample result;
+BoundaryEdges::Place BoundaryEdges::Choice::place(double u) const {
   const int i = distribution.sample(u);
-  result.edge = &edges[i];
-  result.s = u;
-  result.y = result.edge->point(u);
-  result.begin = distribution.below(i);
-  result.share = distribution.probability(i);
-  result.pdf = result.share / result.edge->length;
-  return result;
+  const char* record = reinterpret_cast<const char*>(&edges[i]);
+  __builtin_prefetch(record);
+  __builtin_prefetch(record + 64);
+  return {&edges[i], u, distribution.below(i), distribution.probability(i)};
+}
+
+BoundaryEdges::Sample::Sample(const Place& place) : Place(place), y(edge->point(s)), tangent(edge->end - edge->origin) {
+  const double inverse = 1 / length(tangent);
+  tangent *= inverse;
+  pdf = share * inverse;
 }
 
 int BoundaryEdges::occluder_side(const BoundaryEdge& edge, const Vec3& n_b) {

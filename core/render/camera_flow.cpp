@@ -62,18 +62,14 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
 CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const MovingParts& moving, double radius)
     : position_(camera.position), forward_(camera.forward), radius_(radius * camera.pixel_size()) {
   if (!(radius > 0) || !moving.geometry) return;
-  Bounds moved;
-  for (std::size_t t = 0; t < scene.triangles.size(); ++t)
-    if (moving.triangle[t])
-      for (const int v : scene.triangles[t].vertex) moved.add(scene.positions[v]);
   // x1 is within s of the box, and its own depth enters s.
   constexpr double kLargest = 0.5;
-  const Vec3 farthest{camera.forward.x > 0 ? moved.high.x : moved.low.x,
-                      camera.forward.y > 0 ? moved.high.y : moved.low.y,
-                      camera.forward.z > 0 ? moved.high.z : moved.low.z};
+  const Vec3 farthest{camera.forward.x > 0 ? moving.bounds.high.x : moving.bounds.low.x,
+                      camera.forward.y > 0 ? moving.bounds.high.y : moving.bounds.low.y,
+                      camera.forward.z > 0 ? moving.bounds.high.z : moving.bounds.low.z};
   const double depth = std::max(0.0, dot(camera.forward, farthest - camera.position));
   const double margin = radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
-  near_ = moved.grown(margin);
+  near_ = moving.bounds.grown(margin);
   possible_ = !sees_nothing_of_itself(scene, moving);
   for (std::size_t t = 0; t < scene.triangles.size() && !possible_; ++t)
     possible_ = !moving.triangle[t] && bounds_of(scene, scene.triangles[t]).overlaps(near_);
@@ -81,7 +77,7 @@ CameraFlow::CameraFlow(const Scene& scene, const CameraModel& camera, const Movi
 
 CameraFlow::Follow CameraFlow::follow(const Vec3& x1, const Vec3& x2) const {
   if (!possible_) return {};
-  const double s = radius_ * dot(forward_, x1 - position_);
+  const double s = radius_at(x1);
   const Vec3 d = x1 - x2;
   const double inverse = 1 / (s * s), ratio = length_squared(d) * inverse;
   if (!(ratio < 1)) return {};

@@ -34,6 +34,8 @@ class CameraFlow {
     Vec3 gradient;      ///< of w with respect to x1
   };
   Follow follow(const Vec3& x1, const Vec3& x2) const;
+  /// s at x1: it does not follow what is farther off.
+  double radius_at(const Vec3& x1) const { return radius_ * dot(forward_, x1 - position_); }
 
   /// Whether there may be points x1 and x2, one of which moves, close enough for x1 to follow.
   bool possible() const { return possible_; }

@@ -28,7 +28,9 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
     for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
     const int m = scene.shapes[scene.triangles[t].shape].material;
     scatters[t] = albedo[m] || roughness[m] || ior[m];
-    geometry |= triangle[t] != 0;
+    if (!triangle[t]) continue;
+    geometry = true;
+    for (int v : scene.triangles[t].vertex) bounds.add(scene.positions[v]);
   }
   lengths |= geometry;
   any = !basis->entries.empty();
@@ -40,7 +42,8 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, dou
       layout(source),
       moving(source, basis),
       camera_flow(source, camera, moving, follow_radius),
-      caster(source) {
+      caster(source),
+      moving_bounds(moving.bounds.grown(caster.offset())) {
   for (const Shape& shape : scene.shapes) shapes_.push_back({&scene.materials[shape.material]});
   const std::size_t count = scene.triangles.size();
   records_.resize(count);

@@ -53,6 +53,7 @@ struct MovingParts {
   std::vector<std::uint8_t> emission;                ///< per shape
   std::vector<std::uint8_t> scatters;                ///< per triangle: its material's albedo, roughness or ior moves
   bool any = false, geometry = false;
+  Bounds bounds;         ///< of the triangles with a vertex that moves
   bool lengths = false;  ///< paths can change their length
   MovingParts(const Scene& scene, const TangentBasis* basis);
 };
@@ -68,6 +69,7 @@ class PreparedScene {
   MovingParts moving;
   CameraFlow camera_flow;
   RayCaster caster;
+  Bounds moving_bounds;  ///< of the triangles with a vertex that moves, and as much more as rays go astray by rounding
   std::vector<int> emitters;          ///< triangles that emit
   bool camera_sees_emitters = false;  ///< may, if nothing is in between
   EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
@@ -176,6 +178,11 @@ class PreparedScene {
   /// The triangle that the ray from `x` (offset off its surface) along the unit direction w meets first, or -1. Its record is
   /// on its way from memory: who has other things to do meanwhile does not wait for it.
   int cast(const SurfacePoint& x, const Vec3& w) const { return met(leave(x, w), w); }
+  /// The same of what is not farther away than `distance`, or a little more.
+  int cast_within(const SurfacePoint& x, const Vec3& w, double distance) const {
+    const Vec3 start = leave(x, w);
+    return caster.first_triangle(start, w, static_cast<float>(distance + 4 * caster.offset()));
+  }
   /// The same of a ray from the camera.
   int cast_camera(const Vec3& direction) const { return met(camera.position, direction); }
   /// Where the ray from `origin` along w, which meets `triangle` (-1: none), ends; empty also for a face along which it runs.

@@ -20,7 +20,7 @@ std::optional<SurfacePoint> seen_beside(Worker<Sink>& worker, const BoundaryEdge
   double front_slope = 0;
   Vec3 into_front;
   for (int i = 0; i < edge.faces(); ++i) {
-    const double sign = edge.pierced && dot(edge.inward[i], side) < 0 ? -1 : 1;
+    const double sign = edge.pierced() && dot(edge.inward[i], side) < 0 ? -1 : 1;
     const Vec3 inward = edge.inward[i] * sign;
     const double across = dot(inward, side);
     // A face seen edge-on takes no part of the image: what lies behind it is seen beside the edge.
@@ -66,7 +66,7 @@ class PrimaryBoundary {
     const Vec3 to_y = y - scene_.camera.position;
     const double r = length(to_y);
     const Vec3 d = to_y / r;
-    const Vec3 normal = cross(edge->tangent, d);
+    const Vec3 normal = cross(point.tangent, d);
     const double sine = length(normal);
     if (!(sine > 0)) return;
     const Vec3 n_b = normal / sine;
@@ -148,16 +148,19 @@ class PrimaryBoundary {
   void follow(const SurfacePoint& x1, int pixel, int blamed, const Vec3& g, Rng& rng, Add&& add) {
     if (!scene_.camera_flow.possible_at(x1.p) || worker_.options.max_bounces < 1) return;
     Rgb throughput(1.0);
-    const auto next = step(worker_, x1, normalize(eye_.p - x1.p), throughput, rng);
+    const auto next = turn(scene_, x1, normalize(eye_.p - x1.p), throughput, rng);
     if (!next) return;
+    if (!scene_.has_moving_vertex(x1.triangle) && !scene_.moving_bounds.meets_ray(x1.p, next->direction)) return;
+    const int met = worker_.cast_within(x1, next->direction, scene_.camera_flow.radius_at(x1.p));
+    const auto x2 = scene_.end_point(met, x1.p, next->direction);
+    if (!x2) return;
     following_.clear();
-    add_following_flow(scene_, x1, next->point, g, following_);
+    add_following_flow(scene_, x1, *x2, g, following_);
     if (following_.empty()) return;
     worker_.sink.bind(following_);
     const CameraSide before{pixel, length(x1.p - eye_.p) * scene_.index_between(eye_, x1) +
-                                       length(next->point.p - x1.p) * scene_.index_between(x1, next->point)};
-    for (const GatheredLight& light :
-         light_side_.gather(x1, next->point, {&before, 1}, worker_.options.max_bounces - 1, rng)) {
+                                       length(x2->p - x1.p) * scene_.index_between(x1, *x2)};
+    for (const GatheredLight& light : light_side_.gather(x1, *x2, {&before, 1}, worker_.options.max_bounces - 1, rng)) {
       note_boundary(worker_.sink, light.bounces + 1, blamed);
       add(throughput * light.value, before.length + light.length);
     }

@@ -17,12 +17,13 @@ class RayCaster {
   RayCaster(const RayCaster&) = delete;
   RayCaster& operator=(const RayCaster&) = delete;
 
-  /// Index of the first triangle along (origin, direction), or -1.
-  int first_triangle(const Vec3& origin, const Vec3& direction) const {
+  /// Index of the first triangle along (origin, direction) up to `far` lengths of `direction`, or -1.
+  int first_triangle(const Vec3& origin, const Vec3& direction,
+                     float far = std::numeric_limits<float>::infinity()) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit query;
-    set_ray(query.ray, origin, direction, std::numeric_limits<float>::infinity());
+    set_ray(query.ray, origin, direction, far);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     rtcIntersect1(scene_, &context, &query);

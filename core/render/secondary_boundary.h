@@ -45,10 +45,13 @@ class SecondaryBoundary {
       g.w = normalize(target.p - g.y.y);
       aimed_at = target.triangle;
     } else {
-      g.w = direction_in_wedge(*g.y.edge, u0, u1);
+      g.w = direction_in_wedge(g.y, u0, u1);
     }
-    if (!g.orient() || !find_light_end(g)) return;
+    if (!g.orient()) return;
+    const bool may_end_moving = g.y.edge->moves || may_meet_moving(g, -g.w);
+    if (!(may_end_moving || may_meet_moving(g, g.w)) || !find_light_end(g)) return;
     if (aimed_at >= 0 && g.light.triangle != aimed_at) return;
+    if (!(may_end_moving || scene_.has_moving_vertex(g.light.triangle))) return;
     ++worker_.rays;
     const int t = scene_.caster.first_triangle(g.lifted(scene_.caster.offset()), -g.w);
     if (t < 0 || !faces(t, g.w)) return;
@@ -64,7 +67,10 @@ class SecondaryBoundary {
 
   /// One camera path through `pixel`, with a random edge point at each of its vertices.
   void sample_from_camera(int pixel, double scale, Rng& rng) {
-    if (!techniques_.from_camera || !edges_.has_secondary() || !worker_.start_camera_path(pixel, rng)) return;
+    if (!techniques_.from_camera || !edges_.has_secondary()) return;
+    // Each edge is drawn before the ray is traced to where it is wanted, so that it comes from memory meanwhile.
+    BoundaryEdges::Place place = place_from_camera(pixel, 1, rng);
+    if (!worker_.start_camera_path(pixel, rng)) return;
     Path& path = worker_.path;
     Rgb throughput(1.0);
     double tau = 0;
@@ -74,9 +80,10 @@ class SecondaryBoundary {
     }
     for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
       if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
-      connect_edge(pixel, throughput * scale, rng);
+      connect_edge(pixel, throughput * scale, place, rng);
       if (at_length_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
       if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
+      place = place_from_camera(pixel, bounce + 1, rng);
       if (!extend(worker_, path, throughput, rng)) return;
     }
   }
@@ -94,7 +101,7 @@ class SecondaryBoundary {
     double r_d = 0, r_s = 0;
 
     bool orient() {
-      const Vec3 normal = cross(y.edge->tangent, w);
+      const Vec3 normal = cross(y.tangent, w);
       sine = length(normal);
       if (!(sine > 0)) return false;
       n_b = normal / sine;
@@ -129,14 +136,15 @@ class SecondaryBoundary {
   }
 
   /// Uniform in azimuth over the grazing wedge (see BoundaryEdge::azimuths) and in the cosine to the edge.
-  static Vec3 direction_in_wedge(const BoundaryEdge& edge, double u0, double u1) {
+  static Vec3 direction_in_wedge(const BoundaryEdges::Sample& y, double u0, double u1) {
+    const BoundaryEdge& edge = *y.edge;
     const Vec3& f0 = edge.inward[0];
-    Vec3 across = cross(edge.tangent, f0);
+    Vec3 across = cross(y.tangent, f0);
     if (edge.faces() == 2 && dot(across, edge.inward[1]) < 0) across = -across;
     const double half = u0 < 0.5 ? 0 : 1;
-    const double beta = edge.opening + (2 * u0 - half) * edge.azimuths + half * kPi;
+    const double beta = kPi - edge.azimuths + (2 * u0 - half) * edge.azimuths + half * kPi;
     const double cosine = 2 * u1 - 1, sine = std::sqrt(1 - cosine * cosine);
-    return edge.tangent * cosine + (f0 * std::cos(beta) + across * std::sin(beta)) * sine;
+    return y.tangent * cosine + (f0 * std::cos(beta) + across * std::sin(beta)) * sine;
   }
 
   /// Density per solid angle of w from the edge: wedge and aimed together. `g.light` is known.
@@ -146,6 +154,11 @@ class SecondaryBoundary {
     if (scene_.emits(g.light.triangle) && dot(g.light.n, g.w) < 0)
       aimed = scene_.emitter_pdf(g.light.triangle) * g.r_s * g.r_s / -dot(g.light.n, g.w);
     return (1 - aimed_share_) * wedge + aimed_share_ * aimed;
+  }
+
+  /// Whether the ray from the edge point along w may end on a triangle that moves.
+  bool may_meet_moving(const Segment& g, const Vec3& w) const {
+    return scene_.moving_bounds.meets_ray(g.lifted(scene_.caster.offset()), w);
   }
 
   bool find_light_end(Segment& g) {
@@ -232,14 +245,17 @@ class SecondaryBoundary {
     }
   }
 
-  /// D is the last vertex of the worker's path: tries a random edge point.
-  void connect_edge(int pixel, const Rgb& throughput, Rng& rng) {
+  /// Of an edge point for D at vertex `bounces` of a path through the pixel.
+  BoundaryEdges::Place place_from_camera(int pixel, int bounces, Rng& rng) const {
+    return edges_.place_secondary(camera_warp(pixel, bounces).sample(rng.uniform()));
+  }
+
+  /// D is the last vertex of the worker's path: tries the edge point.
+  void connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Place& place, Rng& rng) {
     Segment g;
-    const int table = camera_table(pixel, worker_.path.size() - 1);
-    const double x = guide_.warp(table).sample(rng.uniform());
-    g.y = edges_.sample_secondary(x);
+    g.y = BoundaryEdges::Sample(place);
     if (join_camera_path(g, pixel, throughput)) finish(g, Found::from_camera, rng);
-    note_guide(worker_.sink, table, x);
+    note_guide(worker_.sink, camera_table(pixel, worker_.path.size() - 1), place.x());
   }
 
   /// As `connect_edge`, for light straight from an emitter on paths of length tau.
@@ -326,7 +342,9 @@ class SecondaryBoundary {
     const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
     const Material& material = scene_.material_of(g.camera_end.triangle);
     const double scattered = s.lobe(material);
-    if (!(scattered > 0) || !g.orient() || !find_light_end(g) || !differentiate(g)) return false;
+    if (!(scattered > 0) || !g.orient()) return false;
+    if (!(g.y.edge->moves || scene_.has_moving_vertex(g.camera_end.triangle) || may_meet_moving(g, g.w))) return false;
+    if (!find_light_end(g) || !differentiate(g)) return false;
     ++worker_.rays;
     if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return false;
     const double factor =

@@ -50,6 +50,10 @@ struct Worker {
     ++rays;
     return scene.cast(x, w);
   }
+  int cast_within(const SurfacePoint& x, const Vec3& w, double distance) {
+    ++rays;
+    return scene.cast_within(x, w, distance);
+  }
   int cast_camera(const Vec3& direction) {
     ++rays;
     return scene.cast_camera(direction);
