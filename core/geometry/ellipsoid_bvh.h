@@ -42,8 +42,8 @@ class EllipsoidBvh {
   };
   /// The triangles of `query_surfaces`, and some that only come close: for callers who look for arcs on each. Of the many
   /// of a fine mesh a random choice of those between the foci's cones: as many as make up a few leaves, at a cost that
-  /// grows with the hierarchy's depth alone. Appends to `ids` and, of the same
-  /// length, one over each triangle's probability, which favours what is near the foci. `u`: uniform in (0, 1).
+  /// grows with the hierarchy's depth alone. Appends to `ids` and, of the same length, one over each triangle's
+  /// probability, which favours what is near the foci. `u`: uniform in (0, 1).
   void sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u, std::vector<int>& ids,
                        std::vector<double>& inverse_probability) const;
 

@@ -101,7 +101,7 @@ TEST(ThinnedQuery, CarriesOnAverageWhatAllTrianglesDo) {
   }
 }
 
-// A small mesh is not thinned.
+// A small mesh is not thinned: all that the ellipsoids cross are found, and next to none that they do not.
 TEST(ThinnedQuery, FindsAllOfASmallMesh) {
   const auto triangles = bumpy_sphere(5);
   const EllipsoidBvh bvh(triangles);
@@ -114,6 +114,8 @@ TEST(ThinnedQuery, FindsAllOfASmallMesh) {
     std::ranges::sort(all);
     std::ranges::sort(ids);
     EXPECT_TRUE(std::ranges::includes(ids, all));
+    // Callers clip each: what only comes close to the ellipsoid is a few in a hundred here.
+    EXPECT_LE(ids.size(), all.size() + 2) << "of " << triangles.size();
   }
 }
 
