@@ -121,9 +121,7 @@ void BoundaryEdges::Choice::finish() {
 
 BoundaryEdges::Place BoundaryEdges::Choice::place(double u) const {
   const int i = distribution.sample(u);
-  const char* record = reinterpret_cast<const char*>(&edges[i]);
-  __builtin_prefetch(record);
-  __builtin_prefetch(record + 64);
+  prefetch(edges[i]);
   return {&edges[i], u, distribution.below(i), distribution.probability(i)};
 }
 

@@ -141,11 +141,7 @@ class PreparedScene {
     return {r.origin + (r.edge[0] * (1 - u2) + r.edge[1] * u2) * std::sqrt(u1), r.normal, triangle};
   }
   /// Asks for the triangle's record early.
-  void prefetch(int triangle) const {
-    const char* address = reinterpret_cast<const char*>(&records_[triangle]);
-    __builtin_prefetch(address);
-    __builtin_prefetch(address + 64);
-  }
+  void prefetch(int triangle) const { isochron::prefetch(records_[triangle]); }
   /// Of a triangle that emits.
   double emitter_pdf(int triangle) const { return shapes_[shape_index(triangle)].emitter_pdf; }
 
