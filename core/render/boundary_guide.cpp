@@ -16,7 +16,7 @@ constexpr int kRecordsPerBin = 4, kFewRecords = 32;
 /// How often a technique is used follows from the sum of its squares, which is known as well as if so many records of
 /// equal squares made it up. With as few as these, half of it (of its logarithm) is believed.
 constexpr double kFewEqual = 8;
-/// How much more or less often than once per sample a technique may be used.
+/// How many times as often as without guiding a technique may be used.
 constexpr double kMostRate = 8, kLeastRate = 1.0 / 8;
 
 /// The density that minimises the variance is, in each bin, the root of the mean square of the contributions: given
@@ -67,8 +67,14 @@ double Warp::sample(double u) const {
   return std::clamp(x, 0x1p-53, 1 - 0x1p-53);
 }
 
-BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records, const std::array<double, kTechniques>& cost)
-    : BoundaryGuide() {
+BoundaryGuide::BoundaryGuide(const Each<bool>& possible) : warps_(kTables) {
+  const auto count = std::count(possible.begin(), possible.end(), true);
+  for (int t = 0; t < kTechniques; ++t) rate_[t] = possible[t] ? 1.0 / static_cast<double>(count) : 0;
+}
+
+BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records,
+                             const Each<double>& cost)
+    : BoundaryGuide(possible) {
   std::vector<std::vector<GuideRecord>> of_table(kTables), of_technique(kTechniques);
   for (const GuideRecord& r : records) {
     of_table[r.table].push_back(r);
@@ -87,9 +93,9 @@ BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records, const std:
 
   // For a given total cost, the variance is least where each technique is used in proportion to the root of its
   // second moment, which is that of guided samples, over its cost.
-  double total_cost = 0, wanted_cost = 0;
-  std::array<double, kTechniques> trust;
+  Each<double> wanted{}, trust;
   trust.fill(1);
+  double unguided_cost = 0, wanted_cost = 0;
   for (int t = 0; t < kTechniques; ++t) {
     double square = 0, fourth = 0;
     for (const GuideRecord& r : of_technique[t]) {
@@ -97,14 +103,13 @@ BoundaryGuide::BoundaryGuide(const std::vector<GuideRecord>& records, const std:
       square += guided, fourth += guided * guided;
     }
     if (fourth > 0) trust[t] = square * square / (square * square + kFewEqual * fourth);
-    rate_[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
-    total_cost += cost[t];
-    wanted_cost += rate_[t] * cost[t];
+    wanted[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
+    unguided_cost += cost[t];
+    wanted_cost += wanted[t] * cost[t];
   }
-  for (int t = 0; t < kTechniques; ++t) {
-    const double wanted = wanted_cost > 0 ? std::clamp(rate_[t] * total_cost / wanted_cost, kLeastRate, kMostRate) : 1;
-    rate_[t] = std::pow(wanted, trust[t]);
-  }
+  if (!(wanted_cost > 0)) return;
+  for (int t = 0; t < kTechniques; ++t)
+    rate_[t] *= std::pow(std::clamp(wanted[t] * unguided_cost / wanted_cost, kLeastRate, kMostRate), trust[t]);
 }
 
 }  // namespace isochron

@@ -49,12 +49,18 @@ class BoundaryGuide {
   enum Technique { primary, pixel_border, from_edge, from_camera };
   static constexpr int kTechniques = 4;
 
-  /// Unguided: every technique once per sample.
-  BoundaryGuide() : warps_(kTables) { rate_.fill(1); }
-  /// From the records of unguided samples and the cost of each technique over all of them, in any unit.
-  BoundaryGuide(const std::vector<GuideRecord>& records, const std::array<double, kTechniques>& cost);
+  /// One value for each technique.
+  template <class T>
+  using Each = std::array<T, kTechniques>;
 
-  /// How often a technique is used per sample, on average.
+  /// Unguided: a sample of the visibility term is one search by one of the techniques that can find anything, all equally
+  /// often.
+  explicit BoundaryGuide(const Each<bool>& possible);
+  /// From the records of as many unguided searches by each possible technique and what these cost, in any unit: the mean
+  /// cost of a sample stays that of an unguided one.
+  BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records, const Each<double>& cost);
+
+  /// How often a technique is used per sample, on average; 0 where it finds nothing.
   double rate(Technique t) const { return rate_[t]; }
   /// The histogram of a technique; `from_camera` has one per tile of the image for D next to the camera, and one for
   /// all others.
@@ -70,10 +76,10 @@ class BoundaryGuide {
   static constexpr int kTiles = 4;  ///< across the image, either way
   static constexpr int kTables = kTechniques + kTiles * kTiles;
   std::vector<Warp> warps_;
-  std::array<double, kTechniques> rate_;
+  Each<double> rate_;
 };
 
-/// Sink of the learning pass. What one sample adds to the same value of the same image is summed before it is squared: the
+/// Sink of the learning pass. What one search adds to the same value of the same image is summed before it is squared: the
 /// two sides of a boundary cancel in part.
 class GuideSink {
  public:

@@ -52,9 +52,9 @@ class PrimaryBoundary {
     eye_.p = scene_.camera.position;
   }
 
-  /// One edge point; contributions are scaled by `scale` (one over the number of edge points).
+  /// One edge point, where there are any (`has_primary`); contributions are scaled by `scale` (one over the number of edge
+  /// points).
   void sample(double scale, Rng& rng) {
-    if (!edges_.has_primary()) return;
     const int table = BoundaryGuide::table(BoundaryGuide::primary);
     const Warp& warp = guide_.warp(table);
     const double x = warp.sample(rng.uniform());
@@ -111,10 +111,9 @@ class PrimaryBoundary {
     note_guide(worker_.sink, table, x);
   }
 
-  /// One point on the border of a pixel, left or above; contributions are scaled by `scale` (one over the
-  /// number of points).
+  /// One point on the border of a pixel, left or above, where what the camera sees may follow something; contributions are
+  /// scaled by `scale` (one over the number of points).
   void sample_pixel_border(double scale, Rng& rng) {
-    if (!scene_.camera_flow.possible()) return;
     const CameraModel& camera = scene_.camera;
     const int table = BoundaryGuide::table(BoundaryGuide::pixel_border);
     const double x = guide_.warp(table).sample(rng.uniform());

@@ -21,9 +21,10 @@ constexpr int kSharedStrands = 256;                           // where strands n
 constexpr std::size_t kStrandBudget = std::size_t{64} << 20;  // bytes, all strands together
 constexpr int kPixelsPerBlock = 8;
 
-/// The pass that guiding learns from: its own random numbers; with fewer samples it would teach noise.
+/// The pass that guiding learns from: its own random numbers; with fewer searches by each technique it would teach noise.
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
-constexpr long long kFewestLearningSamples = 64;
+constexpr long long kFewestLearningRounds = 64;
+
 int strand_count(std::size_t accumulator_doubles) {
   const std::size_t fitting = kStrandBudget / (sizeof(double) * std::max<std::size_t>(accumulator_doubles, 1));
   return static_cast<int>(std::clamp<std::size_t>(fitting, kFewestStrands, kMostStrands));
@@ -54,6 +55,8 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates) 
 }
 
 struct Renderer::Impl {
+  using Guide = BoundaryGuide;
+
   const GateSet& gates;
   EstimatorOptions options;
   const TangentBasis* basis;
@@ -64,7 +67,7 @@ struct Renderer::Impl {
   mutable std::atomic<long long> rays{0}, arcs{0};
   mutable std::once_flag learned;
   mutable std::optional<BoundaryEdges> edges;  ///< only the visibility term asks for them
-  mutable BoundaryGuide guide;
+  mutable std::optional<BoundaryGuide> guide;  ///< likewise
 
   Impl(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent)
       : gates(gate_set),
@@ -146,41 +149,50 @@ struct Renderer::Impl {
   void learn() const {
     std::call_once(learned, [this] {
       edges.emplace(scene, options.boundary.wedge);
-      const long long samples = std::llround(options.guiding_samples * scene.camera.pixels());
-      if (samples < kFewestLearningSamples) return;
+      Guide::Each<bool> possible;
+      possible[Guide::primary] = edges->has_primary();
+      possible[Guide::pixel_border] = scene.camera_flow.possible();
+      possible[Guide::from_edge] = edges->has_secondary();
+      possible[Guide::from_camera] = edges->has_secondary() && options.boundary.from_camera;
+      const BoundaryGuide& unguided = guide.emplace(possible);
+      const auto searches = std::count(possible.begin(), possible.end(), true);
+      if (searches == 0) return;
+      const long long rounds =
+          std::llround(options.guiding_samples * scene.camera.pixels() / static_cast<double>(searches));
+      if (rounds < kFewestLearningRounds) return;
       std::vector<std::vector<GuideRecord>> records(kMostStrands);
-      std::vector<std::array<double, BoundaryGuide::kTechniques>> costs(kMostStrands);
+      std::vector<Guide::Each<double>> costs(kMostStrands);
       parallel(kMostStrands, [&](int strand) {
         Worker worker(scene, gates, options, every_gate, GuideSink(gates, scene.layout, *basis));
         auto& cost = costs[strand];
         cost.fill(0);
-        const auto run = [&](BoundaryGuide::Technique technique, auto&& sample) {
+        const auto run = [&](Guide::Technique technique, auto&& search) {
+          if (!possible[technique]) return;
           const double before = worker.work();
-          sample();
+          search();
           cost[technique] += worker.work() - before;
         };
-        const BoundaryGuide unguided;
         PrimaryBoundary primary(worker, *edges, unguided, mix.interior == 1);
         SecondaryBoundary secondary(worker, *edges, unguided, mix.interior == 1);
         const double splat_scale = 1.0 / scene.camera.pixels();
-        for (long long i = strand; i < samples; i += kMostStrands) {
-          const int pixel = static_cast<int>(i * scene.camera.pixels() / samples) % scene.camera.pixels();
+        for (long long i = strand; i < rounds; i += kMostStrands) {
+          const int pixel = static_cast<int>(i * scene.camera.pixels() / rounds) % scene.camera.pixels();
           Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
-          run(BoundaryGuide::primary, [&] { primary.sample(splat_scale, rng); });
-          run(BoundaryGuide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
-          run(BoundaryGuide::from_edge, [&] { secondary.sample_from_edge(splat_scale, rng); });
-          run(BoundaryGuide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
+          run(Guide::primary, [&] { primary.sample(splat_scale, rng); });
+          run(Guide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
+          run(Guide::from_edge, [&] { secondary.sample_from_edge(splat_scale, rng); });
+          run(Guide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
         }
         records[strand] = std::move(worker.sink.records);
         count(worker);
       });
       std::vector<GuideRecord> all;
-      std::array<double, BoundaryGuide::kTechniques> cost{};
+      Guide::Each<double> cost{};
       for (int strand = 0; strand < kMostStrands; ++strand) {
         all.insert(all.end(), records[strand].begin(), records[strand].end());
-        for (int t = 0; t < BoundaryGuide::kTechniques; ++t) cost[t] += costs[strand][t];
+        for (int t = 0; t < Guide::kTechniques; ++t) cost[t] += costs[strand][t];
       }
-      guide = BoundaryGuide(all, cost);
+      guide = BoundaryGuide(possible, all, cost);
     });
   }
 
@@ -200,23 +212,21 @@ struct Renderer::Impl {
       run_paths(worker, 1, mix.path_length_rates, pass, strand, strands, stream, range);
     } else {
       const double scale = 1.0 / range.count(), splat_scale = scale / scene.camera.pixels();
-      PrimaryBoundary primary(worker, *edges, guide, mix.interior == 1);
-      SecondaryBoundary secondary(worker, *edges, guide, mix.interior == 1);
-      const double edges_rate = guide.rate(BoundaryGuide::primary),
-                   borders_rate = guide.rate(BoundaryGuide::pixel_border),
-                   from_edge_rate = guide.rate(BoundaryGuide::from_edge);
+      PrimaryBoundary primary(worker, *edges, *guide, mix.interior == 1);
+      SecondaryBoundary secondary(worker, *edges, *guide, mix.interior == 1);
+      const double edges_rate = guide->rate(Guide::primary), borders_rate = guide->rate(Guide::pixel_border),
+                   from_edge_rate = guide->rate(Guide::from_edge), from_camera_rate = guide->rate(Guide::from_camera);
       const SamplePoints points(stream, range, options.numbers);
       const PointSet of_edges = points.of_image(Technique::primary_edge);
       const PointSet of_borders = points.of_image(Technique::pixel_border);
       const PointSet of_segments = points.of_image(Technique::from_edge);
       for_each_pixel(strand, strands, [&](int pixel) {
         points.in_image(of_edges, pixel, edges_rate, [&](Rng& rng) { primary.sample(splat_scale / edges_rate, rng); });
-        if (scene.camera_flow.possible())
-          points.in_image(of_borders, pixel, borders_rate,
-                          [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
+        points.in_image(of_borders, pixel, borders_rate,
+                        [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
         points.in_image(of_segments, pixel, from_edge_rate,
                         [&](Rng& rng) { secondary.sample_from_edge(splat_scale / from_edge_rate, rng); });
-        const double rate = guide.rate(BoundaryGuide::from_camera) * worker.pick.rate(pixel);
+        const double rate = from_camera_rate * worker.pick.rate(pixel);
         points.in_pixel(Technique::from_camera, pixel, rate,
                         [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / rate, rng); });
       });

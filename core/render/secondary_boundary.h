@@ -17,7 +17,8 @@ namespace isochron {
 template <class Sink>
 class SecondaryBoundary {
  public:
-  /// `narrow_gates`: use the techniques that draw lengths from the gates.
+  /// There must be edges to sample from where a sample is asked for (`has_secondary`). `narrow_gates`: use the techniques
+  /// that draw lengths from the gates.
   SecondaryBoundary(Worker<Sink>& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates)
       : worker_(worker),
         scene_(worker.scene),
@@ -25,15 +26,12 @@ class SecondaryBoundary {
         guide_(guide),
         techniques_(worker.options.boundary),
         at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
-        camera_over_edge_rate_(techniques_.from_camera
-                                   ? guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)
-                                   : 0),
+        camera_over_edge_rate_(guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)),
         aimed_share_(techniques_.aimed ? 0.5 : 0),
         light_side_(worker, narrow_gates && techniques_.light_arcs) {}
 
   /// One segment from an edge; contributions are scaled by `scale` (one over the number of such segments).
   void sample_from_edge(double scale, Rng& rng) {
-    if (!edges_.has_secondary()) return;
     Segment g;
     const double x = edge_warp().sample(rng.uniform());
     g.y = edges_.sample_secondary(x);
@@ -67,7 +65,6 @@ class SecondaryBoundary {
 
   /// One camera path through `pixel`, with a random edge point at each of its vertices.
   void sample_from_camera(int pixel, double scale, Rng& rng) {
-    if (!techniques_.from_camera || !edges_.has_secondary()) return;
     // Each edge is drawn before the ray is traced to where it is wanted, so that it comes from memory meanwhile.
     BoundaryEdges::Place place = place_from_camera(pixel, 1, rng);
     if (!worker_.start_camera_path(pixel, rng)) return;
