@@ -26,8 +26,8 @@ PHOTONS = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 0)
 DRAWS = 3
 SHORT = {
     "corridor": ("optimizer={method: adam, learning_rate: 0.015, iterations: 80, decay: {start: 45, half_life: 12}}",
-                 "samples={primal: 4096, interior: 2048, visibility: 384, path_length: 0}", "target.samples=524288"),
-    "sofa": ("samples={primal: 256, interior: 256, visibility: 32, path_length: 64}", "target.samples=16384"),
+                 "samples={primal: 4096, interior: 2048, visibility: 1536, path_length: 0}", "target.samples=524288"),
+    "sofa": ("samples={primal: 256, interior: 256, visibility: 128, path_length: 64}", "target.samples=16384"),
 }
 COLUMNS = ("experiment", "photons", "draw", "error_percent")
 

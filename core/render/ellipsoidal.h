@@ -12,18 +12,10 @@
 #include <span>
 
 #include "core/geometry/ellipsoid.h"
+#include "core/render/target_lengths.h"
 #include "core/render/worker.h"
 
 namespace isochron {
-
-/// What the gate's derivative asks of a pass.
-struct GatePass {
-  bool value = false;  ///< lengths drawn from W
-  GateWeights use;     ///< of those
-  bool pairs = false;  ///< lengths drawn in pairs from dW
-  PairPart part = PairPart::smooth;
-  bool coupled = true;
-};
 
 /// Complete paths go to the worker's sink.
 struct ToSink {};
@@ -38,8 +30,8 @@ class EllipsoidalConnections {
   /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`.
   void sample_from_camera(double scale, Rng& rng) {
     worker_.start_at_camera(worker_.path);
-    draw_targets(GatePick::kImage, rng);
-    for (const Target& target : targets_) {
+    draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
+    for (const TargetLength& target : targets_) {
       if (scene_.camera_sees_emitters) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
       if (worker_.options.max_bounces >= 1) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
     }
@@ -48,7 +40,7 @@ class EllipsoidalConnections {
   /// One camera path through `pixel` with connections at its other vertices; contributions are scaled by `scale`.
   void sample_walk(int pixel, double scale, Rng& rng) {
     const int max_bounces = worker_.options.max_bounces;
-    draw_targets(pixel, rng);
+    draw_targets(pass_, worker_.gates, worker_.pick, pixel, rng, targets_);
     if (targets_.empty() || max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
     connect_along(pixel, scale, max_bounces, rng);
   }
@@ -60,7 +52,7 @@ class EllipsoidalConnections {
     targets_.clear();
     for (std::size_t i = 0; i < lengths.size(); ++i) {
       if (!(lengths[i] > 0)) continue;
-      Target t;
+      TargetLength t;
       t.tau[0] = lengths[i];
       t.present[0] = true;
       t.index = static_cast<int>(i);
@@ -80,7 +72,7 @@ class EllipsoidalConnections {
     for (int bounce = 1; bounce <= max_bounces; ++bounce) {
       const double needed = path.length.back() + scene_.distance_to_emitters(path.back().p);
       bool reachable = false;
-      for (const Target& target : targets_) {
+      for (const TargetLength& target : targets_) {
         if (!(needed < target.longest())) continue;
         reachable = true;
         connect_emitter(target, pixel, throughput * scale, rng);
@@ -90,19 +82,6 @@ class EllipsoidalConnections {
       if (!extend(worker_, path, throughput, rng)) return;
     }
   }
-
-  /// One length drawn from W, or the two sides of a pair drawn from dW (first plus, then minus).
-  struct Target {
-    double tau[2] = {0, 0};
-    bool present[2] = {false, false};
-    bool jump[2] = {false, false};  ///< at a jump of the gate
-    bool pair = false;
-    int gate = 0;   ///< of a pair
-    int index = 0;  ///< among the lengths gathered for
-    double scale = 0;
-    double longest() const { return std::max(present[0] ? tau[0] : 0, present[1] ? tau[1] : 0); }
-    double shortest() const { return present[0] && present[1] ? std::min(tau[0], tau[1]) : longest(); }
-  };
 
   /// One sampled point on an arc, before its visibility is known.
   struct ArcPoint {
@@ -116,57 +95,13 @@ class EllipsoidalConnections {
     double weight() const { return side[0].value.max() + side[1].value.max(); }
   };
 
-  /// Lengths for connections that serve `pixel` (or, of the camera's own, the whole image).
-  void draw_targets(int pixel, Rng& rng) {
-    const GateSet& gates = worker_.gates;
-    const GateShape& shape = gates.shape();
-    targets_.clear();
-    if (pass_.value) {
-      const double pick = rng.uniform(), u = rng.uniform();
-      const auto length = worker_.pick.sample_length(pixel, pick, u);
-      if (length && *length > 0) {
-        Target t;
-        t.tau[0] = *length;
-        t.present[0] = true;
-        t.scale = 1 / worker_.pick.length_pdf(pixel, t.tau[0]);
-        targets_.push_back(t);
-      }
-    }
-    if (pass_.pairs) {
-      double pick = rng.uniform();
-      const double u = rng.uniform();
-      Target t;
-      t.pair = true;
-      t.gate = worker_.pick.sample(pixel, pick);
-      const double mass = shape.pair_mass(pass_.part);
-      if (!(mass > 0) || t.gate < 0) return;
-      t.scale = mass / worker_.pick.probability(pixel, t.gate);
-      const CoupledPair pair = shape.sample_pair(pass_.part, u);
-      t.tau[0] = gates.center(t.gate) + pair.plus;
-      t.tau[1] = gates.center(t.gate) + pair.minus;
-      t.present[0] = pair.has_plus && t.tau[0] > 0;
-      t.present[1] = pair.has_minus && t.tau[1] > 0;
-      t.jump[0] = pair.plus_is_jump;
-      t.jump[1] = pair.minus_is_jump;
-      if (pass_.coupled) {
-        targets_.push_back(t);
-      } else {
-        for (int i = 0; i < 2; ++i) {
-          Target alone = t;
-          alone.present[1 - i] = false;
-          targets_.push_back(alone);
-        }
-      }
-    }
-  }
-
   /// Whether connecting to emitter point y can only matter through the connecting vertex itself.
   bool ends_are_static(int emitter_triangle) const {
     if constexpr (!Sink::kDifferential || kGathers) return false;
     return !can_move(scene_, worker_.path, worker_.path.size() - 1, emitter_triangle);
   }
 
-  void connect_surface(const Target& target, int pixel, const Rgb& throughput, Rng& rng) {
+  void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
     const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
     const double along = rng.uniform();
     const double pick = rng.uniform(), thinning = rng.uniform();
@@ -233,7 +168,7 @@ class EllipsoidalConnections {
     return {x.p, back ? -x.n : x.n, 0, 1, true};
   }
 
-  void connect_emitter(const Target& target, int pixel, const Rgb& throughput, Rng& rng) {
+  void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
     const double along = rng.uniform();
     const double pick = rng.uniform(), thinning = rng.uniform();
     const Path& path = worker_.path;
@@ -363,7 +298,7 @@ class EllipsoidalConnections {
   }
 
   /// Share of a contribution found by `technique`, over the connections' share of the samples.
-  double mis_weight(const Target& target, int i, const ArcPoint& found, double ArcDensities::*technique) const {
+  double mis_weight(const TargetLength& target, int i, const ArcPoint& found, double ArcDensities::*technique) const {
     // No other technique finds lengths at a jump, and these serve one gate.
     const bool jump = target.jump[i];
     const Path& path = worker_.path;
@@ -392,7 +327,7 @@ class EllipsoidalConnections {
   }
 
   /// The worker's path is complete, by the point `found`, and as long as side i of the target says.
-  void deliver(const Target& target, int i, const ArcPoint& found, double inverse_probability,
+  void deliver(const TargetLength& target, int i, const ArcPoint& found, double inverse_probability,
                double ArcDensities::*technique) {
     if constexpr (!kGathers)
       if (!worker_.matters(worker_.path)) return;
@@ -414,7 +349,7 @@ class EllipsoidalConnections {
   const PreparedScene& scene_;
   const GatePass pass_;
   [[no_unique_address]] Receiver receiver_;
-  std::vector<Target> targets_;
+  std::vector<TargetLength> targets_;
 };
 
 }  // namespace isochron

@@ -157,9 +157,9 @@ TEST_P(Guided, MeansAgreeWithUnguidedOnes) {
   std::vector<std::vector<Estimate>> means[2];
   for (const bool guided : {false, true}) {
     EstimatorOptions options{.max_bounces = 3, .sampling = GetParam()};
-    options.guiding_samples = guided ? 4 : 0;
+    options.guiding_samples = guided ? 16 : 0;
     const Renderer renderer(scene, gates, options, &basis);
-    means[guided] = term_means(renderer, Term::visibility, 3, 2, 24, 32, {guided ? 41u : 42u, 0, 0});
+    means[guided] = term_means(renderer, Term::visibility, 3, 2, 96, 32, {guided ? 41u : 42u, 0, 0});
   }
   double variance[2] = {0, 0};
   for (int c = 0; c < 3; ++c)

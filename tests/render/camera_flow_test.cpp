@@ -191,7 +191,7 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
     EstimatorOptions options;
     options.max_bounces = 3;
     options.sampling = c.sampling;
-    options.guiding_samples = 4;
+    options.guiding_samples = 16;
     options.follow_radius = radius;
     const Renderer renderer(scene, gates, options, &basis);
     std::vector<Batches> pixels(motions.size() * scene.camera.width * scene.camera.height * gates.size());
@@ -199,7 +199,8 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
       std::vector<double> total(pixels.size(), 0.0);
       for (const Term term : kTerms) {
         const Stream stream{41, static_cast<std::uint32_t>(term), static_cast<std::uint32_t>(radius)};
-        const auto images = renderer.derive(term, stream, {b * c.samples, (b + 1) * c.samples});
+        const int samples = samples_of(term, c.samples);
+        const auto images = renderer.derive(term, stream, {b * samples, (b + 1) * samples});
         std::size_t i = 0;
         for (const GatedImage& image : images)
           for (const double x : image.data) total[i++] += x;
@@ -253,7 +254,7 @@ TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
   const TangentBasis basis = make_basis(scene, {motion});
   const GateSet gates(GateShape::steady(), {0.0});
   const EstimatorOptions options{
-      .max_bounces = 2, .sampling = Sampling::standard, .follow_radius = 8, .guiding_samples = 4};
+      .max_bounces = 2, .sampling = Sampling::standard, .follow_radius = 8, .guiding_samples = 16};
   constexpr double kStep = 0.01;
   Scene moved[2] = {scene, scene};
   for (const int side : {0, 1}) motion.apply(moved[side], side ? kStep : -kStep);
@@ -264,7 +265,8 @@ TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
   for (std::uint32_t b = 0; b < kBatches; ++b) {
     std::vector<double> total(64, 0.0);
     for (const Term term : {Term::interior, Term::visibility}) {
-      const auto image = renderer.derive(term, {7, b, static_cast<std::uint32_t>(term)}, {0, kSamples})[0];
+      const Stream stream{7, b, static_cast<std::uint32_t>(term)};
+      const auto image = renderer.derive(term, stream, {0, samples_of(term, kSamples)})[0];
       for (int i = 0; i < 64; ++i) total[i] += image.data[i];
     }
     const GatedImage plus = above.render({8, b, 0}, {0, kReferenceSamples}),

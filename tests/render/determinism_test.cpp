@@ -26,7 +26,7 @@ class Determinism : public ::testing::TestWithParam<Sampling> {
 
   /// Guided, so that what each renderer learns is tested, too.
   Renderer make_renderer() const {
-    return {scene_, gates_, {.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 0.3}, &basis_};
+    return {scene_, gates_, {.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 1.2}, &basis_};
   }
 
   Results run(const Stream& stream, SampleRange range) const { return run(renderer_, stream, range); }

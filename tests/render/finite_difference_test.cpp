@@ -82,7 +82,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
   EstimatorOptions options;
   options.max_bounces = 3;
   options.sampling = c.sampling;
-  options.guiding_samples = 8;
+  options.guiding_samples = 32;
   const Renderer renderer(scene, gates, options, &basis);
 
   constexpr int kBatches = 32;
@@ -90,7 +90,8 @@ TEST_P(FiniteDifference, TotalDerivative) {
   const int factor = factor_text ? std::atoi(factor_text) : 1;
   std::vector<std::vector<Estimate>> terms[3];
   for (int t = 0; t < 3; ++t)
-    terms[t] = term_means(renderer, kTerms[t], basis.columns, 2, factor * c.samples, kBatches, {131, 0, 0});
+    terms[t] = term_means(renderer, kTerms[t], basis.columns, 2, samples_of(kTerms[t], factor * c.samples), kBatches,
+                          {131, 0, 0});
   const auto size_of = [&](std::size_t p) {
     double sum = 0;
     for (int g = 0; g < 2; ++g)

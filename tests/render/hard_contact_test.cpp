@@ -57,7 +57,8 @@ TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
   EstimatorOptions options{.max_bounces = c.max_bounces, .sampling = c.sampling};
   const Renderer renderer(scene, gates, options, &basis);
   std::vector<std::vector<Estimate>> terms[3];
-  for (int t = 0; t < 3; ++t) terms[t] = term_means(renderer, kTerms[t], 2, 1, c.samples, 32, {41, 0, 0});
+  for (int t = 0; t < 3; ++t)
+    terms[t] = term_means(renderer, kTerms[t], 2, 1, samples_of(kTerms[t], c.samples), 32, {41, 0, 0});
   options.sampling = Sampling::standard;
   for (int m = 0; m < 2; ++m) {
     const Estimate difference = finite_difference(scene, motions[m], 0.03, gates, options, 120, 32, {42, 0, 0})[0];

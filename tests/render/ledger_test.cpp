@@ -33,7 +33,7 @@ class Ledger : public ::testing::TestWithParam<Case> {
     EstimatorOptions options;
     options.max_bounces = max_bounces;
     options.sampling = GetParam().sampling;
-    options.guiding_samples = 8;
+    options.guiding_samples = 32;
     return options;
   }
   Scene scene_;

@@ -139,7 +139,7 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
   EstimatorOptions options;
   options.max_bounces = 1;
   options.sampling = sampling;
-  options.guiding_samples = 100;
+  options.guiding_samples = 400;
   const Renderer renderer(scene, gates, options, &basis);
 
   // Standard sampling hits such a gate with few paths, and W' with fewer.
@@ -152,7 +152,8 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
     EXPECT_LT(std::abs(image[g].mean - exact), 4.5 * image[g].standard_error) << "gate " << g << ": " << exact;
   }
   std::vector<std::vector<Estimate>> terms[3];
-  for (int t = 0; t < 3; ++t) terms[t] = term_means(renderer, kTerms[t], size, 2, samples, batches, {11, 0, 0});
+  for (int t = 0; t < 3; ++t)
+    terms[t] = term_means(renderer, kTerms[t], size, 2, samples_of(kTerms[t], samples), batches, {11, 0, 0});
   for (int m = 0; m < size; ++m)
     for (int g = 0; g < 2; ++g) {
       const auto scaled = [&](double h) {

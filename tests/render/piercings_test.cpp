@@ -82,11 +82,11 @@ TEST(Piercings, DerivativesAgreeWithFiniteDifferences) {
        {Case{"together", together, 3}, Case{"sideways", translate(scene, "b", {1, 0, 0}), 1},
         Case{"up", translate(scene, "a", {0, 1, 0}), 1}, Case{"turn", rotate_y(scene, "b", {0, 0, 0}), 1}}) {
     const TangentBasis basis = make_basis(scene, {c.motion});
-    const EstimatorOptions options{.max_bounces = c.max_bounces, .sampling = Sampling::standard, .guiding_samples = 8};
+    const EstimatorOptions options{.max_bounces = c.max_bounces, .sampling = Sampling::standard, .guiding_samples = 32};
     const Renderer renderer(scene, gates, options, &basis);
     constexpr int kBatches = 32;
     const auto interior = term_means(renderer, Term::interior, 1, 2, 128, kBatches, {1, 0, 0});
-    const auto visibility = term_means(renderer, Term::visibility, 1, 2, 128, kBatches, {2, 0, 0});
+    const auto visibility = term_means(renderer, Term::visibility, 1, 2, 512, kBatches, {2, 0, 0});
     const auto difference = finite_difference(scene, c.motion, 0.01, gates, options, 512, kBatches, {3, 0, 0});
     for (int g = 0; g < 2; ++g) {
       const Estimate total{interior[0][g].mean + visibility[0][g].mean,

@@ -67,7 +67,7 @@ TEST_P(Reference, EveryTerm) {
   options.max_bounces = 3;
   options.sampling = c.sampling;
   options.antithetic = c.antithetic;
-  options.guiding_samples = 8;
+  options.guiding_samples = 32;
   options.follow_radius = 0;  // the reference keeps x1 on its pixel ray: other terms, of the same sum
   const Renderer renderer(scene, gates, options, &basis);
 
@@ -75,7 +75,7 @@ TEST_P(Reference, EveryTerm) {
   const Stream stream{21, 0, 0};
   const auto image = image_means(renderer, 3, standard ? 40 : 12, kBatches, stream);
   const auto interior = term_means(renderer, Term::interior, 2, 3, standard ? 200 : 40, kBatches, stream);
-  const auto visibility = term_means(renderer, Term::visibility, 2, 3, standard ? 120 : 40, kBatches, stream);
+  const auto visibility = term_means(renderer, Term::visibility, 2, 3, standard ? 480 : 160, kBatches, stream);
   const auto path_length = term_means(renderer, Term::path_length, 2, 3, standard ? 40 : 30, kBatches, stream);
   for (int p = 0; p < 2; ++p) {
     double scale = 0;

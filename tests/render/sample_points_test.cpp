@@ -86,7 +86,7 @@ TEST(SamplePoints, SumsOverTheImageVaryLess) {
     constexpr int kSets = 64;
     for (std::uint32_t i = 0; i < kSets; ++i) {
       double total = 0;
-      const auto images = renderer.derive(term, {1, i, 0}, {0, 4});
+      const auto images = renderer.derive(term, {1, i, 0}, {0, samples_of(term, 4)});
       for (const double x : images[0].data) total += x;
       sum += total, squares += total * total;
     }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/render/boundary_guide.h"
 #include "core/render/renderer.h"
 #include "core/scene/scene_loader.h"
 
@@ -144,6 +145,12 @@ inline std::vector<Estimate> image_means(const Renderer& renderer, int gates, in
   std::vector<Estimate> out;
   for (const Batches& s : sums) out.push_back(s.estimate());
   return out;
+}
+
+/// Samples of a term for the effort of so many camera paths: one of the visibility term is one search by one of four
+/// techniques.
+inline int samples_of(Term term, int paths) {
+  return term == Term::visibility ? BoundaryGuide::kTechniques * paths : paths;
 }
 
 /// [column][gate] of one term.

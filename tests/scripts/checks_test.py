@@ -20,7 +20,7 @@ LIMIT = 6
 
 # Samples per pixel, and pixels across. The others take longer for a clear verdict: scripts/check_experiments.py.
 QUICK = {
-    "corridor": (8192, 2),
+    "corridor": (32768, 2),
     "cube": (256, 16),
     "figure1": (2048, 16),
     "height_field": (512, 8),

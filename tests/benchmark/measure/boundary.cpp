@@ -173,12 +173,12 @@ int main(int argc, char** argv) {
   const Scene cube = load_scene(PROJECT_ROOT "/scenes/cube/scene.yaml");
   const Scene box = load_scene(PROJECT_ROOT "/tests/data/reference/scene.yaml");
   const auto gauss = [](double sigma, double center) { return GateSet(GateShape::gaussian(sigma), {center}); };
-  measure({"cube", cube, "cube", gauss(0.0108, 5.4), 4, Sampling::ellipsoidal, 1}, batches, csv);
-  measure({"box wide", box, "block", gauss(0.3, 6), 3, Sampling::standard, 4}, batches, csv);
-  measure({"box narrow", box, "block", gauss(0.012, 6), 3, Sampling::ellipsoidal, 4}, batches, csv);
-  measure({"sensor", sensor(), "occluder", gauss(0.0114, 5.7), 1, Sampling::ellipsoidal, 1000}, batches, csv);
-  measure({"ball wide", ball_scene(), "ball", gauss(0.3, 8), 2, Sampling::standard, 4}, batches, csv);
-  measure({"ball narrow", ball_scene(), "ball", gauss(0.016, 8), 2, Sampling::ellipsoidal, 4}, batches, csv);
+  measure({"cube", cube, "cube", gauss(0.0108, 5.4), 4, Sampling::ellipsoidal, 4}, batches, csv);
+  measure({"box wide", box, "block", gauss(0.3, 6), 3, Sampling::standard, 16}, batches, csv);
+  measure({"box narrow", box, "block", gauss(0.012, 6), 3, Sampling::ellipsoidal, 16}, batches, csv);
+  measure({"sensor", sensor(), "occluder", gauss(0.0114, 5.7), 1, Sampling::ellipsoidal, 4000}, batches, csv);
+  measure({"ball wide", ball_scene(), "ball", gauss(0.3, 8), 2, Sampling::standard, 16}, batches, csv);
+  measure({"ball narrow", ball_scene(), "ball", gauss(0.016, 8), 2, Sampling::ellipsoidal, 16}, batches, csv);
   std::fclose(csv);
   return 0;
 }
