@@ -2,7 +2,9 @@
 
 Both take the experiments as they are here, at the initial values, each on one thread and at the same time, so that whatever
 else the machine does strikes both. `isochron gradient` makes repeats of the gradient with the experiment's own samples;
-variance times seconds of a gradient does not depend on their number and is what is compared.
+variance times seconds of a gradient does not depend on their number and is what is compared. Up to commit 90f82c3 a sample
+of the visibility term tried all its techniques, so programs up to there are given a quarter of these samples
+(`--visibility 0.25`).
 """
 
 import argparse
@@ -20,10 +22,10 @@ REPEATS = 32  # the most that `isochron gradient` makes
 MOST_TARGET_SAMPLES = 131072  # what the target's noise adds to the residual is then a small part of it
 
 
-def start(program, name, experiment, seed, folder):
-    samples = experiment["samples"]
+def start(program, name, experiment, visibility, seed, folder):
+    samples = experiment["samples"] | {"visibility": experiment["samples"]["visibility"] * visibility}
     target = min(experiment["target"]["samples"], MOST_TARGET_SAMPLES)
-    spec = ", ".join(f"{term}: {REPEATS * samples[term]}" for term in TERMS)
+    spec = ", ".join(f"{term}: {round(REPEATS * samples[term])}" for term in TERMS)
     return subprocess.Popen(
         [program, "gradient", ROOT / "experiments" / f"{name}.yaml", "-o", folder, "--threads", "1", "--quiet",
          "--seed", str(seed), "--set", f"target.samples={target}", "--set", f"samples={{{spec}}}"])
@@ -61,6 +63,8 @@ def main():
     parser.add_argument("program")
     parser.add_argument("names", nargs="*", metavar="NAME")
     parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--visibility", type=float, default=1, metavar="X",
+                        help="the other program's visibility samples over those of the experiment")
     options = parser.parse_args()
     unknown = [name for name in options.names if name not in NAMES]
     if unknown:
@@ -76,7 +80,8 @@ def main():
         for seed in range(1, options.rounds + 1):
             folders = {label: ROOT / "runs" / "compare" / f"{name}.{label}.{seed}" for label in programs}
             running = {
-                label: start(program, name, experiment, seed, folders[label])
+                label: start(program, name, experiment, options.visibility if label != "now" else 1, seed,
+                             folders[label])
                 for label, program in programs.items()
             }
             if any([process.wait() for process in running.values()]):

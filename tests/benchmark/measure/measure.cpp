@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -119,32 +120,42 @@ void measure_forward(const NamedScene& s, int rounds, Report& report) {
   }
 }
 
-/// Time of one term's gradient pass over the primal pass's at the same number of samples.
+/// Time of the gradient passes over the primal pass's at the same number of samples: each alone and all together.
 void measure_gradient(const NamedScene& s, int rounds, Report& report) {
-  for (const bool narrow : {false, true}) {
-    const GateSet gates = narrow ? narrow_gates() : wide_gates();
-    const EstimatorOptions options{.max_bounces = 3, .sampling = narrow ? Sampling::ellipsoidal : Sampling::standard};
-    const SampleRange samples{0, narrow ? 4 : 16};
+  struct Case {
+    const char* name;
+    GateSet gates;
+    Sampling sampling;
+    int samples;
+  };
+  for (const Case& c :
+       {Case{"standard", wide_gates(), Sampling::standard, 16},
+        Case{"ellipsoidal", narrow_gates(), Sampling::ellipsoidal, 4},
+        Case{"jumps", GateSet(GateShape::truncated_gaussian(0.03, 0.06), {6}), Sampling::ellipsoidal, 4}}) {
+    const EstimatorOptions options{.max_bounces = 3, .sampling = c.sampling};
     for (const bool vertices : {false, true}) {
       const TangentBasis basis = vertices ? all_vertices(s.scene) : translation(s.scene);
-      const Renderer renderer(s.scene, gates, options, &basis);
-      const GatedImage adjoint = unit_adjoint(s.scene, gates);
+      const Renderer renderer(s.scene, c.gates, options, &basis);
+      const GatedImage adjoint = unit_adjoint(s.scene, c.gates);
       std::vector<double> gradient(DofLayout(s.scene).size());
-      for (const Term term : {Term::interior, Term::visibility}) {
+      const auto measure = [&](const std::string& what, std::span<const Term> terms) {
         const Pair pair = measure_pair(
             rounds, CLOCK_THREAD_CPUTIME_ID,
             [&] {
-              renderer.add_gradient(term, adjoint, {.seed = 3, .pass = 1}, samples, gradient);
+              for (const Term term : terms)
+                renderer.add_gradient(term, adjoint, {.seed = 3, .pass = 1}, {0, c.samples}, gradient);
               return 1.0;
             },
             [&] {
-              renderer.render({.seed = 3}, samples);
+              renderer.render({.seed = 3}, {0, c.samples});
               return 1.0;
             });
-        report.add(std::string(name(term)) + " gradient / render",
-                   s.name + (narrow ? " ellipsoidal" : " standard") + (vertices ? " all vertices" : " one translation"),
-                   pair.ratio, "", term == Term::interior ? "<= 3" : "");
-      }
+        report.add(what + " gradient / render",
+                   s.name + " " + c.name + (vertices ? " all vertices" : " one translation"), pair.ratio, "", "<= 3");
+      };
+      for (const Term& term : kTerms)
+        if (renderer.has(term)) measure(name(term), std::span(&term, 1));
+      measure("whole", kTerms);  // a term that is zero costs nothing
     }
   }
 }
