@@ -3,7 +3,7 @@
 // Defaults (the only place where they are listed; a key without one here is required):
 //   max_bounces 8                      parameters: none
 //   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0]
-//   samples: 64 for each of primal, interior, visibility, path_length
+//   samples: 64 for each of primal, interior, visibility, path_length; what a sample is: Term in core/render/renderer.h
 //   estimator: sampling auto, antithetic true, pick contribution, numbers low_discrepancy, guiding true,
 //     follow_radius 4
 //   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter; common_numbers true)

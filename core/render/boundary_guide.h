@@ -56,8 +56,8 @@ class BoundaryGuide {
   /// Unguided: a sample of the visibility term is one search by one of the techniques that can find anything, all equally
   /// often.
   explicit BoundaryGuide(const Each<bool>& possible);
-  /// From the records of as many unguided searches by each possible technique and what these cost, in any unit: the mean
-  /// cost of a sample stays that of an unguided one.
+  /// From the records of as many unguided searches by each possible technique and what these cost, in any unit. The
+  /// mean cost of a sample stays about that of an unguided one.
   BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records, const Each<double>& cost);
 
   /// How often a technique is used per sample, on average; 0 where it finds nothing.

@@ -131,16 +131,16 @@ TEST_P(FiniteDifference, TotalDerivative) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, FiniteDifference,
     ::testing::Values(
-        Case{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120, 250},
+        Case{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120, 125},
         Case{"diffuse_boxcar_standard", Look::diffuse, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
         Case{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3),
              Sampling::ellipsoidal, 40, 400},
-        Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 250},
-        Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 400},
+        Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 125},
+        Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 200},
         Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60,
-             400},
-        Case{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 250},
-        Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60, 250}),
+             200},
+        Case{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 125},
+        Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60, 125}),
     [](const auto& test) { return test.param.name; });
 
 }  // namespace
