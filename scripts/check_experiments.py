@@ -22,8 +22,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 EXPERIMENTS = {
     "branches": (32768, 12),
     "bunny": (8192, 8),
-    "corridor": (32768, 2),
-    "corridor_3bounce": (32768, 2),
+    "corridor": (131072, 2),
+    "corridor_3bounce": (131072, 2),
     "cube": (2048, 16),
     "cube_standard": (8192, 16),
     "figure1": (8192, 16),
