@@ -183,7 +183,6 @@ TEST_P(HardLight, MatchesQuadrature) {
     least_error = std::min(least_error, image.standard_error);
     std::vector<std::vector<Estimate>> terms[3];
     for (int t = 0; t < 3; ++t)
-
       terms[t] =
           term_means(renderer, kTerms[t], basis.columns, 1, samples_of(kTerms[t], kSamples), kBatches, {61, 0, 0});
     for (int m = 0; m < basis.columns; ++m) {
