@@ -93,6 +93,10 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     }
     if (length_only || k == 0) continue;
     const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
+    if (cos_near == 0 || cos_far == 0) {
+      out.clear();
+      return;
+    }
     const Vec3 g_d = x[k].n / cos_near + x[k + 1].n / cos_far - d * (4 / squared);
     g[k].position -= g_d;
     g[k + 1].position += g_d;

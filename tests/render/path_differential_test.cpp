@@ -377,6 +377,26 @@ TEST_P(PathDifferential, LeavesOutWhatIsStatic) {
     }
 }
 
+/// A path along a floor, whose value may be other than zero by rounding: not 0/0.
+TEST(EdgeOnPath, HasNoDifferential) {
+  Scene scene;
+  scene.camera = {{0, 1, 0}, {0, 0, 0}, {0, 0, 1}, 40, 8, 8};
+  add_shape(scene, "floor", quad({-1, 0, -1}, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}), diffuse(Rgb(0.5)));
+  add_shape(scene, "wall", quad({1, -1, -1}, {1, -1, 1}, {1, 1, 1}, {1, 1, -1}), diffuse(Rgb(0.5)));
+  add_shape(scene, "lamp", quad({-1, 2, -1}, {1, 2, -1}, {1, 2, 1}, {-1, 2, 1}), diffuse(Rgb(0)), Rgb(1));
+  const TangentBasis all = free_dofs(scene, every_dof(scene));
+  const PreparedScene prepared(scene, &all);
+  const SurfacePoint eye{{0, 1, 0}, {}, -1}, floor{{0, 0, 0}, prepared.normal(0), 0},
+      corner{{1, 0, 0.25}, prepared.normal(2), 2}, wall{{1, 0.5, 0.25}, prepared.normal(2), 2},
+      lamp{{0.5, 2, 0.5}, prepared.normal(4), 4};
+  LocalDifferential differential;
+  const std::vector<SurfacePoint> along{eye, floor, corner, lamp}, above{eye, floor, wall, lamp};
+  differentiate_path(prepared, along.data(), 4, false, differential);
+  EXPECT_TRUE(differential.empty());
+  differentiate_path(prepared, above.data(), 4, false, differential);
+  EXPECT_FALSE(differential.empty());
+}
+
 INSTANTIATE_TEST_SUITE_P(, PathDifferential,
                          ::testing::Values(Case{"Scattered", random_path}, Case{"ToAndFro", book_path},
                                            Case{"ThroughGlass", glass_path}),
