@@ -142,18 +142,15 @@ INSTANTIATE_TEST_SUITE_P(, Cost, ::testing::Values(Sampling::standard, Sampling:
 
 /// A small plate moves among others, a floor and a lamp that stand. Half of the searches go to edges that stand, as those that
 /// move and those that do not get equal shares; few of their segments meet the plate, and those that do not cast no rays. Rays
-/// of a search over those where all moves: 0.72 from the edge, 1.01 from the camera, but 1.18 and 1.48 if each segment casts its
-/// rays.
+/// of a search: 1.13 from the edge, 0.29 from the camera, but 1.85 and 0.42 if each segment casts its rays.
 TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
   Scene scene;
   scene.camera = {{0, 6, 14}, {0, 0, 0}, {0, 1, 0}, 50, 16, 16};
-  std::vector<Motion> all;
   for (int i = 0; i < 8; ++i) {
     const double x = i - 3.5;
-    const std::string name = "plate" + std::to_string(i);
-    add_shape(scene, name, quad({x - 0.3, 0, -0.3}, {x - 0.3, 0, 0.3}, {x + 0.3, 0, 0.3}, {x + 0.3, 0, -0.3}),
+    add_shape(scene, "plate" + std::to_string(i),
+              quad({x - 0.3, 0, -0.3}, {x - 0.3, 0, 0.3}, {x + 0.3, 0, 0.3}, {x + 0.3, 0, -0.3}),
               diffuse(Rgb(0.6), true));
-    all.push_back(translate(scene, name, {0.1 * i, 1, 0.2 * i}));
   }
   add_shape(scene, "floor", quad({-9, -2, -9}, {-9, -2, 9}, {9, -2, 9}, {9, -2, -9}), diffuse(Rgb(0.6)));
   add_shape(scene, "lamp", quad({-1, 4, -1}, {1, 4, -1}, {1, 4, 1}, {-1, 4, 1}), diffuse(Rgb(0.0)), Rgb(10.0));
@@ -161,7 +158,8 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
   const EstimatorOptions options{.max_bounces = 1};
   const BoundaryGuide unguided({true, true, true, true});
   const GatePick every_gate(gates);
-  const auto rays = [&](const TangentBasis& basis, bool from_camera) {
+  const TangentBasis basis = make_basis(scene, {translate(scene, "plate0", {0, 1, 0})});
+  const auto rays = [&](bool from_camera) {
     const PreparedScene prepared(scene, &basis);
     const BoundaryEdges edges(prepared);
     Worker worker(prepared, gates, options, every_gate, GuideSink(gates, prepared.layout, basis));
@@ -176,11 +174,8 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
     }
     return static_cast<double>(worker.rays) / kSearches - from_camera;  // but for the camera's own
   };
-  for (const char* name : {"floor", "lamp"}) all.push_back(translate(scene, name, {1, 0.5, -1}));
-  const TangentBasis one = make_basis(scene, {all[0]}), everything = make_basis(scene, all);
-  for (const bool from_camera : {false, true}) {
-    EXPECT_LT(rays(one, from_camera), (from_camera ? 1.2 : 0.9) * rays(everything, from_camera)) << from_camera;
-  }
+  EXPECT_LT(rays(false), 1.4);
+  EXPECT_LT(rays(true), 0.35);
 }
 
 }  // namespace
