@@ -67,7 +67,7 @@ struct Renderer::Impl {
   mutable std::atomic<long long> rays{0}, arcs{0};
   mutable std::once_flag learned;
   mutable std::optional<BoundaryEdges> edges;  ///< only the visibility term asks for them
-  mutable std::optional<BoundaryGuide> guide;  ///< likewise
+  mutable std::optional<Guide> guide;          ///< likewise
 
   Impl(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent)
       : gates(gate_set),
@@ -154,7 +154,7 @@ struct Renderer::Impl {
       possible[Guide::pixel_border] = scene.camera_flow.possible();
       possible[Guide::from_edge] = edges->has_secondary();
       possible[Guide::from_camera] = edges->has_secondary() && options.boundary.from_camera;
-      const BoundaryGuide& unguided = guide.emplace(possible);
+      const Guide& unguided = guide.emplace(possible);
       const auto searches = std::count(possible.begin(), possible.end(), true);
       if (searches == 0) return;
       const long long rounds =
@@ -192,7 +192,7 @@ struct Renderer::Impl {
         all.insert(all.end(), records[strand].begin(), records[strand].end());
         for (int t = 0; t < Guide::kTechniques; ++t) cost[t] += costs[strand][t];
       }
-      guide = BoundaryGuide(possible, all, cost);
+      guide.emplace(possible, all, cost);
     });
   }
 

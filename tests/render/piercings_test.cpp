@@ -86,7 +86,8 @@ TEST(Piercings, DerivativesAgreeWithFiniteDifferences) {
     const Renderer renderer(scene, gates, options, &basis);
     constexpr int kBatches = 32;
     const auto interior = term_means(renderer, Term::interior, 1, 2, 128, kBatches, {1, 0, 0});
-    const auto visibility = term_means(renderer, Term::visibility, 1, 2, 512, kBatches, {2, 0, 0});
+    const auto visibility =
+        term_means(renderer, Term::visibility, 1, 2, samples_of(Term::visibility, 128), kBatches, {2, 0, 0});
     const auto difference = finite_difference(scene, c.motion, 0.01, gates, options, 512, kBatches, {3, 0, 0});
     for (int g = 0; g < 2; ++g) {
       const Estimate total{interior[0][g].mean + visibility[0][g].mean,

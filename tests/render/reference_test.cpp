@@ -75,7 +75,8 @@ TEST_P(Reference, EveryTerm) {
   const Stream stream{21, 0, 0};
   const auto image = image_means(renderer, 3, standard ? 40 : 12, kBatches, stream);
   const auto interior = term_means(renderer, Term::interior, 2, 3, standard ? 200 : 40, kBatches, stream);
-  const auto visibility = term_means(renderer, Term::visibility, 2, 3, standard ? 480 : 160, kBatches, stream);
+  const auto visibility =
+      term_means(renderer, Term::visibility, 2, 3, samples_of(Term::visibility, standard ? 120 : 40), kBatches, stream);
   const auto path_length = term_means(renderer, Term::path_length, 2, 3, standard ? 40 : 30, kBatches, stream);
   for (int p = 0; p < 2; ++p) {
     double scale = 0;
