@@ -285,6 +285,8 @@ void read_settings(YamlMap& map, Experiment& experiment) {
     if (const auto numbers = estimator.find("numbers"))
       experiment.estimator.numbers = static_cast<Numbers>(numbers->choice({"low_discrepancy", "independent"}));
     if (const auto guiding = estimator.find("guiding")) experiment.guiding = guiding->boolean();
+    if (const auto follow = estimator.find("follow"))
+      experiment.estimator.follow = follow->number(NumberRange::non_negative());
     if (const auto radius = estimator.find("follow_radius"))
       experiment.estimator.follow_radius = radius->number(NumberRange::non_negative());
     estimator.reject_unknown();

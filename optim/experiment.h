@@ -5,7 +5,7 @@
 //   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0]
 //   samples: 64 for each of primal, interior, visibility, path_length; what a sample is: Term in core/render/renderer.h
 //   estimator: sampling auto, antithetic true, pick contribution, numbers low_discrepancy, guiding true,
-//     follow_radius 4
+//     follow 1, follow_radius 4
 //   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter; common_numbers true)
 //   loss: kind squared                (huber, cauchy: scale 1)
 //   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);

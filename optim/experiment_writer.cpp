@@ -113,7 +113,8 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
   fmt::format_to(out, "estimator:\n  sampling: {}\n  antithetic: {}\n  pick: {}\n  numbers: {}\n",
                  kSampling[static_cast<int>(e.estimator.sampling)], e.estimator.antithetic,
                  kPicks[static_cast<int>(e.estimator.pick)], kNumbers[static_cast<int>(e.estimator.numbers)]);
-  fmt::format_to(out, "  guiding: {}\n  follow_radius: {}\n", e.guiding, e.estimator.follow_radius);
+  fmt::format_to(out, "  guiding: {}\n  follow: {}\n  follow_radius: {}\n", e.guiding, e.estimator.follow,
+                 e.estimator.follow_radius);
   const bool analytic = e.gradient.method == GradientMethod::analytic;
   fmt::format_to(out, "gradient:\n  method: {}\n", analytic ? "analytic" : "finite_difference");
   // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.

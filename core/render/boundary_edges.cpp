@@ -59,7 +59,7 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
     }
     b.azimuths = wedge ? angle : kPi;
     b.moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
-    if (b.moves || scene.camera_flow.possible())
+    if (b.moves || scene.flows.camera_possible())
       if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
     secondary_.add(b, edge_length * b.azimuths);
   }
@@ -81,7 +81,7 @@ void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
     // The angle between the planes takes the place of the wedge.
     const double angle = std::atan2(length(cross(b.inward[0], b.inward[1])), std::abs(dot(b.inward[0], b.inward[1])));
     b.azimuths = wedge ? angle : kPi;
-    if (angle < kCoplanarAngle || !(b.moves || scene.camera_flow.possible())) continue;
+    if (angle < kCoplanarAngle || !(b.moves || scene.flows.camera_possible())) continue;
     if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
   }
 }

@@ -14,6 +14,7 @@ struct GatheredLight {
   double length;  ///< from vertex 1 to the emitter
   int bounces;    ///< scattering vertices
   int target;     ///< which of the lengths before the path it is meant for; -1: all
+  SurfacePoint next = {};  ///< vertex 2; none (triangle -1) where vertex 1 emits the light
 };
 
 /// What a boundary segment's light is joined with.
@@ -69,7 +70,9 @@ class LightSide {
     std::vector<GatheredLight>& lights;
     const Path& path;
     bool wants() const { return true; }
-    void take(const Rgb& value) { lights.push_back({value, path.length.back(), path.size() - 2, -1}); }
+    void take(const Rgb& value) {
+      lights.push_back({value, path.length.back(), path.size() - 2, -1, path.size() > 2 ? path.vertex[2] : SurfacePoint{}});
+    }
   };
   struct Receiver {
     LightSide& side;
@@ -77,7 +80,7 @@ class LightSide {
       const double length = side.lengths_[target];
       const CameraSide& before = side.before_[target];
       const double pdf = side.worker_.pick.length_pdf(before.pixel, length + before.length);
-      side.lights_.push_back({value * (1 / pdf), length, bounces, target});
+      side.lights_.push_back({value * (1 / pdf), length, bounces, target, side.worker_.path.vertex[2]});
     }
   };
 

@@ -30,37 +30,44 @@ LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const S
   return lobe;
 }
 
-/// Turns the gradients at x1 into those of its material point, for x1 slides along its pixel ray and follows
-/// x2, which takes its part of them.
-void let_flow(const CameraFlow::Follow& follow, const Vec3& ray, const Vec3& forward, const SurfacePoint& x1,
-              Accumulated& g1, Accumulated& g2) {
-  const double height = dot(x1.n, ray);
-  const auto in_plane = [&](const Vec3& g) { return g - x1.n * dot(g, x1.n); };
-  Vec3 position, length;  // what multiplies the flow in the plane of x1
-  double squeezed = 0;
-  if (follow.weight > 0) {
-    // As it leaves the pixel ray, what it sees per area counts: du/dA = (n . ray) / (forward . ray)^3, up to
-    // a factor. That the normal turns and the flow spreads adds up to the last line.
-    const Vec3 log_density = x1.n / height - forward * (3 / dot(forward, ray));
-    position = in_plane(g1.position * follow.weight + follow.gradient);
-    length = in_plane(g1.length * follow.weight);
-    squeezed = follow.weight * dot(x1.n, log_density);
-    g2.position += position + in_plane(log_density) * follow.weight;
-    g2.length += length;
-    g1.normal += ray * (follow.weight / height);
-  }
-  g1.position = x1.n * (dot(ray, g1.position - position) / height + squeezed);
-  g1.length = x1.n * (dot(ray, g1.length - length) / height);
+/// What a vertex's material point adds up beyond what its base flow says: from neighbours that follow it, from x1 itself.
+struct Extra {
+  Vec3 position, length;
+  double area = 0;  ///< counts d ln (area of its triangle)
+};
+
+Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
+  return g - x.n * dot(g, x.n);
+}
+
+/// Lets x_k follow its neighbours (theory section 8): takes the gradients there and hands its part of them to what it
+/// follows; `density` is d ln (sampling measure) / dx in the plane of x_k. Returns what its base flow loses by it.
+Extra let_follow(const VertexFlow& flow, const SurfacePoint& x, const Accumulated& g, const Vec3& density,
+                 Extra* before, Extra* own, Extra* after) {
+  Extra lost;
+  const auto hand = [&](const Following& f, Extra* to) {
+    if (!(f.weight > 0)) return;
+    const Vec3 position = in_plane(x, (g.position + density) * f.weight + f.gradient);
+    const Vec3 along = in_plane(x, g.length * f.weight);
+    to->position += position;
+    to->length += along;
+    lost.position += position;
+    lost.length += along;
+    lost.area += f.weight;
+  };
+  hand(flow.before, before);
+  hand(flow.after, after);
+  hand(flow.own, own);
+  return lost;
 }
 
 /// Carries position and normal gradients of a vertex to its triangle's vertices.
-void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, bool material,
-                 bool length_only, LocalDifferential& out) {
+/// `area`: how often d ln (area of the triangle) counts (paper Eq. 11).
+void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, double area, bool length_only,
+                 LocalDifferential& out) {
   if (!scene.has_moving_vertex(x.triangle)) return;
-  // Rotation of the face normal, and d ln A of material points (paper Eq. 11).
-  Vec3 through_cross = g.normal - x.n * dot(g.normal, x.n);
-  if (material) through_cross += x.n;
-  through_cross = through_cross / (2 * scene.area(x.triangle));
+  // Both turn with the doubled area's vector.
+  const Vec3 through_cross = (in_plane(x, g.normal) + x.n * area) / (2 * scene.area(x.triangle));
   const auto b = scene.barycentrics(x);
   const auto& edge = scene.edges(x.triangle);
   const Vec3 opposite[3] = {edge[0] - edge[1], edge[1], -edge[0]};  // from the next but one corner to the next
@@ -69,6 +76,50 @@ void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumu
     if (!length_only) entry.log_f += cross(opposite[i], through_cross);
     out.vertices.push_back(entry);
   });
+}
+
+/// Carries the gradients at the path's vertices through their flows to the vertices of the mesh.
+void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std::vector<Accumulated>& g, bool length_only,
+              LocalDifferential& out) {
+  thread_local std::vector<Extra> extra;
+  extra.assign(count, {});
+  // Each material point counts its area but that of x1, which the pixel holds.
+  for (int k = 2; k < count; ++k) extra[k].area = 1;
+
+  // What an area of the surface at x1 takes of the image: W_e = (n . ray) / (forward . ray)^3, up to a factor; theory
+  // section 8.
+  const Vec3 ray = x[1].p - x[0].p;
+  const Vec3& forward = scene.camera.forward;
+  const double height = dot(x[1].n, ray);
+  const Vec3 log_density = x[1].n / height - forward * (3 / dot(forward, ray));
+  VertexFlows::Pair before, after;
+  Extra lost_by_pixel;
+  for (int k = 1; k < count; ++k) {
+    after = k + 1 < count ? scene.flows.pair(scene, x[k], x[k + 1], k) : VertexFlows::Pair{};
+    const VertexFlow flow = VertexFlows::at(before, after, k);
+    before = after;
+    if (!flow.follows()) continue;
+    const Extra lost = let_follow(flow, x[k], g[k], k == 1 ? log_density : Vec3(), &extra[k - 1], &extra[k],
+                                  k + 1 < count ? &extra[k + 1] : nullptr);
+    if (k == 1) {
+      lost_by_pixel = lost;
+    } else {
+      extra[k].position -= lost.position;
+      extra[k].length -= lost.length;
+      extra[k].area -= lost.area;
+    }
+  }
+
+  // The pixel flow: along the ray, as far as the surface moves along its normal.
+  const Vec3 squeezed = g[1].position - lost_by_pixel.position + log_density * lost_by_pixel.area;
+  g[1].normal += ray * (lost_by_pixel.area / height);
+  g[1].position = x[1].n * (dot(ray, squeezed) / height);
+  g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
+  for (int k = 1; k < count; ++k) {
+    g[k].position += extra[k].position;
+    g[k].length += extra[k].length;
+    to_triangle(scene, x[k], g[k], extra[k].area, length_only, out);
+  }
 }
 
 }  // namespace
@@ -123,10 +174,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
         if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
   }
-  CameraFlow::Follow follow;
-  if (count > 2) follow = scene.camera_flow.follow(x[1].p, x[2].p);
-  let_flow(follow, x[1].p - x[0].p, scene.camera.forward, x[1], g[1], g[count > 2 ? 2 : 0]);
-  for (int k = 1; k < count; ++k) to_triangle(scene, x[k], g[k], k > 1, length_only, out);
+  let_flow(scene, x, count, g, length_only, out);
 }
 
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {

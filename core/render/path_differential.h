@@ -34,8 +34,8 @@ struct LocalDifferential {
 };
 
 /// Differentiates the path vertex[0..count-1], vertex[0] the camera and vertex[count-1] on an emitter (or, where
-/// `length_only`, only its length). vertex[1] flows as CameraFlow says, the others with their material points, whose
-/// area factors count in F. Static vertices are left out. Empty where a segment lies exactly in a surface that it ends at:
+/// `length_only`, only its length). Vertices flow as VertexFlows says; area factors of material points, and what F gains
+/// where the flow spreads, count in ln F. Static vertices are left out. Empty where a segment lies exactly in a surface that it ends at:
 /// F is zero there, or by rounding next to it, and ln F has no derivative.
 void differentiate_path(const PreparedScene& scene, const SurfacePoint* vertex, int count, bool length_only,
                         LocalDifferential& out);

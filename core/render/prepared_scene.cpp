@@ -36,14 +36,15 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
   any = !basis->entries.empty();
 }
 
-PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, double follow_radius)
+PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow)
     : scene(source),
       camera(source.camera),
       layout(source),
       moving(source, basis),
-      camera_flow(source, camera, moving, follow_radius),
+      flows(source, camera, moving, follow),
       caster(source),
-      moving_bounds(moving.bounds.grown(caster.offset())) {
+      moving_bounds(moving.bounds.grown(caster.offset())),
+      flowing_bounds(flows.near().grown(caster.offset())) {
   for (const Shape& shape : scene.shapes) shapes_.push_back({&scene.materials[shape.material]});
   const std::size_t count = scene.triangles.size();
   records_.resize(count);

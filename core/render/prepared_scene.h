@@ -11,9 +11,9 @@
 #include "core/geometry/ellipsoid_bvh.h"
 #include "core/math/discrete_distribution.h"
 #include "core/math/large_array.h"
-#include "core/render/camera_flow.h"
 #include "core/render/camera_model.h"
 #include "core/render/ray_caster.h"
+#include "core/render/vertex_flow.h"
 #include "core/scene/scene.h"
 
 namespace isochron {
@@ -60,16 +60,17 @@ struct MovingParts {
 
 class PreparedScene {
  public:
-  /// `follow_radius`: see CameraFlow.
-  PreparedScene(const Scene& scene, const TangentBasis* basis, double follow_radius = 0);
+  PreparedScene(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow = {});
 
   const Scene& scene;
   CameraModel camera;
   DofLayout layout;
   MovingParts moving;
-  CameraFlow camera_flow;
+  VertexFlows flows;
   RayCaster caster;
-  Bounds moving_bounds;  ///< of the triangles with a vertex that moves, and as much more as rays go astray by rounding
+  /// Of the triangles with a vertex that moves, and as much more as rays go astray by rounding; and of all vertices but x1
+  /// that may follow or be followed.
+  Bounds moving_bounds, flowing_bounds;
   std::vector<int> emitters;          ///< triangles that emit
   bool camera_sees_emitters = false;  ///< may, if nothing is in between
   EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;

@@ -1,6 +1,6 @@
 // Primary visibility boundary: a camera ray grazes an edge (theory section 5, "Primary") or the border of a
 // pixel. Light crosses it where the edge moves, and where the points beside it follow others (see
-// CameraFlow): per length,
+// VertexFlows): per length,
 //     L (velocity of the boundary - flow of x1) . n_B / distance, with the sign of the side.
 #pragma once
 #include "core/render/boundary_edges.h"
@@ -75,7 +75,7 @@ class PrimaryBoundary {
     differential.clear();
     BoundaryEdges::add_velocity(scene_, point, n_b, differential);
     const bool moves = !differential.empty();
-    if (!moves && !scene_.camera_flow.possible_along(d)) return;
+    if (!moves && !scene_.flows.camera_possible_along(d)) return;
 
     // Off the faces, to the camera's side of each, so that the edge does not hide itself.
     Vec3 off = -d;
@@ -125,7 +125,7 @@ class PrimaryBoundary {
     const double along = place - border;
     const Vec3 d = camera.direction(column + (axis == 1 ? along : 0), row + (axis == 0 ? along : 0));
     const bool in_columns = column < camera.width, in_rows = row < camera.height;
-    if (!(axis == 0 ? in_rows : in_columns) || !scene_.camera_flow.possible_along(d)) return;
+    if (!(axis == 0 ? in_rows : in_columns) || !scene_.flows.camera_possible_along(d)) return;
     const auto x1 = worker_.trace_camera(d);
     if (!x1) return;
     const int pixel = row * camera.width + column;
@@ -145,16 +145,18 @@ class PrimaryBoundary {
   /// being bound to g . (how x1 follows); ledgers put it down to the triangle `blamed`.
   template <class Add>
   void follow(const SurfacePoint& x1, int pixel, int blamed, const Vec3& g, Rng& rng, Add&& add) {
-    if (!scene_.camera_flow.possible_at(x1.p) || worker_.options.max_bounces < 1) return;
+    if (!scene_.flows.camera_possible_at(x1.p) || worker_.options.max_bounces < 1) return;
     Rgb throughput(1.0);
     const auto next = turn(scene_, x1, normalize(eye_.p - x1.p), throughput, rng);
     if (!next) return;
     if (!scene_.has_moving_vertex(x1.triangle) && !scene_.moving_bounds.meets_ray(x1.p, next->direction)) return;
-    const int met = worker_.cast_within(x1, next->direction, scene_.camera_flow.radius_at(x1.p));
+    const int met = worker_.cast_within(x1, next->direction, scene_.flows.camera_radius_at(x1.p));
     const auto x2 = scene_.end_point(met, x1.p, next->direction);
     if (!x2) return;
     following_.clear();
-    add_following_flow(scene_, x1, *x2, g, following_);
+    const VertexFlow flow = VertexFlows::at({}, scene_.flows.pair(scene_, x1, *x2, 1), 1);
+    if (!flow.follows()) return;
+    add_following_flow(scene_, flow, nullptr, x1, &*x2, 1, g, following_);
     if (following_.empty()) return;
     worker_.sink.bind(following_);
     const CameraSide before{pixel, length(x1.p - eye_.p) * scene_.index_between(eye_, x1) +

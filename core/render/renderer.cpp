@@ -73,7 +73,7 @@ struct Renderer::Impl {
       : gates(gate_set),
         options(estimator),
         basis(tangent),
-        scene(source, tangent, estimator.follow_radius),
+        scene(source, tangent, {estimator.follow_radius, estimator.follow}),
         every_gate(gate_set) {
     const double width = gates.relative_width();
     mix = sampling_mix(options, gates);
@@ -151,7 +151,7 @@ struct Renderer::Impl {
       edges.emplace(scene, options.boundary.wedge);
       Guide::Each<bool> possible;
       possible[Guide::primary] = edges->has_primary();
-      possible[Guide::pixel_border] = scene.camera_flow.possible();
+      possible[Guide::pixel_border] = scene.flows.camera_possible();
       possible[Guide::from_edge] = edges->has_secondary();
       possible[Guide::from_camera] = edges->has_secondary() && options.boundary.from_camera;
       const Guide& unguided = guide.emplace(possible);

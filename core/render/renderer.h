@@ -57,8 +57,10 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// Within how many widths of a pixel what the camera sees follows what moves beside it, see CameraFlow; 0: not at all.
-  double follow_radius = 4;
+  /// How far path vertices follow what is close to them and moves otherwise, see VertexFlows; 0: not at all. Any values
+  /// give the same derivative, with other variances, divided otherwise between the interior and the visibility term.
+  double follow = 1;         ///< all but what the camera sees: in radii of the smaller body
+  double follow_radius = 4;  ///< what the camera sees: in widths of a pixel
   /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.
   double guiding_samples = 0;
   bool operator==(const EstimatorOptions&) const = default;

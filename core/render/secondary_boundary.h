@@ -46,16 +46,16 @@ class SecondaryBoundary {
       g.w = direction_in_wedge(g.y, u0, u1);
     }
     if (!g.orient()) return;
-    const bool may_end_moving = g.y.edge->moves || may_meet_moving(g, -g.w);
-    if (!(may_end_moving || may_meet_moving(g, g.w)) || !find_light_end(g)) return;
+    const bool may_end_flowing = g.y.edge->moves || may_meet_flowing(g, -g.w);
+    if (!(may_end_flowing || may_meet_flowing(g, g.w)) || !find_light_end(g)) return;
     if (aimed_at >= 0 && g.light.triangle != aimed_at) return;
-    if (!(may_end_moving || scene_.has_moving_vertex(g.light.triangle))) return;
+    if (!(may_end_flowing || may_flow(g.light))) return;
     ++worker_.rays;
     const int t = scene_.caster.first_triangle(g.lifted(scene_.caster.offset()), -g.w);
     if (t < 0 || !faces(t, g.w)) return;
     g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
     g.r_d = length(g.camera_end.p - g.y.y);
-    if (!differentiate(g)) return;
+    if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return;
 
     connections_.clear();
     walk_to_camera(g, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
@@ -117,6 +117,7 @@ class SecondaryBoundary {
     Rgb value;                ///< without multiple importance sampling
     double length;            ///< camera to D
     double camera_over_edge;  ///< density of finding the segment from the camera over that from the edge
+    SurfacePoint before;      ///< the vertex before D; none (triangle -1) where D is x1
   };
   enum class Found { from_edge, from_camera };
 
@@ -153,9 +154,12 @@ class SecondaryBoundary {
     return (1 - aimed_share_) * wedge + aimed_share_ * aimed;
   }
 
-  /// Whether the ray from the edge point along w may end on a triangle that moves.
-  bool may_meet_moving(const Segment& g, const Vec3& w) const {
-    return scene_.moving_bounds.meets_ray(g.lifted(scene_.caster.offset()), w);
+  /// Whether the ray from the edge point along w may end on a triangle that moves, or where a vertex follows what does.
+  bool may_meet_flowing(const Segment& g, const Vec3& w) const {
+    return scene_.flowing_bounds.meets_ray(g.lifted(scene_.caster.offset()), w);
+  }
+  bool may_flow(const SurfacePoint& x) const {
+    return scene_.has_moving_vertex(x.triangle) || scene_.flows.possible_at(x.p);
   }
 
   bool find_light_end(Segment& g) {
@@ -168,8 +172,8 @@ class SecondaryBoundary {
     return true;
   }
 
-  /// The speed of the edge relative to the line that grazes it, as a linear form in vertex velocities; once with D
-  /// as x1, once as a material point. False when nothing moves.
+  /// The speed of the edge relative to the line that grazes it, as a linear form in vertex velocities, where D and S
+  /// follow nothing; once with D as x1, once as a material point. False when nothing moves.
   bool differentiate(const Segment& g) {
     const Vec3 b = g.n_b * g.side;
     LocalDifferential& common = camera_flow_;
@@ -179,9 +183,26 @@ class SecondaryBoundary {
     add_material_flow(scene_, g.light, b * (-g.r_d / whole), common);
     material_flow_ = common;
     add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), camera_flow_);
-    add_following_flow(scene_, g.camera_end, g.light, b * (-g.r_s / whole), camera_flow_);
     add_material_flow(scene_, g.camera_end, b * (-g.r_s / whole), material_flow_);
     return !camera_flow_.empty() || !material_flow_.empty();
+  }
+
+  /// The same on the path of connection c that goes on to `next` (none: triangle -1), with what D and S follow.
+  const LocalDifferential& with_following(const Segment& g, const Connection& c, const SurfacePoint& next) {
+    const int k = c.bounces;
+    const bool has_before = c.before.triangle >= 0, has_next = next.triangle >= 0;
+    const VertexFlows& flows = scene_.flows;
+    const LocalDifferential& base = k == 1 ? camera_flow_ : material_flow_;
+    const auto along = flows.pair(scene_, g.camera_end, g.light, k);
+    const auto before = has_before ? flows.pair(scene_, c.before, g.camera_end, k - 1) : VertexFlows::Pair{};
+    const auto after = has_next ? flows.pair(scene_, g.light, next, k + 1) : VertexFlows::Pair{};
+    const VertexFlow of_d = VertexFlows::at(before, along, k), of_s = VertexFlows::at(along, after, k + 1);
+    if (!of_d.follows() && !of_s.follows()) return base;
+    following_ = base;
+    const Vec3 b = g.n_b * (g.side / (g.r_s + g.r_d));
+    add_following_flow(scene_, of_d, &c.before, g.camera_end, &g.light, k, b * -g.r_s, following_);
+    add_following_flow(scene_, of_s, &g.camera_end, g.light, &next, k + 1, b * -g.r_d, following_);
+    return following_;
   }
 
   /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
@@ -228,7 +249,8 @@ class SecondaryBoundary {
           camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
           connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
                                   walked + distance * scene_.index_between(x, eye),
-                                  camera_over_edge(g, camera_side_, bounce, pixel)});
+                                  camera_over_edge(g, camera_side_, bounce, pixel),
+                                  bounce > 1 ? walk_[1] : SurfacePoint{}});
         }
       }
       if (bounce == worker_.options.max_bounces || !survives(throughput, bounce, rng)) return;
@@ -283,7 +305,7 @@ class SecondaryBoundary {
       const double rate = length_over_random(g, c);
       const Rgb radiance = scene_.emitted(g.light, -g.w);
       if (!(rate > 0) || radiance.is_black()) continue;
-      const LocalDifferential& differential = c.bounces == 1 ? camera_flow_ : material_flow_;
+      const LocalDifferential& differential = with_following(g, c, {});
       if (differential.empty()) continue;
       worker_.sink.bind(differential);
       note_boundary(worker_.sink, c.bounces, g.y.edge->face[0]);
@@ -340,14 +362,15 @@ class SecondaryBoundary {
     const Material& material = scene_.material_of(g.camera_end.triangle);
     const double scattered = s.lobe(material);
     if (!(scattered > 0) || !g.orient()) return false;
-    if (!(g.y.edge->moves || scene_.has_moving_vertex(g.camera_end.triangle) || may_meet_moving(g, g.w))) return false;
-    if (!find_light_end(g) || !differentiate(g)) return false;
+    if (!(g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
+    if (!find_light_end(g)) return false;
+    if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return false;
     ++worker_.rays;
     if (scene_.caster.occluded(scene_.leave(g.camera_end, g.w), g.lifted(scene_.caster.offset()))) return false;
     const double factor =
         g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x())) * scattered;
     connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back(),
-                            camera_over_edge(g, path.vertex, k, pixel)});
+                            camera_over_edge(g, path.vertex, k, pixel), k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
     return true;
   }
 
@@ -362,16 +385,20 @@ class SecondaryBoundary {
       before_.push_back({c.pixel, c.length + length});
     }
     const auto& lights = light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng);
+    const bool may_follow = scene_.flows.possible_at(g.camera_end.p) || scene_.flows.possible_at(g.light.p) ||
+                            scene_.flows.camera_possible_at(g.camera_end.p);
     const LocalDifferential* bound = nullptr;
     for (std::size_t i = 0; i < connections_.size(); ++i) {
       const Connection& c = connections_[i];
       const LocalDifferential* differential = c.bounces == 1 ? &camera_flow_ : &material_flow_;
-      if (differential->empty()) continue;
-      if (differential != bound) worker_.sink.bind(*(bound = differential));
+      if (!may_follow && differential->empty()) continue;
       const double ratio = c.camera_over_edge;
       for (const GatheredLight& e : lights) {
         if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
         if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
+        if (may_follow) differential = &with_following(g, c, e.next);
+        if (differential->empty()) continue;
+        if (may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
         const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
         const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
         note_boundary(worker_.sink, c.bounces + e.bounces, g.y.edge->face[0]);
@@ -389,7 +416,7 @@ class SecondaryBoundary {
   const double camera_over_edge_rate_;  ///< how often segments are looked for from the camera, over that from an edge
   const double aimed_share_;            ///< of the directions from an edge
   LightSide<Sink> light_side_;
-  LocalDifferential camera_flow_, material_flow_;
+  LocalDifferential camera_flow_, material_flow_, following_;
   std::vector<SurfacePoint> walk_, camera_side_;
   std::vector<Connection> connections_;
   std::vector<CameraSide> before_;  ///< up to S, one per connection
