@@ -10,10 +10,10 @@ namespace isochron {
 
 /// Light that vertex 1 of a path sends to vertex 0.
 struct GatheredLight {
-  Rgb value;      ///< contribution over density from vertex 1 on, without the gate
-  double length;  ///< from vertex 1 to the emitter
-  int bounces;    ///< scattering vertices
-  int target;     ///< which of the lengths before the path it is meant for; -1: all
+  Rgb value;               ///< contribution over density from vertex 1 on, without the gate
+  double length;           ///< from vertex 1 to the emitter
+  int bounces;             ///< scattering vertices
+  int target;              ///< which of the lengths before the path it is meant for; -1: all
   SurfacePoint next = {};  ///< vertex 2; none (triangle -1) where vertex 1 emits the light
 };
 
@@ -71,7 +71,8 @@ class LightSide {
     const Path& path;
     bool wants() const { return true; }
     void take(const Rgb& value) {
-      lights.push_back({value, path.length.back(), path.size() - 2, -1, path.size() > 2 ? path.vertex[2] : SurfacePoint{}});
+      lights.push_back(
+          {value, path.length.back(), path.size() - 2, -1, path.size() > 2 ? path.vertex[2] : SurfacePoint{}});
     }
   };
   struct Receiver {

@@ -79,8 +79,8 @@ void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumu
 }
 
 /// Carries the gradients at the path's vertices through their flows to the vertices of the mesh.
-void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std::vector<Accumulated>& g, bool length_only,
-              LocalDifferential& out) {
+void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std::vector<Accumulated>& g,
+              bool length_only, LocalDifferential& out) {
   thread_local std::vector<Extra> extra;
   extra.assign(count, {});
   // Each material point counts its area but that of x1, which the pixel holds.
@@ -103,6 +103,7 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
                                   k + 1 < count ? &extra[k + 1] : nullptr);
     if (k == 1) {
       lost_by_pixel = lost;
+      extra[k].area = flow.own.weight;
     } else {
       extra[k].position -= lost.position;
       extra[k].length -= lost.length;

@@ -100,7 +100,10 @@ Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
 
 VertexFlows::VertexFlows(const Scene& scene, const CameraModel& camera, const MovingParts& moving,
                          const FollowOptions& options)
-    : position_(camera.position), forward_(camera.forward), radius_(options.radius_in_pixels * camera.pixel_size()), near_(moving.bounds) {
+    : position_(camera.position),
+      forward_(camera.forward),
+      radius_(options.radius_in_pixels * camera.pixel_size()),
+      near_(moving.bounds) {
   if (!moving.geometry) return;
   if (options.radius_in_pixels > 0) {
     // x1 is within s of the box, and its own depth enters s.
@@ -109,7 +112,8 @@ VertexFlows::VertexFlows(const Scene& scene, const CameraModel& camera, const Mo
                         camera.forward.y > 0 ? moving.bounds.high.y : moving.bounds.low.y,
                         camera.forward.z > 0 ? moving.bounds.high.z : moving.bounds.low.z};
     const double depth = std::max(0.0, dot(camera.forward, farthest - camera.position));
-    const double margin = radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
+    const double margin =
+        radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
     camera_near_ = moving.bounds.grown(margin);
     camera_possible_ = !sees_nothing_of_itself(scene, moving);
     for (std::size_t t = 0; t < scene.triangles.size() && !camera_possible_; ++t)

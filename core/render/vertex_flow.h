@@ -102,12 +102,12 @@ class VertexFlows {
   Vec3 position_, forward_;  ///< of the camera
   double radius_;            ///< s of x1 per depth
   bool camera_possible_ = false;
-  Bounds camera_near_;           ///< holds every x1 that may follow
-  Bounds near_;                  ///< holds what moves and all others that may
-  std::vector<int> patch_;       ///< of each triangle: coplanar triangles of one mesh that share edges; empty: none follows
+  Bounds camera_near_;      ///< holds every x1 that may follow
+  Bounds near_;             ///< holds what moves and all others that may
+  std::vector<int> patch_;  ///< of each triangle: coplanar triangles of one mesh that share edges; empty: none follows
   std::vector<Patch> patches_;
-  std::vector<Crease> creases_;       ///< patch by patch
-  std::vector<double> body_radius_;   ///< times `follow`
+  std::vector<Crease> creases_;      ///< patch by patch
+  std::vector<double> body_radius_;  ///< times `follow`
 };
 
 /// Adds g . (velocity of x1 along its pixel ray) to `out`.

@@ -68,7 +68,7 @@ TEST_P(Reference, EveryTerm) {
   options.sampling = c.sampling;
   options.antithetic = c.antithetic;
   options.guiding_samples = 32;
-  options.follow_radius = 0;  // the reference keeps x1 on its pixel ray: other terms, of the same sum
+  options.follow = options.follow_radius = 0;  // the reference's vertices follow nothing: other terms, of the same sum
   const Renderer renderer(scene, gates, options, &basis);
 
   constexpr int kBatches = 32;

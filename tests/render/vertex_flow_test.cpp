@@ -1,6 +1,6 @@
-// What the camera sees follows what moves close to it (CameraFlow): which term holds what changes, the
-// derivative of every pixel does not.
-#include "core/render/camera_flow.h"
+// What the camera sees follows what moves close to it, and so do the other vertices of a path (VertexFlows): which term
+// holds what changes, the derivative of every pixel does not.
+#include "core/render/vertex_flow.h"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ std::array<double, 2> image_point(const CameraModel& camera, const Vec3& p) {
           0.5 * camera.height + dot(camera.image_gradient(camera.forward, 1), off)};
 }
 
-/// ln of the differential of a path camera - x1 - x2 whose first vertex flows as the header of CameraFlow
+/// ln of the differential of a path camera - x1 - x2 whose first vertex flows as the header of VertexFlows
 /// says, from the definition by central differences: contribution times Jacobian of the flow in the image.
 TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
   Rng rng(Stream{5, 0, 0}, 0, 0);
@@ -60,9 +60,9 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
         }
     const TangentBasis basis = make_basis(scene, motions);
     const double radius = 8;
-    const PreparedScene prepared(scene, &basis, radius);
+    const PreparedScene prepared(scene, &basis, {radius, 0});
     const CameraModel& camera = prepared.camera;
-    ASSERT_TRUE(prepared.camera_flow.possible());
+    ASSERT_TRUE(prepared.flows.camera_possible());
 
     const double b1 = in(0.2, 0.4), b2 = in(0.2, 0.4), b[3] = {1 - b1 - b2, b1, b2};
     const auto second = [&](const std::vector<Vec3>& p) { return p[3] * b[0] + p[4] * b[1] + p[5] * b[2]; };
@@ -75,7 +75,7 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
     const double distance = length(x[2].p - x[1].p), depth = dot(x[1].p - x[0].p, camera.forward);
     const double expected_weight =
         std::pow(std::max(0.0, 1 - std::pow(distance / (radius * camera.pixel_size() * depth), 2)), 2);
-    ASSERT_NEAR(prepared.camera_flow.follow(x[1].p, x[2].p).weight, expected_weight, 1e-12);
+    ASSERT_NEAR(prepared.flows.pair(prepared, x[1], x[2], 1).near.value, expected_weight, 1e-12);
     following += expected_weight > 0.05;
 
     for (std::size_t dof = 0; dof < motions.size(); ++dof) {
@@ -129,6 +129,185 @@ TEST(CameraFlow, DifferentialOfAPathIsThatOfTheFlow) {
     }
   }
   EXPECT_GT(following, 20) << "paths close enough to test anything";
+}
+
+/// The flow of a path camera - x1 ... x4 over four triangles, each a body, written anew from the header of VertexFlows.
+struct FlowingPath {
+  const Scene& scene;
+  const CameraModel& camera;
+  double follow, pixels;
+  std::array<std::array<double, 3>, 5> b;  ///< barycentrics of x1 .. x4
+
+  using Points = std::array<Vec3, 5>;
+
+  Vec3 corner(const std::vector<Vec3>& p, int k, int i) const { return p[3 * (k - 1) + i]; }
+  Vec3 normal(const std::vector<Vec3>& p, int k) const {
+    return normalize(cross(corner(p, k, 1) - corner(p, k, 0), corner(p, k, 2) - corner(p, k, 0)));
+  }
+  double area(const std::vector<Vec3>& p, int k) const {
+    return 0.5 * length(cross(corner(p, k, 1) - corner(p, k, 0), corner(p, k, 2) - corner(p, k, 0)));
+  }
+  double radius(int k) const {
+    Bounds bounds;
+    for (int i = 0; i < 3; ++i) bounds.add(corner(scene.positions, k, i));
+    return follow * 0.5 * length(bounds.high - bounds.low);
+  }
+  /// (1 - |x - y|^2 / s^2)^2 for x on triangle k.
+  double weight(int k, const Vec3& x, int j, const Vec3& y) const {
+    double s = std::min(radius(k), radius(j));
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 a = corner(scene.positions, k, i), d = corner(scene.positions, k, (i + 1) % 3) - a;
+      const double along = std::clamp(dot(x - a, d) / dot(d, d), 0.0, 1.0);
+      s = std::min(s, length(x - a - d * along));
+    }
+    const double q = length_squared(x - y) / (s * s);
+    return q < 1 ? (1 - q) * (1 - q) : 0;
+  }
+  /// Of x_k to follow x_j, beside it on the path; k > 1.
+  double pair_weight(int k, int j, const Points& x) const {
+    const double w = weight(k, x[k], j, x[j]);
+    if (j == 1) return w;  // x1 goes by what x2 does
+    const bool first = area(scene.positions, k) > area(scene.positions, j);
+    return first ? w : w * (1 - weight(j, x[j], k, x[k]));
+  }
+  /// Velocity of x_k beyond its base, given the material velocities v and the pixel flow of x1.
+  Vec3 following(int k, const Points& x, const Points& v, const Vec3& pixel_flow) const {
+    const Vec3 n = normal(scene.positions, k);
+    Vec3 t;
+    if (k == 1) {
+      const double s = pixels * camera.pixel_size() * dot(x[1] - camera.position, camera.forward);
+      const double q = length_squared(x[1] - x[2]) / (s * s), w = q < 1 ? (1 - q) * (1 - q) : 0;
+      const double w2 = pair_weight(2, 1, x);
+      t = (v[2] * (1 - w2) + v[1] * w2 - pixel_flow) * w;
+    } else {
+      const double w1 = pair_weight(k, k - 1, x), w2 = k < 4 ? pair_weight(k, k + 1, x) : 0;
+      t = (v[k - 1] - v[k]) * (w1 * (1 - w2) / (1 - w1 * w2));
+      if (k < 4) t += (v[k + 1] - v[k]) * (w2 * (1 - w1) / (1 - w1 * w2));
+    }
+    return t - n * dot(n, t);
+  }
+};
+
+/// The differential of paths whose vertices follow their neighbours, for every coordinate of every triangle, by central
+/// differences of contribution and length along the flow, and of the flow for its divergence.
+TEST(VertexFlows, DifferentialOfAPathIsThatOfTheFlow) {
+  Rng rng(Stream{6, 0, 0}, 0, 0);
+  const auto in = [&](double low, double high) { return low + (high - low) * rng.uniform(); };
+  int following = 0, two_sided = 0, own = 0;
+  for (int trial = 0; trial < 60; ++trial) {
+    Scene scene;
+    scene.camera = {{in(-0.2, 0.2), in(-0.2, 0.2), 3}, {0, 0, 0}, {0, 1, 0}, 40, 16, 16};
+    for (int k = 1; k <= 4; ++k) {
+      Mesh mesh;
+      for (int i = 0; i < 3; ++i) {
+        const double angle = kTwoPi * i / 3 + in(-0.3, 0.3), radius = in(0.6, 1.4);
+        const Vec3 flat{radius * std::cos(angle), radius * std::sin(angle), 0};
+        // In turns facing the camera and across, with their middles close to each other.
+        const Vec3 tilted = k % 2 ? flat + Vec3{0, 0, 0.4 * flat.x} : Vec3{flat.z, flat.x, flat.y} + Vec3{0.15, 0, 0.2};
+        mesh.positions.push_back(tilted + Vec3{in(-0.1, 0.1), in(-0.1, 0.1), in(-0.1, 0.1)});
+      }
+      mesh.faces = {{0, 1, 2}};
+      add_shape(scene, std::to_string(k), mesh, diffuse(Rgb(0.5), true), k == 4 ? Rgb(1) : Rgb());
+    }
+    std::vector<int> dofs(36);
+    for (int i = 0; i < 36; ++i) dofs[i] = i;
+    const TangentBasis basis = free_dofs(scene, dofs);
+    const double follow = 1, pixels = 8;
+    const PreparedScene prepared(scene, &basis, {pixels, follow});
+    FlowingPath path{scene, prepared.camera, follow, pixels, {}};
+    SurfacePoint x[5];
+    x[0].p = scene.camera.position;
+    FlowingPath::Points points;
+    points[0] = x[0].p;
+    for (int k = 1; k <= 4; ++k) {
+      const double b1 = in(0.25, 0.4), b2 = in(0.25, 0.4);
+      path.b[k] = {1 - b1 - b2, b1, b2};
+      for (int i = 0; i < 3; ++i) points[k] += path.corner(scene.positions, k, i) * path.b[k][i];
+      x[k] = {points[k], prepared.normal(k - 1), k - 1};
+    }
+    bool too_close = false;  // to a kink of the flow, or where differences say little
+    for (int k = 2; k <= 4; ++k)
+      for (int j : {k - 1, k + 1})
+        if (j >= 1 && j <= 4) {
+          const double w = path.pair_weight(k, j, points);
+          following += w > 0.05;
+          two_sided += j > k && w > 0.01 && path.pair_weight(k, k - 1, points) > 0.01;
+          own += k == 2 && j == 1 && w > 0.05;
+          too_close |= (w > 0 && w < 1e-3) || length(points[k] - points[j]) < 0.06;
+        }
+    if (too_close) continue;
+
+    LocalDifferential differential;
+    differentiate_path(prepared, x, 5, false, differential);
+    for (int dof = 0; dof < 36; ++dof) {
+      const auto positions = [&](double t) {
+        std::vector<Vec3> p = scene.positions;
+        p[dof / 3][dof % 3] += t;
+        return p;
+      };
+      constexpr double kStep = 1e-5;
+      const auto above = positions(kStep), below = positions(-kStep);
+      const int moved = dof / 9 + 1;
+      // Velocity of the material at any point of the moved triangle's plane.
+      const auto material = [&](int k, const Vec3& at) {
+        if (k != moved) return Vec3();
+        const Vec3 a = path.corner(scene.positions, k, 0), e1 = path.corner(scene.positions, k, 1) - a,
+                   e2 = path.corner(scene.positions, k, 2) - a, n = cross(e1, e2);
+        const double b1 = dot(cross(at - a, e2), n) / dot(n, n), b2 = dot(cross(e1, at - a), n) / dot(n, n);
+        const double share[3] = {1 - b1 - b2, b1, b2};
+        Vec3 v;
+        v[dof % 3] = share[dof / 3 - 3 * (k - 1)];
+        return v;
+      };
+      const auto total = [&](const FlowingPath::Points& at) {
+        FlowingPath::Points v;
+        for (int k = 1; k <= 4; ++k) v[k] = material(k, at[k]);
+        const Vec3 n = path.normal(scene.positions, 1), ray = at[1] - at[0];
+        const Vec3 pixel_flow = ray * (dot(n, v[1]) / dot(n, ray));
+        FlowingPath::Points sum;
+        for (int k = 1; k <= 4; ++k) sum[k] = (k == 1 ? pixel_flow : v[k]) + path.following(k, at, v, pixel_flow);
+        return sum;
+      };
+      // Contribution, with the measure of the image for x1 and areas for the others; areas and their spread apart.
+      const auto log_f = [&](const FlowingPath::Points& at, const std::vector<Vec3>& p) {
+        const Vec3 e = at[1] - at[0];
+        double sum = std::log(std::abs(dot(path.normal(p, 1), e)) / std::pow(dot(e, prepared.camera.forward), 3));
+        for (int k = 1; k < 4; ++k) {
+          const Vec3 d = at[k + 1] - at[k];
+          sum += std::log(std::abs(dot(path.normal(p, k), d) * dot(path.normal(p, k + 1), d)) / std::pow(dot(d, d), 2));
+        }
+        return sum;
+      };
+      const auto optical = [&](const FlowingPath::Points& at) {
+        double sum = 0;
+        for (int k = 0; k < 4; ++k) sum += length(at[k + 1] - at[k]);
+        return sum;
+      };
+      const auto v = total(points);
+      auto ahead = points, behind = points;
+      for (int k = 1; k <= 4; ++k) ahead[k] += v[k] * kStep, behind[k] -= v[k] * kStep;
+      double expected = (log_f(ahead, above) - log_f(behind, below)) / (2 * kStep);
+      for (int k = 1; k <= 4; ++k) {
+        const Vec3 n = path.normal(scene.positions, k);
+        const Vec3 e1 = normalize(path.corner(scene.positions, k, 1) - path.corner(scene.positions, k, 0)),
+                   e2 = cross(n, e1);
+        for (const Vec3& e : {e1, e2}) {
+          auto right = points, left = points;
+          right[k] += e * kStep, left[k] -= e * kStep;
+          expected += dot(total(right)[k] - total(left)[k], e) / (2 * kStep);
+        }
+      }
+      const double expected_length = (optical(ahead) - optical(behind)) / (2 * kStep);
+      double ours = 0, our_length = 0;
+      for (const VertexGradient& g : differential.vertices)
+        if (g.vertex == dof / 3) ours += g.log_f[dof % 3], our_length += g.length[dof % 3];
+      EXPECT_NEAR(ours, expected, 5e-5 * (10 + std::abs(expected))) << "trial " << trial << ", dof " << dof;
+      EXPECT_NEAR(our_length, expected_length, 1e-6) << "trial " << trial << ", dof " << dof;
+    }
+  }
+  EXPECT_GT(following, 60);
+  EXPECT_GT(two_sided, 15) << "vertices that follow both neighbours";
+  EXPECT_GT(own, 15) << "x1 that follows itself, as x2 follows it";
 }
 
 /// Two estimates of the same values, more than `least` of which are not zero: mean of their squared z-scores
@@ -305,7 +484,7 @@ TEST(CameraFlow, ShadowsMoveWithEverything) {
   const EstimatorOptions options{.max_bounces = 1};  // D is x1
   const BoundaryGuide unguided({true, true, true, true});
   for (const double radius : {1e9, 0.0}) {
-    const PreparedScene prepared(scene, &basis, radius);
+    const PreparedScene prepared(scene, &basis, {radius, 0});
     const BoundaryEdges edges(prepared);
     const GatePick pick(gates);
     Worker worker(prepared, gates, options, pick, VelocitySink());
@@ -348,7 +527,7 @@ TEST(CameraFlow, IsLeftOutWhereNothingMovesCloseToAnything) {
     add_shape(scene, "floor", quad({-3, -2, 3}, {3, -2, 3}, {3, -2, -3}, {-3, -2, -3}), diffuse(Rgb(0.5)));
     change(scene);
     const TangentBasis basis = make_basis(scene, {translate(scene, "block", {1, 0, 0})});
-    return PreparedScene(scene, &basis, 4).camera_flow.possible();
+    return PreparedScene(scene, &basis, {4, 0}).flows.camera_possible();
   };
   EXPECT_FALSE(possible([](Scene&) {})) << "a convex block, far from all else";
   EXPECT_TRUE(possible([](Scene& s) {
