@@ -136,7 +136,7 @@ TEST(Experiment, OverridesAreCheckedLikeTheFile) {
   const Experiment changed =
       load_experiment(file, {"optimizer.iterations=9", "parameters[1].initial=[5]", "gates.centers=[1, 2, 3]",
                              "estimator={sampling: standard, antithetic: false, pick: uniform, numbers: independent, "
-                             "guiding: false, follow_radius: 0}"});
+                             "guiding: false, follow: 0.5, follow_radius: 0}"});
   EXPECT_EQ(changed.optimizer.iterations, 9);
   EXPECT_EQ(changed.parameters[1].initial, std::vector<double>{5});
   EXPECT_EQ(changed.gates.centers.size(), 3u);
@@ -145,6 +145,7 @@ TEST(Experiment, OverridesAreCheckedLikeTheFile) {
   EXPECT_EQ(changed.estimator.pick, ArcPick::uniform);
   EXPECT_EQ(changed.estimator.numbers, Numbers::independent);
   EXPECT_FALSE(changed.guiding);
+  EXPECT_EQ(changed.estimator.follow, 0.5);
   EXPECT_EQ(changed.estimator.follow_radius, 0);
   for (const char* wrong : {"optimizer.iterations=-9", "parameters[7].initial=1", "nothing=1",
                             "gates.sigma=", "gates.sigma", "optimizer.method=newton"}) {
@@ -195,7 +196,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
   folder.write("table.txt", "-1 0\n0 1\n0 0.5\n1.5 0\n");
   const std::string vertices =
       "seed: 9007199254740993\nestimator: {sampling: ellipsoidal, antithetic: false, pick: uniform, "
-      "numbers: independent, guiding: false, follow_radius: 2.5}\n"
+      "numbers: independent, guiding: false, follow: 0.25, follow_radius: 2.5}\n"
       "gradient: {method: finite_difference, step: 0.003, common_numbers: false}\nresolution: [12, 9]\n";
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
   for (const char* other : {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
@@ -237,6 +238,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.estimator.pick, ArcPick::uniform);
     EXPECT_EQ(back.estimator.numbers, Numbers::independent);
     EXPECT_FALSE(back.guiding);
+    EXPECT_EQ(back.estimator.follow, 0.25);
     EXPECT_EQ(back.estimator.follow_radius, 2.5);
     EXPECT_EQ(back.gradient.step, 0.003);
     EXPECT_FALSE(back.gradient.common_numbers);

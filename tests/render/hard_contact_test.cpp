@@ -4,10 +4,8 @@
 // Statistics: z-tests at 4.5 standard errors with fixed seeds (false alarms: 7e-6 each, 10 of them), whose
 // errors must be a few per cent of what is compared.
 //
-// Light that goes between two touching surfaces which move against each other is left out on purpose: their
-// geometry term changes at a rate like 1 / r, r the distance between the points, so that its estimate has no
-// finite variance (the samples then show a heavy tail). A black cube has no such light but everything else
-// about standing on a floor.
+// Light between two surfaces that touch is for contact_test.cpp; a black cube has none, but everything else about standing
+// on a floor.
 #include <gtest/gtest.h>
 
 #include "core/math/constants.h"
