@@ -56,7 +56,7 @@ int derive(const DeriveCommand& command) {
         names.push_back(component.component);
         images.push_back(component.images[i]);
       }
-      write_exr_components(folder + "/" + name + ".exr", names, images);
+      write_exr_components(folder + "/" + name + ".exr", names, images, exr_notes(problem.experiment().gates));
       for (int g = 0; g < problem.gates().size(); ++g)
         for (const DerivativeEstimate& component : components) {
           const Statistics& s = component.gates[i];

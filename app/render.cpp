@@ -24,7 +24,7 @@ int render(const CommonOptions& options) {
   ProgressDisplay display(options.quiet);
   const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
   display.end();
-  write_exr(folder + "/render.exr", estimate.image);
+  write_exr(folder + "/render.exr", estimate.image, exr_notes(problem.experiment().gates));
   std::string table = "gate,mean,standard_error\n";
   for (int g = 0; g < problem.gates().size(); ++g)
     table += fmt::format("{},{},{}\n", g, estimate.gates.mean[g], estimate.gates.standard_error[g]);

@@ -348,6 +348,14 @@ GateSet make_gates(const GateSpec& spec) {
   return GateSet(shape, scaled(spec.centers));
 }
 
+ExrNotes exr_notes(const GateSpec& spec) {
+  constexpr const char* kUnits[] = {"scene units", "ns", "ps"};
+  const bool steady = spec.kind == GateKind::steady;
+  return {{"isochron.gateCenters", steady ? "" : fmt::format("{}", fmt::join(spec.centers, " "))},
+          {"isochron.gateUnit", kUnits[static_cast<int>(spec.unit)]},
+          {"isochron.quantity", steady ? "radiance" : "radiance per scene unit of path length"}};
+}
+
 void ParameterSpec::fail(const std::string& key, const std::string& wrong, const std::string& allowed) const {
   for (const std::string& place : {key, std::string()})
     if (const auto found = where.find(place); found != where.end()) found->second.fail(wrong, allowed);

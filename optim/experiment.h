@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "core/gates/gate.h"
+#include "core/image/image.h"
 #include "core/render/renderer.h"
 #include "core/scene/yaml_reader.h"
 
@@ -45,6 +46,11 @@ struct GateSpec {
 /// Gates in scene units. Throws std::invalid_argument when the shape cannot be made (for example a table of
 /// zeros).
 GateSet make_gates(const GateSpec& spec);
+
+/// What an EXR file says of its gates, so that it can be drawn by itself: isochron.gateCenters (numbers in the unit of
+/// `spec`, separated by spaces; none where steady), isochron.gateUnit (scene units, ns, ps), isochron.quantity (what a
+/// pixel's value is).
+ExrNotes exr_notes(const GateSpec& spec);
 
 enum class ParameterType { translation, rotation, vertices, albedo, roughness, ior, emission };
 enum class VertexDirection { fixed, normal, free };

@@ -62,7 +62,7 @@ class Run {
 
   void load_target() {
     const std::string file = path("target.exr");
-    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }));
+    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
     target_ = problem_.read_target(file);
   }
 
@@ -87,7 +87,7 @@ class Run {
                parameters_.distance_to_target(theta),
                scaled_norm(now.gradient)};
       if (last_.iteration == 0) {
-        write_exr(path("initial.exr"), now.image);
+        write_exr(path("initial.exr"), now.image, notes_);
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
           options_.warning("no light reaches the gates, neither at the target nor at the initial values");
         state_.image_rmse_initial = last_.image_rmse;
@@ -109,7 +109,7 @@ class Run {
       stage.advance();
     };
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
-    write_exr(path("final.exr"), final_image);
+    write_exr(path("final.exr"), final_image, notes_);
     return result;
   }
 
@@ -130,6 +130,7 @@ class Run {
   const Problem& problem_;
   const Parameters& parameters_;
   const RunOptions& options_;
+  const ExrNotes notes_ = exr_notes(problem_.experiment().gates);
   Checkpoint state_;
   GatedImage target_;
   LogRow last_;
