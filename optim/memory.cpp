@@ -79,7 +79,7 @@ std::vector<MemoryUse> image_memory(const Problem& problem) {
   // Standard sampling shares one image; what automatic sampling settles on is not known before its trial.
   const Experiment& experiment = problem.experiment();
   const bool shared = experiment.estimator.sampling == Sampling::standard || experiment.gates.kind == GateKind::steady;
-  std::vector<MemoryUse> parts = {{"images and their mean", 3 * image}};
+  std::vector<MemoryUse> parts = {{"images, their mean and their file", 4.5 * image}};
   if (!shared) parts.push_back({"images of work partitions", kLeastPartitions * image});
   return parts;
 }

@@ -76,5 +76,26 @@ TEST_F(Program, RefusesWhatDoesNotFitIntoMemory) {
   }
 }
 
+TEST_F(Program, OutOfMemoryIsOneLine) {
+  // The limit lies above what the images are estimated to need (72 MB), below what they and the libraries' threads take.
+  // Where exactly differs between machines: somewhere in this range memory ends while work is under way.
+  folder_.write("limited.sh", "ulimit -v $1; shift; exec \"$@\"");
+  int failed = 0;
+  for (int megabytes = 150; megabytes <= 500 && failed == 0; megabytes += 25) {
+    const std::string command = "sh " + folder_.file("limited.sh") + " " + std::to_string(1000 * megabytes) +
+                                " " ISOCHRON_PROGRAM " render " + folder_.file("tiny.yaml") + " -o " +
+                                folder_.file("out") +
+                                " --no-plots --quiet --threads 1 --samples 2 --set 'resolution=[1000, 1000]' --set "
+                                "estimator.sampling=standard 2> " +
+                                folder_.file("errors");
+    const int status = std::system(command.c_str());
+    ASSERT_TRUE(WIFEXITED(status)) << megabytes;
+    const std::string errors = folder_.read("errors");
+    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), WEXITSTATUS(status) == 0 ? 0 : 1) << errors;
+    failed += errors.find("out of memory") != std::string::npos;
+  }
+  EXPECT_GT(failed, 0);
+}
+
 }  // namespace
 }  // namespace isochron

@@ -251,9 +251,12 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_FALSE(back.gradient.common_numbers);
     EXPECT_EQ(back.resolution, (std::array<int, 2>{12, 9}));
     EXPECT_EQ(back.target.max_bounces, 3);
-    ASSERT_EQ(back.parameters.size(), 7u);
-    EXPECT_EQ(back.parameters[5].type, ParameterType::ior);
-    EXPECT_EQ(back.parameters[5].material, "glass");
+    ASSERT_EQ(back.parameters.size(), 9u);
+    EXPECT_EQ(back.parameters[7].type, ParameterType::ior);
+    EXPECT_EQ(back.parameters[7].material, "glass");
+    EXPECT_EQ(back.parameters[3].scale, 12.5);
+    EXPECT_EQ(back.parameters[3].pivot_kind, PivotKind::center);
+    EXPECT_EQ(back.parameters[4].pivot, (Vec3{0.5, 0.25, 1}));
     EXPECT_EQ(back.target.photons, 12.5);
     EXPECT_EQ(back.loss.kind, LossKind::cauchy);
     EXPECT_EQ(back.loss.scale, 0.3);
@@ -266,8 +269,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.parameters[2].axis, (Vec3{0, 3, 4}));
     EXPECT_EQ(back.parameters[2].pivot, (Vec3{1, 0.1, 0}));
     EXPECT_EQ(back.parameters[2].selection.max, (Vec3{0, 1, 0.1}));
-    EXPECT_EQ(back.parameters[3].selection.indices, (std::vector<int>{2, 0}));
-    EXPECT_EQ(back.parameters[4].material, "metal");
+    EXPECT_EQ(back.parameters[5].selection.indices, (std::vector<int>{2, 0}));
+    EXPECT_EQ(back.parameters[6].material, "metal");
     const std::string decaying =
         replaced(text, "method: lbfgs, inner_iterations: 3", "decay: {start: 20, half_life: 12.5}");
     const Experiment adam = load_experiment(folder.write("adam.yaml", decaying));
