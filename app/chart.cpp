@@ -8,7 +8,9 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/plots.h"
+#include "app/progress.h"
 #include "optim/files.h"
+#include "optim/memory.h"
 #include "optim/solver_race.h"
 
 namespace isochron {
@@ -35,7 +37,9 @@ void chart_solvers(const ChartCommand& command, const Problem& problem, const st
   options.seeds = command.seeds;
   options.poll = poll_interrupt;
   options.progress = note_progress;
+  ProgressDisplay display(command.common.quiet);
   const Race race = race_solvers(problem.experiment(), problem.make_target(poll_interrupt), options);
+  display.end();
   write_file_atomically(folder + "/chart_solvers.csv", race_csv(race));
   fmt::print("{}", race_table(race));
   spdlog::info("wrote {}/chart_solvers.csv", folder);
@@ -51,8 +55,10 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
   options.poll = poll_interrupt;
   options.progress = note_progress;
   options.progress("target");
+  ProgressDisplay display(command.common.quiet);
   const GatedImage target = problem.make_target(poll_interrupt);
   const Chart chart = make_chart(problem.experiment(), theta, target, options);
+  display.end();
   write_file_atomically(folder + "/chart.csv", chart_csv(chart));
   write_file_atomically(folder + "/chart_table.csv", chart_table_csv(chart));
   fmt::print("{}", chart_table(chart));
@@ -63,6 +69,7 @@ int chart(const ChartCommand& command) {
   begin_session(command.common);
   const Problem problem(read_experiment(command.common), warn);
   problem.require_parameters();
+  require_memory(problem, image_memory(problem));
   const std::string folder = output_folder(command.common, problem.experiment(), "-chart");
   make_output_folder(folder);
   catch_interrupts();

@@ -9,8 +9,10 @@
 
 #include "app/commands.h"
 #include "app/interrupt.h"
+#include "app/progress.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
+#include "optim/memory.h"
 
 namespace isochron {
 namespace {
@@ -58,6 +60,7 @@ int check(const CheckCommand& command) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
+  require_memory(problem, derivative_memory(problem, 1, 6));
   const std::string folder = output_folder(command.common, problem.experiment());
   make_output_folder(folder);
   catch_interrupts();
@@ -66,10 +69,16 @@ int check(const CheckCommand& command) {
   for (int component : components) check_step(problem, theta, component);  // fails before anything is rendered
 
   std::vector<Comparison> table;
-  for (int component : components) {
-    const auto rows = check_derivative(problem, theta, component, poll_interrupt);
-    table.insert(table.end(), rows.begin(), rows.end());
+  ProgressDisplay display(command.common.quiet);
+  {
+    ProgressStage stage("comparing derivatives", static_cast<int>(components.size()));
+    for (int component : components) {
+      const auto rows = check_derivative(problem, theta, component, poll_interrupt);
+      table.insert(table.end(), rows.begin(), rows.end());
+      stage.advance();
+    }
   }
+  display.end();
   const int comparisons = static_cast<int>(table.size());
   const double limit = false_alarm_limit(comparisons, check_batches(problem) - 1);
   print_table(table, limit);

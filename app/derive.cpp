@@ -6,10 +6,12 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/plots.h"
+#include "app/progress.h"
 #include "core/image/image.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
+#include "optim/memory.h"
 
 namespace isochron {
 namespace {
@@ -30,13 +32,17 @@ int derive(const DeriveCommand& command) {
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block block = chosen_parameter(parameters, command.parameter);
   const std::string folder = output_folder(command.common, problem.experiment());
-  make_output_folder(folder);
-  catch_interrupts();
 
   const Camera& camera = problem.scene().camera;
   const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
   const double images_per_unknown = 6;  // total, three terms, a batch and its sum
   const int group = std::max(1, static_cast<int>(std::min(kMostBytes / (bytes * images_per_unknown), 1e6)));
+  require_memory(problem,
+                 derivative_memory(problem, std::min(group, block.count), static_cast<int>(images_per_unknown)));
+  make_output_folder(folder);
+  catch_interrupts();
+  ProgressDisplay display(command.common.quiet);
+  ProgressStage stage("rendering the derivatives", (block.count + group - 1) / group);
   std::string table = "parameter,gate,component,mean,standard_error,kurtosis\n";
   HeavyTails tails;
   for (int first = block.begin; first < block.begin + block.count; first += group) {
@@ -50,7 +56,7 @@ int derive(const DeriveCommand& command) {
         names.push_back(component.component);
         images.push_back(component.images[i]);
       }
-      write_exr_components(folder + "/" + name + ".exr", names, images);
+      write_exr_components(folder + "/" + name + ".exr", names, images, exr_notes(problem.experiment().gates));
       for (int g = 0; g < problem.gates().size(); ++g)
         for (const DerivativeEstimate& component : components) {
           const Statistics& s = component.gates[i];
@@ -59,7 +65,9 @@ int derive(const DeriveCommand& command) {
           tails.add(name, g, s.kurtosis[g]);
         }
     }
+    stage.advance();
   }
+  display.end();
   write_file_atomically(folder + "/derive.csv", table);
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote derivative images and {}/derive.csv", folder);

@@ -11,18 +11,15 @@ namespace isochron {
 int execute_run(const std::string& folder, const CommonOptions& common, bool force,
                 const std::function<RunStatus(const RunOptions&)>& start) {
   catch_interrupts();
-  ProgressLine line(common.quiet);
+  ProgressDisplay display(common.quiet);
   RunOptions options;
   options.folder = folder;
   options.force = force;
   options.stop = interrupted;
-  options.progress = [&](const Progress& progress) { line.show(progress); };
-  options.warning = [&](const std::string& text) {
-    line.end();
-    warn(text);
-  };
+  options.progress = [&](const Progress& progress) { display.show(progress); };
+  options.warning = warn;
   const RunStatus status = start(options);
-  line.end();
+  display.end();
   if (status == RunStatus::interrupted) {
     spdlog::warn("interrupted; go on with: isochron resume {}", folder);
     return 1;

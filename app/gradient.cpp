@@ -5,9 +5,11 @@
 
 #include "app/commands.h"
 #include "app/interrupt.h"
+#include "app/progress.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
+#include "optim/memory.h"
 
 namespace isochron {
 namespace {
@@ -18,15 +20,18 @@ int gradient(const CommonOptions& options) {
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(options.at.empty() ? "initial" : options.at);
+  require_memory(problem, image_memory(problem));
   const std::string folder = output_folder(options, problem.experiment());
   make_output_folder(folder);
   catch_interrupts();
   gradient_repeats(problem);  // too few samples must show before the target is rendered
+  ProgressDisplay display(options.quiet);
   const GatedImage target = problem.make_target(poll_interrupt);
   const auto start = std::chrono::steady_clock::now();
   const GradientEstimate estimate = estimate_gradient(problem, theta, target, poll_interrupt);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
+  display.end();
   std::string table = "parameter,value,gradient,standard_error,kurtosis\n";
   HeavyTails tails;
   for (int i = 0; i < parameters.size(); ++i) {

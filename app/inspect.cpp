@@ -7,11 +7,13 @@
 
 #include "app/commands.h"
 #include "app/interrupt.h"
+#include "app/progress.h"
 #include "core/math/error.h"
 #include "optim/advice.h"
 #include "optim/experiment_edit.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
+#include "optim/memory.h"
 
 namespace isochron {
 namespace {
@@ -171,7 +173,9 @@ int inspect_experiment(const InspectCommand& command) {
   const std::string folder = output_folder(command.common, experiment, "-inspect");
   make_output_folder(folder);
   catch_interrupts();
+  ProgressDisplay display(command.common.quiet);
   const Inspection inspection = inspect(problem, start, command.seconds, poll_interrupt);
+  display.end();
   fmt::print("{}: {} unknowns, {} gates, {} bounces at most\n", experiment.name, problem.parameters().size(),
              problem.gates().size(), full_bounces(experiment));
   for (const PointInspection& p : inspection.points) print_point(problem, p);

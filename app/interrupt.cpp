@@ -2,33 +2,31 @@
 
 #include <csignal>
 
-#include "optim/problem.h"
+#include "core/render/progress.h"
 
 namespace isochron {
 namespace {
 
-volatile std::sig_atomic_t flag = 0;
-
-void raise_flag(int) {
-  flag = 1;
+void stop_work(int) {
+  request_stop();
 }
 
 }  // namespace
 
 void catch_interrupts() {
   struct sigaction action = {};
-  action.sa_handler = raise_flag;
+  action.sa_handler = stop_work;
   action.sa_flags = SA_RESETHAND | SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
 }
 
 bool interrupted() {
-  return flag != 0;
+  return stop_requested();
 }
 
 void poll_interrupt() {
-  if (interrupted()) throw Interrupted{};
+  throw_if_stopped();
 }
 
 }  // namespace isochron

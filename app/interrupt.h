@@ -2,7 +2,8 @@
 
 namespace isochron {
 
-/// From now on the first SIGINT or SIGTERM only raises a flag; the second ends the program at once.
+/// From now on the first SIGINT or SIGTERM requests a stop (core/render/progress.h): work under way ends by Interrupted,
+/// renderers within a sample. The second ends the program at once.
 void catch_interrupts();
 bool interrupted();
 /// Throws Interrupted once the flag is up. A Poll.

@@ -6,12 +6,14 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
+#include <new>
 #include <string>
 
 #include "app/commands.h"
+#include "app/progress.h"
 #include "core/math/error.h"
 #include "core/render/parallel.h"
-#include "optim/problem.h"
+#include "core/render/progress.h"
 
 namespace {
 
@@ -26,6 +28,7 @@ int main(int argc, char** argv) {
   isochron::keep_freed_memory();
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
   spdlog::set_pattern("%n: %^%l%$: %v");
+  isochron::keep_messages_off_the_bar();
   CLI::App app("Differentiable time-gated rendering and optimisation", "isochron");
   app.set_version_flag("--version", "isochron " ISOCHRON_VERSION);
   app.require_subcommand(1);
@@ -53,6 +56,9 @@ int main(int argc, char** argv) {
     return 2;
   } catch (const isochron::Interrupted&) {
     spdlog::error("interrupted, nothing more was written");
+    return 1;
+  } catch (const std::bad_alloc&) {
+    spdlog::error("out of memory: lower resolution, the number of gates or unknowns, or threads");
     return 1;
   } catch (const std::exception& error) {
     spdlog::error("{}", one_line(error.what()));

@@ -1,6 +1,8 @@
 #include "app/plots.h"
 
 #include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
 #include <spawn.h>
 #include <spdlog/spdlog.h>
 #include <sys/wait.h>
@@ -9,6 +11,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+
+#include "app/interrupt.h"
 
 extern char** environ;
 
@@ -41,9 +45,16 @@ bool run_script(const std::string& script, const std::string& folder) {
   close(ends[1]);
   std::string messages;
   if (error == 0) {
+    constexpr int kPause = 100;  // milliseconds between looks at whether the user wants to stop
     std::array<char, 4096> buffer;
-    for (ssize_t n; (n = read(ends[0], buffer.data(), buffer.size())) > 0 || (n < 0 && errno == EINTR);)
+    for (pollfd ready{ends[0], POLLIN, 0};;) {
+      const int count = poll(&ready, 1, kPause);
+      if (interrupted()) kill(child, SIGTERM);
+      if (count <= 0) continue;
+      const ssize_t n = read(ends[0], buffer.data(), buffer.size());
       if (n > 0) messages.append(buffer.data(), static_cast<std::size_t>(n));
+      if (n == 0 || (n < 0 && errno != EINTR)) break;
+    }
   }
   close(ends[0]);
   if (error != 0) {
@@ -54,6 +65,10 @@ bool run_script(const std::string& script, const std::string& folder) {
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
+  if (interrupted()) {
+    spdlog::warn("plots: interrupted; draw them with: {} {}", script, argument);
+    return false;
+  }
   spdlog::warn("plots: {} failed: {}", script, last_line(messages));
   return false;
 }

@@ -4,9 +4,11 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/plots.h"
+#include "app/progress.h"
 #include "core/image/image.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
+#include "optim/memory.h"
 
 namespace isochron {
 namespace {
@@ -15,11 +17,14 @@ int render(const CommonOptions& options) {
   begin_session(options);
   const Problem problem(read_experiment(options), warn);
   const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
+  require_memory(problem, image_memory(problem));
   const std::string folder = output_folder(options, problem.experiment());
   make_output_folder(folder);
   catch_interrupts();
+  ProgressDisplay display(options.quiet);
   const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
-  write_exr(folder + "/render.exr", estimate.image);
+  display.end();
+  write_exr(folder + "/render.exr", estimate.image, exr_notes(problem.experiment().gates));
   std::string table = "gate,mean,standard_error\n";
   for (int g = 0; g < problem.gates().size(); ++g)
     table += fmt::format("{},{},{}\n", g, estimate.gates.mean[g], estimate.gates.standard_error[g]);

@@ -11,7 +11,9 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/plots.h"
+#include "app/progress.h"
 #include "optim/files.h"
+#include "optim/memory.h"
 
 namespace isochron {
 namespace {
@@ -40,6 +42,7 @@ int stability(const StabilityCommand& command) {
   const Problem problem(experiment, warn);
   problem.require_parameters();
   const std::vector<double> theta = problem.parameters().initial();
+  require_memory(problem, image_memory(problem));
   const std::string folder = output_folder(command.common, experiment, "-stability");
   make_output_folder(folder);
   catch_interrupts();
@@ -48,7 +51,9 @@ int stability(const StabilityCommand& command) {
   options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
   options.poll = poll_interrupt;
   options.progress = [](const std::string& what) { spdlog::info("{}", what); };
+  ProgressDisplay display(command.common.quiet);
   const Stability map = map_stability(experiment, options);
+  display.end();
   write_file_atomically(folder + "/stability.csv", stability_csv(map));
   fmt::print("{}", stability_table(map));
   spdlog::info("wrote {}/stability.csv", folder);

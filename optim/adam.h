@@ -11,7 +11,7 @@
 namespace isochron {
 
 struct AdamOptions {
-  double learning_rate = 0.02;  ///< > 0, units of the unknowns
+  double learning_rate = 0.02;  ///< > 0, in units of the unknowns that it is given
   double beta1 = 0.9, beta2 = 0.999;
 };
 

@@ -114,9 +114,12 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
                      ": gradient.method: finite differences cannot be taken apart (allowed: analytic)");
   Inspection result;
   const auto points = points_to_inspect(problem.parameters(), start);
-  for (const InspectedPoint& point : points)
+  ProgressStage stage("inspecting", static_cast<int>(points.size()) + 2);  // the points, then costs before and after
+  for (const InspectedPoint& point : points) {
     result.points.push_back(
         inspect_point(problem, point, (1 - kShareOfCosts) * seconds / static_cast<double>(points.size()), poll));
+    stage.advance();
+  }
 
   const auto finds_any = [](const PointInspection& p) { return p.found[0] || p.found[1] || p.found[2]; };
   if (std::none_of(result.points.begin(), result.points.end(), finds_any))
@@ -139,6 +142,7 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   for (const PointInspection& p : result.points)
     samples.push_back(affordable_samples(problem, p.point.theta, p.target, present, each, poll));
   advice.costs_before = measure_all(problem, result.points, present, samples, poll);
+  stage.advance();
   Setting reduced = advice.before;
   reduced.max_bounces = advice.reduction.kept.max_bounces;
   const auto trial = [&](Sampling sampling) {

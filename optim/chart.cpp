@@ -134,6 +134,7 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
   std::size_t different = 0;
   for (std::size_t m = 0; m < runs.size(); ++m) different += first[m] == m;
   const double each = (1 - kReferenceShare) * options.core_seconds / static_cast<double>(different);
+  ProgressStage stage("charting", static_cast<int>(different));
   for (std::size_t m = 0; m < runs.size(); ++m) {
     if (first[m] < m) {
       chart.methods.push_back(chart.methods[first[m]]);
@@ -149,6 +150,7 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
                              experiment.loss.kind == LossKind::squared);
     row.to_error = core_seconds_to(options.error, row.error);
     chart.methods.push_back(std::move(row));
+    stage.advance();
   }
   if (!fine_enough(chart.reference, options.error))
     chart.notes.push_back(fmt::format("the reference's own error is {}: too noisy to tell a bias of {} (--seconds)",

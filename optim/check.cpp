@@ -101,6 +101,7 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
   BatchStatistics statistics;
   DifferenceEstimate result;
   result.rounding.assign(gates, 0.0);
+  ProgressStage stage("rendering finite differences", batches);
   for (int b = 0; b < batches; ++b) {
     const SampleRange range = Share{b, batches}.of(samples);
     std::array<std::vector<double>, 3> differences;
@@ -118,6 +119,7 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
     for (int g = 0; g < gates; ++g)
       extrapolated.push_back(extrapolate(differences[0][g], differences[1][g], differences[2][g]));
     statistics.add(extrapolated, range.count());
+    stage.advance();
   }
   result.gates = statistics.result();
   return result;
@@ -201,7 +203,9 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
 
 std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component,
                                          const Poll& poll) {
+  ProgressStage stage("comparing derivatives", 2);
   const auto analytic = estimate_derivatives(problem, theta, component, 1, poll);
+  stage.advance();
   const DifferenceEstimate difference = estimate_difference(problem, theta, component, poll);
   std::vector<Comparison> rows;
   for (int g = 0; g < problem.gates().size(); ++g) {

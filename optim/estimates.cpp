@@ -29,6 +29,7 @@ DerivativeEstimate collect(const std::string& component, int samples, int batche
                            Estimate&& estimate) {
   std::vector<ImageMean> means(count);
   std::vector<BatchStatistics> statistics(count);
+  ProgressStage stage("rendering the " + component, batches);
   for (int b = 0; b < batches; ++b) {
     const SampleRange range = Share{b, batches}.of(samples);
     const std::vector<GatedImage> images = estimate(range);
@@ -36,6 +37,7 @@ DerivativeEstimate collect(const std::string& component, int samples, int batche
       means[i].add(images[i], range.count());
       statistics[i].add(gate_means(images[i]), range.count());
     }
+    stage.advance();
     poll();
   }
   DerivativeEstimate result{component, {}, {}};
@@ -132,12 +134,15 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
   const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
   const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility, Purpose::images), &basis);
   std::vector<DerivativeEstimate> components;
+  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return spec.term(t) > 0; });
+  ProgressStage stage("rendering the derivatives", static_cast<int>(terms));
   for (Term term : kTerms) {
     const int samples = spec.term(term);
     if (samples == 0) continue;
     const Stream stream = problem.stream(pass_of(term));
     components.push_back(collect(name(term), samples, batches_for(name(term), samples), count, poll,
                                  [&](SampleRange range) { return renderer.derive(term, stream, range); }));
+    stage.advance();
   }
   if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
   components.insert(components.begin(), sum_of(components));
@@ -158,8 +163,11 @@ GradientEstimate estimate_gradient(const Problem& problem, const std::vector<dou
   GradientEstimate result;
   result.repeats = gradient_repeats(problem);
   BatchStatistics statistics;
-  for (int r = 0; r < result.repeats; ++r)
+  ProgressStage stage("estimating the gradient", result.repeats);
+  for (int r = 0; r < result.repeats; ++r) {
     statistics.add(problem.evaluate(theta, target, 0, poll, {r, result.repeats}).gradient, 1);
+    stage.advance();
+  }
   result.gradient = statistics.result();
   return result;
 }

@@ -140,6 +140,21 @@ Selection read_selection(const YamlValue& value) {
   return selection;
 }
 
+/// [x, y, z], center, or {follow: [x, y, z]}.
+void read_pivot(const YamlValue& value, ParameterSpec& spec) {
+  if (value.is_list()) {
+    spec.pivot = value.vec3();
+  } else if (value.is_map()) {
+    YamlMap map = value.map();
+    spec.pivot_kind = PivotKind::follow;
+    spec.pivot = map.require("follow").vec3();
+    map.reject_unknown();
+  } else {
+    value.choice({"center"});
+    spec.pivot_kind = PivotKind::center;
+  }
+}
+
 ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder, bool target_required) {
   YamlMap map = value.map();
   ParameterSpec spec;
@@ -169,7 +184,7 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
     spec.axis = require("axis").direction();
     if (!std::isnormal(length_squared(spec.axis)))
       spec.fail("axis", "is too long or too short", "a length whose square a double can hold");
-    if (const auto pivot = find("pivot")) spec.pivot = pivot->vec3();
+    if (const auto pivot = find("pivot")) read_pivot(*pivot, spec);
   }
   if (spec.type == ParameterType::vertices) {
     const YamlValue direction = require("direction");
@@ -196,6 +211,7 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
     spec.target = read_values(*target, folder);
   if (const auto lower = find("lower")) spec.lower = read_values(*lower, folder);
   if (const auto upper = find("upper")) spec.upper = read_values(*upper, folder);
+  if (const auto scale = find("scale")) spec.scale = scale->number(NumberRange::positive());
   map.reject_unknown();
   return spec;
 }
@@ -332,6 +348,14 @@ GateSet make_gates(const GateSpec& spec) {
     }
   }();
   return GateSet(shape, scaled(spec.centers));
+}
+
+ExrNotes exr_notes(const GateSpec& spec) {
+  constexpr const char* kUnits[] = {"scene units", "ns", "ps"};
+  const bool steady = spec.kind == GateKind::steady;
+  return {{"isochron.gateCenters", steady ? "" : fmt::format("{}", fmt::join(spec.centers, " "))},
+          {"isochron.gateUnit", kUnits[static_cast<int>(spec.unit)]},
+          {"isochron.quantity", steady ? "radiance" : "radiance per scene unit of path length"}};
 }
 
 void ParameterSpec::fail(const std::string& key, const std::string& wrong, const std::string& allowed) const {

@@ -2,7 +2,8 @@
 //
 // Defaults (the only place where they are listed; a key without one here is required):
 //   max_bounces 8                      parameters: none
-//   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0]
+//   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0],
+//     scale by type, see parameters.h
 //   samples: 64 for each of primal, interior, visibility, path_length; what a sample is: Term in core/render/renderer.h
 //   estimator: sampling auto, antithetic true, pick contribution, numbers low_discrepancy, guiding true,
 //     follow 1, follow_radius 4
@@ -21,6 +22,7 @@
 #include <vector>
 
 #include "core/gates/gate.h"
+#include "core/image/image.h"
 #include "core/render/renderer.h"
 #include "core/scene/yaml_reader.h"
 
@@ -45,8 +47,16 @@ struct GateSpec {
 /// zeros).
 GateSet make_gates(const GateSpec& spec);
 
+/// What an EXR file says of its gates, so that it can be drawn by itself: isochron.gateCenters (numbers in the unit of
+/// `spec`, separated by spaces; none where steady), isochron.gateUnit (scene units, ns, ps), isochron.quantity (what a
+/// pixel's value is).
+ExrNotes exr_notes(const GateSpec& spec);
+
 enum class ParameterType { translation, rotation, vertices, albedo, roughness, ior, emission };
 enum class VertexDirection { fixed, normal, free };
+/// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
+/// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
+enum class PivotKind { fixed, center, follow };
 const char* name(ParameterType type);
 /// Whether it is a material's, else a shape's.
 inline bool is_of_material(ParameterType type) {
@@ -71,9 +81,12 @@ struct ParameterSpec {
   VertexDirection direction_kind = VertexDirection::fixed;
   Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
   Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
-  Vec3 pivot;      ///< rotation; a fixed point of the world that no other parameter moves
+  PivotKind pivot_kind = PivotKind::fixed;
+  Vec3 pivot;  ///< rotation; of follow: where the point is in the scene as loaded; of center: unused
   std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
                                                       ///< empty (all but initial)
+
+  double scale = 0;  ///< in units of the parameter, see parameters.h; 0: the default of its type
 
   /// Of type vertices, see smoothing.h; 0: none.
   double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
@@ -133,7 +146,7 @@ struct RateDecay {
 
 struct OptimizerSpec {
   OptimizerMethod method = OptimizerMethod::adam;
-  /// adam: units of the parameter per iteration. lbfgs: length of the first trial step, same unit.
+  /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
   /// levenberg_marquardt: without meaning.
   double learning_rate = 0.02;
   int iterations = 100;

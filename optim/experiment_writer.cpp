@@ -56,8 +56,12 @@ std::string parameter_yaml(const ParameterSpec& spec) {
     fmt::format_to(out, "    selection: [{}]\n", fmt::join(selection.indices, ", "));
   if (selection.kind == Selection::Kind::box)
     fmt::format_to(out, "    selection: {{box: {{min: {}, max: {}}}}}\n", vector(selection.min), vector(selection.max));
-  if (spec.type == ParameterType::rotation)
-    fmt::format_to(out, "    axis: {}\n    pivot: {}\n", vector(spec.axis), vector(spec.pivot));
+  if (spec.type == ParameterType::rotation) {
+    std::string pivot = vector(spec.pivot);
+    if (spec.pivot_kind == PivotKind::center) pivot = "center";
+    if (spec.pivot_kind == PivotKind::follow) pivot = "{follow: " + pivot + "}";
+    fmt::format_to(out, "    axis: {}\n    pivot: {}\n", vector(spec.axis), pivot);
+  }
   if (spec.direction_kind != VertexDirection::fixed)
     fmt::format_to(out, "    direction: {}\n", spec.direction_kind == VertexDirection::normal ? "normal" : "free");
   else if (spec.type == ParameterType::translation || spec.type == ParameterType::vertices)
@@ -68,6 +72,7 @@ std::string parameter_yaml(const ParameterSpec& spec) {
   if (!spec.target.empty()) fmt::format_to(out, "    target: {}\n", number_or_list(spec.target));
   if (!spec.lower.empty()) fmt::format_to(out, "    lower: {}\n", number_or_list(spec.lower));
   if (!spec.upper.empty()) fmt::format_to(out, "    upper: {}\n", number_or_list(spec.upper));
+  if (spec.scale > 0) fmt::format_to(out, "    scale: {}\n", spec.scale);
   return text;
 }
 

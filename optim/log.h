@@ -14,8 +14,8 @@ struct LogRow {
   int iteration = 0;
   double seconds = 0;  ///< spent in iterations so far, this one included
   double loss = 0, image_rmse = 0;
-  double param_rmse = 0;  ///< NaN where target values are unknown: written as an empty field
-  double gradient_norm = 0;
+  double param_rmse = 0;     ///< NaN where target values are unknown: written as an empty field
+  double gradient_norm = 0;  ///< of dLoss/dtheta times scale
 };
 
 class Log {
@@ -23,9 +23,11 @@ class Log {
   /// Opens the log to go on at row `next`: rows from there on, and a torn last line, are cut off. Throws
   /// std::runtime_error.
   Log(const std::string& file, const Parameters& parameters, int next);
-  /// Writes one line and flushes it to the disk. Parameters of more than 16 components are written as one
-  /// column NAME.norm, the Euclidean norm.
-  void append(const LogRow& row, const std::vector<double>& theta);
+  /// Writes one line and flushes it to the disk: the row, values of the parameters, for each parameter NAME.rmse (the
+  /// distance to its target; empty where that is unknown), and derivatives of the loss, NAME.gradient. All these are in
+  /// units of the parameter. Parameters of more than 16 components are written as NAME.norm and NAME.gradient_norm, the
+  /// Euclidean norms.
+  void append(const LogRow& row, const std::vector<double>& theta, const std::vector<double>& gradient);
 
  private:
   struct Close {

@@ -50,7 +50,13 @@ std::unique_ptr<Optimizer> make_lbfgs(double first_step, int inner_iterations);
 /// next.
 std::unique_ptr<Optimizer> make_levenberg_marquardt();
 
-/// As the experiment says; the preconditioner is for Adam alone.
-std::unique_ptr<Optimizer> make_optimizer(const OptimizerSpec& spec, const Preconditioner& preconditioner);
+/// `inner` works on u = theta / scale, one scale > 0 per unknown, so that its steps mean the same for unknowns of
+/// different units; everybody else deals with theta. With equal scales within each of a preconditioner's blocks, that
+/// acts on u as it would on theta. Scales of 1 change no bit.
+std::unique_ptr<Optimizer> make_scaled(std::unique_ptr<Optimizer> inner, const std::vector<double>& scales);
+
+/// As the experiment says; the preconditioner is for Adam alone. No scales: all 1.
+std::unique_ptr<Optimizer> make_optimizer(const OptimizerSpec& spec, const Preconditioner& preconditioner,
+                                          const std::vector<double>& scales = {});
 
 }  // namespace isochron

@@ -14,6 +14,7 @@ namespace isochron {
 namespace {
 
 constexpr double kDegree = kPi / 180;
+constexpr double kRadian = 180 / kPi;
 constexpr double kLeastAlbedo = 1e-4, kLeastRoughness = 1e-3, kLeastContrast = 1e-3, kLeastRelativeEmission = 1e-6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -68,6 +69,13 @@ int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, st
   return count;
 }
 
+/// What counts as one unit of the parameter where the user does not say.
+double default_scale(const ParameterSpec& spec) {
+  if (spec.type == ParameterType::rotation) return kRadian;
+  if (spec.type == ParameterType::emission) return *std::max_element(spec.initial.begin(), spec.initial.end());
+  return 1;
+}
+
 void check_material(const ParameterSpec& spec, MaterialType type) {
   const auto reject = [&](const char* is, const char* has) {
     spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material, is, has));
@@ -112,7 +120,7 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
       material_values_.push_back({spec.type, index, first, count});
     }
     bind_values(spec, count);
-    blocks_.push_back({spec.name, first, count});
+    blocks_.push_back({spec.name, first, count, spec.scale > 0 ? spec.scale : default_scale(spec)});
     for (int i = 0; i < count; ++i)
       component_names_.push_back(count == 1 ? spec.name : fmt::format("{}[{}]", spec.name, i));
   }
@@ -123,8 +131,8 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
   motion.type = spec.type;
   motion.direction_kind = spec.direction_kind;
   motion.direction = spec.type == ParameterType::rotation ? normalize(spec.axis) : spec.direction;
-  motion.pivot = spec.pivot;
   const int selected = select(spec, scene_, shape, motion.slot);
+  if (spec.type == ParameterType::rotation) bind_pivot(spec, motion, shape_index);
   if (spec.type != ParameterType::vertices) return;
   count = spec.direction_kind == VertexDirection::free ? 3 * selected : selected;
   if (spec.direction_kind != VertexDirection::normal) return;
@@ -137,6 +145,28 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
       spec.fail("direction", fmt::format("vertex {} of shape '{}' has no normal", v, shape.name),
                 "leave it out by selection");
     motion.normals[motion.slot[v]] = sums[v] / norm;
+  }
+}
+
+void Parameters::bind_pivot(const ParameterSpec& spec, Motion& motion, int shape_index) const {
+  motion.pivot = spec.pivot;
+  if (spec.pivot_kind == PivotKind::fixed) return;
+  if (spec.pivot_kind == PivotKind::center) {
+    Vec3 sum;
+    int count = 0;
+    for (std::size_t v = 0; v < motion.slot.size(); ++v) {
+      if (motion.slot[v] < 0) continue;
+      sum += scene_.positions[scene_.shapes[shape_index].first_vertex + v];
+      ++count;
+    }
+    motion.pivot = sum / count;
+  }
+  const std::vector<Motion>& earlier = motions_[shape_index];
+  for (std::size_t m = 0; m < earlier.size(); ++m) {
+    if (earlier[m].type == ParameterType::vertices) continue;
+    bool of_all = true;
+    for (std::size_t v = 0; v < motion.slot.size(); ++v) of_all &= motion.slot[v] < 0 || earlier[m].slot[v] >= 0;
+    if (of_all) motion.carriers.push_back(static_cast<int>(m));
   }
 }
 
@@ -198,20 +228,74 @@ Parameters::VertexField Parameters::vertex_field(const Block& block) const {
 
 double Parameters::distance_to_target(const std::vector<double>& theta) const {
   double sum = 0;
-  for (std::size_t i = 0; i < theta.size(); ++i) {
+  for (const Block& block : blocks_)
+    for (int i = block.begin; i < block.begin + block.count; ++i) {
+      const double error = (theta[i] - target_[i]) / block.scale;
+      sum += error * error;
+    }
+  return std::sqrt(sum / static_cast<double>(theta.size()));
+}
+
+double Parameters::distance_to_target(const std::vector<double>& theta, const Block& block) const {
+  double sum = 0;
+  for (int i = block.begin; i < block.begin + block.count; ++i) {
     const double error = theta[i] - target_[i];
     sum += error * error;
   }
-  return std::sqrt(sum / static_cast<double>(theta.size()));
+  return std::sqrt(sum / block.count);
+}
+
+std::vector<double> Parameters::scales() const {
+  std::vector<double> all(initial_.size());
+  for (const Block& block : blocks_) std::fill_n(all.begin() + block.begin, block.count, block.scale);
+  return all;
 }
 
 bool Parameters::target_known() const {
   return std::none_of(target_.begin(), target_.end(), [](double value) { return std::isnan(value); });
 }
 
-Vec3 Parameters::move(int shape_index, int v, const std::vector<double>& theta, std::vector<Moved>* tangent) const {
+void Parameters::turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,
+                      std::vector<Moved>* tangent) {
+  const double radians = theta[rotation.first_component] * kDegree;
+  p = pivot.position + rotate(p - pivot.position, rotation.direction, radians);
+  if (!tangent) return;
+  for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, rotation.direction, radians);
+  // p = c + R (p_before - c): what moves the pivot c moves p by (1 - R) dc. What carries a pivot acts on all that turns
+  // about it, so that its column is there.
+  for (const Moved& of_pivot : pivot.velocity) {
+    const Vec3 velocity = of_pivot.velocity - rotate(of_pivot.velocity, rotation.direction, radians);
+    const auto same = std::find_if(tangent->begin(), tangent->end(),
+                                   [&](const Moved& earlier) { return earlier.column == of_pivot.column; });
+    same->velocity += velocity;
+  }
+  tangent->push_back({rotation.first_component, kDegree * cross(rotation.direction, p - pivot.position)});
+}
+
+std::vector<Parameters::CarriedPoint> Parameters::pivots(int shape_index, const std::vector<double>& theta) const {
+  const std::vector<Motion>& motions = motions_[shape_index];
+  std::vector<CarriedPoint> points(motions.size());
+  for (std::size_t m = 0; m < motions.size(); ++m) {
+    CarriedPoint& point = points[m];
+    point.position = motions[m].pivot;
+    for (int carrier : motions[m].carriers) {
+      const Motion& motion = motions[carrier];
+      if (motion.type == ParameterType::rotation) {
+        turn(motion, points[carrier], theta, point.position, &point.velocity);
+      } else {
+        point.position += theta[motion.first_component] * motion.direction;
+        point.velocity.push_back({motion.first_component, motion.direction});
+      }
+    }
+  }
+  return points;
+}
+
+Vec3 Parameters::move(int shape_index, int v, const std::vector<CarriedPoint>& pivots, const std::vector<double>& theta,
+                      std::vector<Moved>* tangent) const {
   Vec3 p = scene_.positions[scene_.shapes[shape_index].first_vertex + v];
-  for (const Motion& motion : motions_[shape_index]) {
+  for (std::size_t m = 0; m < motions_[shape_index].size(); ++m) {
+    const Motion& motion = motions_[shape_index][m];
     const int slot = motion.slot[v];
     if (slot < 0) continue;
     const auto add = [&](int column, const Vec3& direction) {
@@ -221,12 +305,7 @@ Vec3 Parameters::move(int shape_index, int v, const std::vector<double>& theta, 
     if (motion.type == ParameterType::translation) {
       add(motion.first_component, motion.direction);
     } else if (motion.type == ParameterType::rotation) {
-      const double radians = theta[motion.first_component] * kDegree;
-      p = motion.pivot + rotate(p - motion.pivot, motion.direction, radians);
-      if (tangent) {
-        for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, motion.direction, radians);
-        tangent->push_back({motion.first_component, kDegree * cross(motion.direction, p - motion.pivot)});
-      }
+      turn(motion, pivots[m], theta, p, tangent);
     } else if (motion.direction_kind == VertexDirection::free) {
       for (int axis = 0; axis < 3; ++axis) {
         Vec3 unit;
@@ -246,8 +325,9 @@ Scene Parameters::apply(const std::vector<double>& theta) const {
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
     if (motions_[s].empty()) continue;
     const Shape& shape = scene.shapes[s];
+    const std::vector<CarriedPoint> centers = pivots(static_cast<int>(s), theta);
     for (int v = 0; v < shape.vertex_count; ++v)
-      scene.positions[shape.first_vertex + v] = move(static_cast<int>(s), v, theta, nullptr);
+      scene.positions[shape.first_vertex + v] = move(static_cast<int>(s), v, centers, theta, nullptr);
   }
   for (const MaterialValue& value : material_values_) {
     const double* t = theta.data() + value.first_component;
@@ -272,11 +352,13 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
     const Shape& shape = scene_.shapes[s];
     std::fill_n(shape_of.begin() + shape.first_vertex, shape.vertex_count, static_cast<int>(s));
   }
+  std::vector<std::vector<CarriedPoint>> centers;
+  for (std::size_t s = 0; s < scene_.shapes.size(); ++s) centers.push_back(pivots(static_cast<int>(s), theta));
   std::vector<Moved> moved;
   for (int v = 0; v < layout.vertices; ++v) {
     moved.clear();
     const int s = shape_of[v];
-    if (s >= 0 && !motions_[s].empty()) move(s, v - scene_.shapes[s].first_vertex, theta, &moved);
+    if (s >= 0 && !motions_[s].empty()) move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
     for (int axis = 0; axis < 3; ++axis) {
       for (const Moved& entry : moved)
         if (entry.velocity[axis] != 0) basis.entries.push_back({entry.column, entry.velocity[axis]});

@@ -2,7 +2,15 @@
 //
 // Parameters of one shape act in the listed order: a rotation turns what earlier parameters moved, so the
 // tangents of earlier parameters are carried through it. Directions (also `normal`: the area-weighted vertex
-// normals of the loaded mesh) and pivots are fixed in the world.
+// normals of the loaded mesh) and axes are fixed in the world, and so are pivots unless they move with the shape
+// (PivotKind): those are carried along by the translations and rotations listed before that act on every vertex
+// that this rotation turns.
+//
+// Scales: what counts as one unit of each parameter where parameters of different units are compared, as optimisers
+// and param_rmse do. Values, bounds, gradients, checkpoints and logs are in units of the parameter. Default: 1 for
+// translations and vertices (units of the parameter, usually scene units), albedo, roughness and ior; 180 / pi degrees for
+// rotations, which move what is one scene unit from the axis by one scene unit; the largest initial component of an
+// emission.
 //
 // Physical bounds, always applied besides the user's: albedo in [1e-4, 1], roughness in [1e-3, 1], ior at
 // least 1e-3 from 1 on the side of its initial value, emission
@@ -31,6 +39,7 @@ class Parameters {
   struct Block {
     std::string name;
     int begin, count;
+    double scale = 1;  ///< > 0, in units of the parameter
   };
   const std::vector<Block>& blocks() const { return blocks_; }
 
@@ -49,8 +58,12 @@ class Parameters {
   /// Target values. Components without one are NaN.
   const std::vector<double>& target() const { return target_; }
   bool target_known() const;
-  /// Root mean square of theta - target over the unknowns; NaN where a target value is unknown.
+  /// Root mean square of (theta - target) / scale over the unknowns; NaN where a target value is unknown.
   double distance_to_target(const std::vector<double>& theta) const;
+  /// Root mean square of theta - target over one parameter's unknowns, in units of the parameter; NaN likewise.
+  double distance_to_target(const std::vector<double>& theta, const Block& block) const;
+  /// Block::scale of every unknown.
+  std::vector<double> scales() const;
   const std::vector<double>& lower() const { return lower_; }  ///< -infinity where there is none
   const std::vector<double>& upper() const { return upper_; }
 
@@ -73,6 +86,7 @@ class Parameters {
     Vec3 direction, pivot;      ///< for rotations `direction` is the unit axis
     std::vector<Vec3> normals;  ///< per selected vertex, for `normal`
     std::vector<int> slot;
+    std::vector<int> carriers;  ///< of a rotation's pivot: places in the shape's list of motions, rising
   };
   struct MaterialValue {
     ParameterType type;
@@ -84,10 +98,24 @@ class Parameters {
     Vec3 velocity;
   };
 
+  /// A point that moves with the parameters.
+  struct CarriedPoint {
+    Vec3 position;
+    std::vector<Moved> velocity;  ///< a column at most once
+  };
+
   void bind_motion(const ParameterSpec& spec, Motion& motion, int shape, int& count);
+  /// Sets the pivot in the scene as loaded, and what carries it.
+  void bind_pivot(const ParameterSpec& spec, Motion& motion, int shape) const;
   void bind_values(const ParameterSpec& spec, int count);
+  /// Turns `p` and what `tangent`, if given, holds about the pivot.
+  static void turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,
+                   std::vector<Moved>* tangent);
+  /// Where the pivots of a shape's rotations are at theta, by place in its list of motions.
+  std::vector<CarriedPoint> pivots(int shape, const std::vector<double>& theta) const;
   /// Position of vertex v of `shape` at theta; `tangent`, if given, receives its velocity for every column.
-  Vec3 move(int shape, int v, const std::vector<double>& theta, std::vector<Moved>* tangent) const;
+  Vec3 move(int shape, int v, const std::vector<CarriedPoint>& pivots, const std::vector<double>& theta,
+            std::vector<Moved>* tangent) const;
 
   const Scene& scene_;
   std::vector<std::vector<Motion>> motions_;  ///< per shape, in the listed order

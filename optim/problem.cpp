@@ -118,9 +118,11 @@ GatedImage Problem::make_target(const Poll& poll) const {
   options.max_bounces = target.max_bounces;
   const Renderer renderer(scene, gates_, options);
   ImageMean mean;
+  ProgressStage stage("rendering the target", parts);
   for (int i = 0; i < parts; ++i) {
     const SampleRange range = Share{i, parts}.of(target.samples);
     mean.add(renderer.render(stream, range), range.count());
+    stage.advance();
     poll();
   }
   GatedImage image = mean.mean();
@@ -152,16 +154,21 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const TangentBasis basis = parameters_->tangent(theta);
   const Renderer renderer(scene, gates_, estimator(share.of(samples.visibility).count()), &basis);
   Evaluation result;
+  const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
+  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
+  ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
   result.image = renderer.render(stream(Pass::primal, iteration), share.of(samples.primal));
+  stage.advance();
   result.loss = loss(result.image, target, theta);
   result.mean_squared_error = mean_loss(result.image, target);
   const GatedImage adjoint = loss_adjoint(result.image, target, robust_loss(target));
   poll();
-  if (experiment_.gradient.method == GradientMethod::finite_difference) {
+  if (differences) {
     for (int i = 0; i < parameters_->size(); ++i) {
       const GatedImage derivative =
           finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(samples.primal));
       result.gradient.push_back(inner_product(adjoint, derivative));
+      stage.advance();
       poll();
     }
     penalty_.add_gradient(theta, mean_square(target), result.gradient);
@@ -172,6 +179,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
     const SampleRange range = share.of(samples.term(term));
     if (range.count() == 0) continue;
     renderer.add_gradient(term, adjoint, stream(pass_of(term), iteration), range, dof_gradient);
+    stage.advance();
     poll();
   }
   result.gradient = basis.transpose_apply(dof_gradient);

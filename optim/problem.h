@@ -10,6 +10,7 @@
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/render/measure_mix.h"
+#include "core/render/progress.h"
 #include "core/scene/scene.h"
 #include "optim/experiment.h"
 #include "optim/loss.h"
@@ -43,9 +44,6 @@ struct Share {
 
 /// Called between the passes of an estimate. May throw to abandon it (see Interrupted).
 using Poll = std::function<void()>;
-
-/// Thrown by a Poll after the user asked to stop.
-struct Interrupted {};
 
 class Problem {
  public:

@@ -13,6 +13,7 @@
 #include "optim/files.h"
 #include "optim/log.h"
 #include "optim/loss.h"
+#include "optim/memory.h"
 #include "optim/problem.h"
 #include "optim/rendered_objective.h"
 #include "optim/run_folder.h"
@@ -61,14 +62,14 @@ class Run {
 
   void load_target() {
     const std::string file = path("target.exr");
-    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }));
+    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
     target_ = problem_.read_target(file);
   }
 
   LoopResult optimise() {
     const OptimizerSpec& spec = problem_.experiment().optimizer;
     const RenderedObjective objective(problem_, target_, [this] { poll(); });
-    const auto optimizer = make_optimizer(spec, problem_.preconditioner());
+    const auto optimizer = make_optimizer(spec, problem_.preconditioner(), parameters_.scales());
     Log log(path("log.csv"), parameters_, state_.iteration);
     GatedImage final_image;
     const Clock::time_point call_start = Clock::now();
@@ -79,17 +80,20 @@ class Run {
     loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_));
     loop.warning = options_.warning;
     loop.row = [&](const Evaluation& now, const std::vector<double>& theta, bool closing) {
-      last_ = {
-          state_.iteration + (closing ? 1 : 0), state_.seconds + seconds_since(iteration_start), now.loss,
-          std::sqrt(now.mean_squared_error),    parameters_.distance_to_target(theta),           norm(now.gradient)};
+      last_ = {state_.iteration + (closing ? 1 : 0),
+               state_.seconds + seconds_since(iteration_start),
+               now.loss,
+               std::sqrt(now.mean_squared_error),
+               parameters_.distance_to_target(theta),
+               scaled_norm(now.gradient)};
       if (last_.iteration == 0) {
-        write_exr(path("initial.exr"), now.image);
+        write_exr(path("initial.exr"), now.image, notes_);
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
           options_.warning("no light reaches the gates, neither at the target nor at the initial values");
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
-      log.append(last_, theta);
+      log.append(last_, theta, now.gradient);
       final_image = now.image;
       if (!closing) report(first, seconds_since(call_start));
     };
@@ -99,9 +103,20 @@ class Run {
       save_checkpoint(options_.folder, state_, parameters_);
       poll();
     };
+    ProgressStage stage("optimising", std::max(1, spec.iterations - first));
+    loop.save = [&, save = loop.save] {
+      save();
+      stage.advance();
+    };
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
-    write_exr(path("final.exr"), final_image);
+    write_exr(path("final.exr"), final_image, notes_);
     return result;
+  }
+
+  double scaled_norm(std::vector<double> gradient) const {
+    const std::vector<double> scales = parameters_.scales();
+    for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] *= scales[i];
+    return norm(gradient);
   }
 
   void report(int first, double seconds) const {
@@ -115,6 +130,7 @@ class Run {
   const Problem& problem_;
   const Parameters& parameters_;
   const RunOptions& options_;
+  const ExrNotes notes_ = exr_notes(problem_.experiment().gates);
   Checkpoint state_;
   GatedImage target_;
   LogRow last_;
@@ -126,6 +142,7 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
   const Problem problem(experiment, options.warning);
   problem.require_parameters();
   require_jacobian_fits(problem);
+  require_memory(problem, run_memory(problem));
   prepare_run_folder(options.folder, options.force, options.warning);
   write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(experiment, options.folder));
   return Run(problem, options).execute();
@@ -138,6 +155,7 @@ RunStatus resume_run(const RunOptions& options) {
   const Problem problem(load_experiment(file), options.warning);
   problem.require_parameters();
   require_jacobian_fits(problem);
+  require_memory(problem, run_memory(problem));
   make_output_folder(options.folder);
   return Run(problem, options).execute();
 }

@@ -27,7 +27,8 @@ struct TimeIsUp {};
 RaceRun race(const Problem& problem, const GatedImage& target, double core_seconds, const Poll& poll) {
   const Experiment& experiment = problem.experiment();
   const Parameters& parameters = problem.parameters();
-  const std::unique_ptr<Optimizer> optimizer = make_optimizer(experiment.optimizer, problem.preconditioner());
+  const std::unique_ptr<Optimizer> optimizer =
+      make_optimizer(experiment.optimizer, problem.preconditioner(), parameters.scales());
   const RenderedObjective objective(problem, target, poll);
   problem.estimator();  // its trial is no part of a run
   RaceRun run{name(experiment.optimizer.method), experiment.seed, {{0, 0, 1}}};
@@ -62,6 +63,7 @@ Race race_solvers(const Experiment& experiment, const GatedImage& target, const 
   Race result;
   result.error = options.error;
   const double each = options.core_seconds / static_cast<double>(std::size(kMethods) * options.seeds);
+  ProgressStage stage("racing the optimisers", static_cast<int>(std::size(kMethods)) * options.seeds);
   for (OptimizerMethod method : kMethods) {
     options.progress(name(method));
     for (int s = 0; s < options.seeds; ++s) {
@@ -79,6 +81,7 @@ Race race_solvers(const Experiment& experiment, const GatedImage& target, const 
         break;
       }
       result.runs.push_back(race(problem, target, each, options.poll));
+      stage.advance();
     }
   }
   return result;

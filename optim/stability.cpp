@@ -174,6 +174,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     map.notes.push_back(fmt::format("{} unknowns: no finite differences", theta.size()));
   }
   const double of_width = options.core_seconds / static_cast<double>(options.widths.size());
+  ProgressStage stage("mapping", static_cast<int>(options.widths.size()));
   for (double width : options.widths) {
     options.progress(fmt::format("width {:.3g}", width));
     Experiment narrow = experiment;
@@ -200,6 +201,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
       cells.back().width = width;
     }
     map.cells.insert(map.cells.end(), cells.begin(), cells.end());
+    stage.advance();
   }
   return map;
 }

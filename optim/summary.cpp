@@ -29,6 +29,11 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
   pair("loss", state.loss_initial, last.loss);
   pair("image_rmse", state.image_rmse_initial, last.image_rmse);
   pair("param_rmse", state.param_rmse_initial, last.param_rmse);
+  text += "param_rmse_by_parameter:\n";  // in units of the parameter
+  for (const Parameters::Block& block : parameters.blocks())
+    fmt::format_to(out, "  {}: {{initial: {}, final: {}}}\n", block.name,
+                   optional_number(parameters.distance_to_target(parameters.initial(), block)),
+                   optional_number(parameters.distance_to_target(state.theta, block)));
   text += "parameters:\n";
   for (const Parameters::Block& block : parameters.blocks()) {
     const auto begin = state.theta.begin() + block.begin;

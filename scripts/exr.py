@@ -107,8 +107,19 @@ def read(path):
         raise ExrError(f"damaged file ({error})") from error
 
 
-def write(path, images):
-    """Writes name -> array of height x width as 32-bit floats with ZIPS compression."""
+def attributes(path):
+    """The header: name -> value as bytes. Raises ExrError, OSError."""
+    with open(path, "rb") as file:
+        data = file.read()
+    try:
+        return _header(data)[0]
+    except (IndexError, ValueError, struct.error) as error:
+        raise ExrError(f"damaged file ({error})") from error
+
+
+def write(path, images, notes=None):
+    """Writes name -> array of height x width as 32-bit floats with ZIPS compression; `notes` (name -> text) go into the
+    header."""
     names = sorted(images)
     height, width = np.shape(images[names[0]])
     window = struct.pack("<iiii", 0, 0, width - 1, height - 1)
@@ -123,6 +134,7 @@ def write(path, images):
         ("screenWindowCenter", "v2f", struct.pack("<ff", 0, 0)),
         ("screenWindowWidth", "float", struct.pack("<f", 1)),
     ]
+    attributes += [(name, "string", text.encode()) for name, text in (notes or {}).items()]
     # Version 2; the flag allows names longer than 31 characters.
     out = bytearray(struct.pack("<II", MAGIC, 2 | (0x400 if max(map(len, names)) > 31 else 0)))
     for name, kind, value in attributes:

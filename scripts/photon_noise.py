@@ -19,7 +19,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-import plot
+from pictures import sheets
 from reproduction.measure import ROOT, program, summary
 
 PHOTONS = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 0)
@@ -71,7 +71,7 @@ def draw(file, picture):
     axes.set_ylabel("error at the end, % of the initial one")
     axes.grid(True, which="both", lw=0.4, alpha=0.4)
     axes.legend(fontsize=8)
-    plot.save(figure, pathlib.Path(picture))
+    sheets.save(figure, pathlib.Path(picture))
 
 
 def main(arguments):

@@ -15,7 +15,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from plot import PlotError, save
+from pictures.reading import PlotError
+from pictures.sheets import save
 
 # Colour says what kind of method it is, marker and dashes which one.
 STYLES = {

@@ -17,7 +17,7 @@ from matplotlib import colors
 from matplotlib.cm import ScalarMappable
 
 import exr
-import plot
+from pictures import sheets
 
 EXPERIMENT1 = pathlib.Path(__file__).resolve().parent.parent / "experiments/figure1.yaml"
 GATED = "radiance per scene unit of path length"
@@ -29,7 +29,7 @@ def channel(images, component):
 
 def show_image(axes, image, title):
     """A grey image as the eye would see it, exposed for its brightest half per cent."""
-    shown = plot.srgb(image / max(np.percentile(image, 99.5), 1e-30))
+    shown = sheets.srgb(image / max(np.percentile(image, 99.5), 1e-30))
     axes.imshow(shown, cmap="gray", vmin=0, vmax=1, interpolation="nearest")
     axes.set_title(title, fontsize=9)
     axes.set(xticks=[], yticks=[])
@@ -103,7 +103,7 @@ def figure9(folder):
     show_image(axes[0, 0], channel(images, "image"), "image")
     axes[1, 0].axis("off")
     for line, (term, name) in zip(axes, rows.items()):
-        scale = plot.scale_of(channel(images, f"{term}_coupled"))
+        scale = sheets.scale_of(channel(images, f"{term}_coupled"))
         for axis, (method, title) in zip(line[1:], columns.items()):
             if term == "path_length" and method == "standard":
                 show_derivative(axis, np.zeros_like(channel(images, "image")), scale, "")

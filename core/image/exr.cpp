@@ -4,6 +4,7 @@
 #include <ImfInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfStdIO.h>
+#include <ImfStringAttribute.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -34,9 +35,11 @@ struct Plane {
   std::vector<float> values;
 };
 
-void write_planes(const std::string& file, int width, int height, const std::vector<Plane>& planes) {
+void write_planes(const std::string& file, int width, int height, const std::vector<Plane>& planes,
+                  const ExrNotes& notes) {
   Imf::Header header(width, height);
   header.compression() = Imf::ZIP_COMPRESSION;
+  for (const auto& [name, text] : notes) header.insert(name, Imf::StringAttribute(text));
   Imf::FrameBuffer buffer;
   for (const Plane& plane : planes) {
     header.channels().insert(plane.name, Imf::Channel(Imf::FLOAT));
@@ -145,7 +148,7 @@ GatedImage read_planes(const std::string& file) {
 
 }  // namespace
 
-void write_exr(const std::string& file, const GatedImage& image) {
+void write_exr(const std::string& file, const GatedImage& image, const ExrNotes& notes) {
   require_pixels(image);
   std::vector<Plane> planes;
   for (int gate = 0; gate < image.gates; ++gate) {
@@ -157,11 +160,11 @@ void write_exr(const std::string& file, const GatedImage& image) {
       planes.push_back(std::move(plane));
     }
   }
-  write_planes(file, image.width, image.height, planes);
+  write_planes(file, image.width, image.height, planes, notes);
 }
 
 void write_exr_components(const std::string& file, const std::vector<std::string>& components,
-                          const std::vector<GatedImage>& images) {
+                          const std::vector<GatedImage>& images, const ExrNotes& notes) {
   if (components.empty() || components.size() != images.size())
     throw std::invalid_argument("one image per component is needed");
   std::vector<Plane> planes;
@@ -180,7 +183,7 @@ void write_exr_components(const std::string& file, const std::vector<std::string
       planes.push_back(std::move(plane));
     }
   }
-  write_planes(file, images[0].width, images[0].height, planes);
+  write_planes(file, images[0].width, images[0].height, planes, notes);
 }
 
 GatedImage read_exr(const std::string& file) {

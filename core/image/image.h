@@ -1,6 +1,7 @@
 #pragma once
 #include <cstddef>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace isochron {
@@ -26,13 +27,16 @@ struct GatedImage {
   }
 };
 
+/// Texts by name for the header of an EXR file.
+using ExrNotes = std::vector<std::pair<std::string, std::string>>;
+
 /// Writes 32-bit float channels `gateNNN.R/G/B` (three channels) or `gateNNN.Y` (one), by temporary name and rename.
 /// Throws InputError when the file cannot be written.
-void write_exr(const std::string& file, const GatedImage& image);
+void write_exr(const std::string& file, const GatedImage& image, const ExrNotes& notes = {});
 
 /// Writes derivative images: channels `COMPONENT.gateNNN.Y`, each the average over the image's channels.
 void write_exr_components(const std::string& file, const std::vector<std::string>& components,
-                          const std::vector<GatedImage>& images);
+                          const std::vector<GatedImage>& images, const ExrNotes& notes = {});
 
 /// Reads what `write_exr` writes (any compression). Throws InputError naming the file and the first thing amiss.
 GatedImage read_exr(const std::string& file);

@@ -7,10 +7,25 @@
 
 #include <algorithm>
 
+#include "core/render/progress.h"
+
 namespace isochron {
 namespace {
 
 int thread_count = 0;
+
+template <class F>
+void run(int count, const F& f) {
+  tbb::task_arena arena(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
+  arena.execute([&] {
+    tbb::parallel_for(
+        tbb::blocked_range<int>(0, count, 1),
+        [&](const tbb::blocked_range<int>& range) {
+          for (int i = range.begin(); i < range.end(); ++i) f(i);
+        },
+        tbb::simple_partitioner());
+  });
+}
 
 }  // namespace
 
@@ -24,21 +39,18 @@ void keep_freed_memory() {
 }
 
 void parallel(int count, const std::function<void(int)>& f) {
-  tbb::task_arena arena(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
-  arena.execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<int>(0, count, 1),
-        [&](const tbb::blocked_range<int>& range) {
-          for (int i = range.begin(); i < range.end(); ++i) f(i);
-        },
-        tbb::simple_partitioner());
+  begin_parts(count);
+  run(count, [&](int i) {
+    throw_if_stopped();
+    f(i);
+    count_part();
   });
 }
 
 void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum) {
   constexpr int kChunk = 1 << 14;
   const int size = static_cast<int>(sum.size());
-  parallel((size + kChunk - 1) / kChunk, [&](int chunk) {
+  run((size + kChunk - 1) / kChunk, [&](int chunk) {
     const int end = std::min(size, (chunk + 1) * kChunk);
     for (const auto& part : parts)
       for (int i = chunk * kChunk; i < end; ++i) sum[i] += part[i];

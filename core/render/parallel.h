@@ -13,7 +13,8 @@ void set_thread_count(int threads);
 /// are filled with. For programs to call first.
 void keep_freed_memory();
 
-/// f(0) ... f(count - 1), in any order, on as many threads as set.
+/// f(0) ... f(count - 1), in any order, on as many threads as set. Counts as progress (progress.h). Throws Interrupted once
+/// a stop is requested, and what f throws, after all threads have left f.
 void parallel(int count, const std::function<void(int)>& f);
 
 /// sum[i] += parts[0][i] + parts[1][i] + ... in that order.

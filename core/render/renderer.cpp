@@ -8,6 +8,7 @@
 #include "core/render/ledger.h"
 #include "core/render/parallel.h"
 #include "core/render/primary_boundary.h"
+#include "core/render/progress.h"
 #include "core/render/sample_points.h"
 #include "core/render/secondary_boundary.h"
 
@@ -176,6 +177,7 @@ struct Renderer::Impl {
         SecondaryBoundary secondary(worker, *edges, unguided, mix.interior == 1);
         const double splat_scale = 1.0 / scene.camera.pixels();
         for (long long i = strand; i < rounds; i += kMostStrands) {
+          throw_if_stopped();
           const int pixel = static_cast<int>(i * scene.camera.pixels() / rounds) % scene.camera.pixels();
           Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
           run(Guide::primary, [&] { primary.sample(splat_scale, rng); });

@@ -4,6 +4,7 @@
 #pragma once
 #include <cmath>
 
+#include "core/render/progress.h"
 #include "core/render/renderer.h"
 
 namespace isochron {
@@ -38,6 +39,7 @@ class PointSet {
     const double shift = whole ? 0 : rng_.shift();
     const auto end = static_cast<std::int64_t>(to + shift);
     for (auto i = static_cast<std::int64_t>(from + shift); i < end; ++i) {
+      throw_if_stopped();
       const auto number = static_cast<std::uint32_t>(i);
       Rng rng = together_ ? rng_.with_point(number, key_, number) : rng_.with_sample(number);
       sample(rng);

@@ -10,7 +10,7 @@ import yaml
 from matplotlib import colors
 
 import exr
-import plot
+from pictures import reading, sheets
 
 from .measure import ROOT, program, values
 
@@ -40,32 +40,32 @@ def render(name, entry, folder, halfway, samples=None):
 
 def draw(name, entry, folder, file):
     strip = folder / "strip"
-    images = {s: plot.read_stack(strip / s / "render.exr")[""][list(entry.gates)] for s in STATES}
-    slopes = {s: plot.read_stack(strip / s / f"{entry.unknown}.exr")["total"][list(entry.gates)] for s in STATES[:3]}
+    images = {s: reading.read_stack(strip / s / "render.exr")[""][list(entry.gates)] for s in STATES}
+    slopes = {s: reading.read_stack(strip / s / f"{entry.unknown}.exr")["total"][list(entry.gates)] for s in STATES[:3]}
     rows, side, shape = len(entry.gates), 1.2, images["target"].shape[1:3]
     figure = plt.figure(figsize=(7 * side + 3.4, max(rows * side * shape[0] / shape[1], 2.6) + 0.5), layout="constrained")
     left, right = figure.subfigures(1, 2, width_ratios=[7 * side, 3.4])
     cells = left.subplots(rows, 7, squeeze=False)
     # Every gate has its own exposure, the same in all states: gates differ by orders of magnitude.
-    labels = plot.Labels(folder)
+    words = reading.Folder(folder)
     for row, gate in enumerate(entry.gates):
-        exposure = plot.scale_of(*(images[s][row] for s in STATES))
+        exposure = sheets.scale_of(*(images[s][row] for s in STATES))
         steep = np.abs(np.concatenate([slopes[s][row].ravel() for s in STATES[:3]]))
         steepest = np.percentile(steep[steep > 0], 97) if steep.any() else 1  # noise has outliers
         for column, state in enumerate(STATES):
-            image = plot.srgb(images[state][row] / exposure)
+            image = sheets.srgb(images[state][row] / exposure)
             cells[row, column].imshow(image, cmap="gray", vmin=0, vmax=1, interpolation="nearest")
         for column, state in enumerate(STATES[:3], 4):
             slope = slopes[state][row]
             cells[row, column].imshow(slope, cmap="RdBu_r", norm=colors.Normalize(-steepest, steepest), interpolation="nearest")
-        center = "steady" if labels.centers is None else f"{labels.centers[gate]:.4g}"
+        center = "steady" if words.centers is None else f"{words.centers[gate]:.4g}"
         cells[row, 0].set_ylabel(center, fontsize=8)
     for axes, title in zip(cells[0], [*STATES, *(f"∂/∂{entry.unknown}\n{s}" for s in STATES[:3])]):
         axes.set_title(title, fontsize=8)
     for axes in cells.flat:
         axes.set(xticks=[], yticks=[])
-    _curves(right, plot.read_log(folder / "log.csv"))
-    plot.save(figure, file)
+    _curves(right, reading.read_log(folder / "log.csv"))
+    sheets.save(figure, file)
 
 
 def _curves(figure, log):

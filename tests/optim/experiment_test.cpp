@@ -206,16 +206,21 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
                             "{kind: tabulated, centers: [3], file: table.txt}"}) {
     std::string text = replaced(replaced(tiny_experiment(), gates, other), "seed: 3\n", vertices);
     text = replaced(text, "seed: 7}", "seed: 7, max_bounces: 3}");
-    text = replaced(text, "  - {name: power",
-                    "  - {name: dent, type: vertices, shape: block, direction: normal, initial: values.txt, target: "
-                    "[0, 0, 0, 0.1], lower: -1, upper: [1, 2, 3, 4]}\n"
-                    "  - {name: turn, type: rotation, shape: block, axis: [0, 3, 4], pivot: [1, 0.1, 0], selection: "
-                    "{box: {min: [-1, 0, -1], max: [0, 1, 0.1]}}, initial: 5, target: 0}\n"
-                    "  - {name: pull, type: vertices, shape: block, direction: [1, 1, 0], selection: [2, 0], initial: "
-                    "0, target: [0.1, -0.1]}\n"
-                    "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
-                    "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
-                    "  - {name: power");
+    text = replaced(
+        text, "  - {name: power",
+        "  - {name: dent, type: vertices, shape: block, direction: normal, initial: values.txt, target: "
+        "[0, 0, 0, 0.1], lower: -1, upper: [1, 2, 3, 4]}\n"
+        "  - {name: turn, type: rotation, shape: block, axis: [0, 3, 4], pivot: [1, 0.1, 0], selection: "
+        "{box: {min: [-1, 0, -1], max: [0, 1, 0.1]}}, initial: 5, target: 0}\n"
+        "  - {name: spin, type: rotation, shape: block, axis: [0, 1, 0], pivot: center, initial: 5, target: 0, "
+        "scale: 12.5}\n"
+        "  - {name: hinge, type: rotation, shape: block, axis: [0, 1, 0], pivot: {follow: [0.5, 0.25, 1]}, "
+        "initial: 5, target: 0}\n"
+        "  - {name: pull, type: vertices, shape: block, direction: [1, 1, 0], selection: [2, 0], initial: "
+        "0, target: [0.1, -0.1]}\n"
+        "  - {name: shine, type: roughness, material: metal, initial: 0.2, target: 0.3}\n"
+        "  - {name: bend, type: ior, material: glass, initial: 1.4, target: 1.6}\n"
+        "  - {name: power");
     text = replaced(text, "max_bounces: 3}", "max_bounces: 3, noise: {photons: 12.5}}");
     text = replaced(text, "method: adam", "method: lbfgs, inner_iterations: 3, stop: {window: 7}");
     text += "loss: {kind: cauchy, scale: 0.3}\n";
@@ -225,6 +230,10 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     const std::string resolved = resolved_yaml(original, out);
     const Experiment back = load_experiment(folder.write("runs/deep/experiment.yaml", resolved));
     EXPECT_EQ(resolved_yaml(back, out), resolved);
+    for (std::size_t i = 0; i < original.parameters.size(); ++i) {
+      EXPECT_EQ(back.parameters[i].scale, original.parameters[i].scale);
+      EXPECT_EQ(back.parameters[i].pivot_kind, original.parameters[i].pivot_kind);
+    }
     EXPECT_EQ(back.scene, original.scene);
     EXPECT_EQ(back.seed, 9007199254740993u);
     EXPECT_EQ(back.gates.kind, original.gates.kind);
@@ -244,9 +253,12 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_FALSE(back.gradient.common_numbers);
     EXPECT_EQ(back.resolution, (std::array<int, 2>{12, 9}));
     EXPECT_EQ(back.target.max_bounces, 3);
-    ASSERT_EQ(back.parameters.size(), 7u);
-    EXPECT_EQ(back.parameters[5].type, ParameterType::ior);
-    EXPECT_EQ(back.parameters[5].material, "glass");
+    ASSERT_EQ(back.parameters.size(), 9u);
+    EXPECT_EQ(back.parameters[7].type, ParameterType::ior);
+    EXPECT_EQ(back.parameters[7].material, "glass");
+    EXPECT_EQ(back.parameters[3].scale, 12.5);
+    EXPECT_EQ(back.parameters[3].pivot_kind, PivotKind::center);
+    EXPECT_EQ(back.parameters[4].pivot, (Vec3{0.5, 0.25, 1}));
     EXPECT_EQ(back.target.photons, 12.5);
     EXPECT_EQ(back.loss.kind, LossKind::cauchy);
     EXPECT_EQ(back.loss.scale, 0.3);
@@ -259,8 +271,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.parameters[2].axis, (Vec3{0, 3, 4}));
     EXPECT_EQ(back.parameters[2].pivot, (Vec3{1, 0.1, 0}));
     EXPECT_EQ(back.parameters[2].selection.max, (Vec3{0, 1, 0.1}));
-    EXPECT_EQ(back.parameters[3].selection.indices, (std::vector<int>{2, 0}));
-    EXPECT_EQ(back.parameters[4].material, "metal");
+    EXPECT_EQ(back.parameters[5].selection.indices, (std::vector<int>{2, 0}));
+    EXPECT_EQ(back.parameters[6].material, "metal");
     const std::string decaying =
         replaced(text, "method: lbfgs, inner_iterations: 3", "decay: {start: 20, half_life: 12.5}");
     const Experiment adam = load_experiment(folder.write("adam.yaml", decaying));

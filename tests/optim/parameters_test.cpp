@@ -120,6 +120,101 @@ TEST(Parameters, TangentIsTheDerivativeOfApply) {
   }
 }
 
+/// Motions of the tetrahedron with pivots that follow it: of all its vertices but for `part`, which carries no pivot
+/// that all of them turn about.
+std::vector<ParameterSpec> carried_pivots() {
+  std::vector<ParameterSpec> specs;
+  specs.push_back(spec("move", ParameterType::translation, "tetra", 5));
+  specs.back().direction = {0.5, 1, -2};
+  specs.push_back(spec("part", ParameterType::translation, "tetra", 0.4));
+  specs.back().direction = {1, 0, 0};
+  specs.back().selection = {Selection::Kind::list, {0, 2}, {}, {}};
+  specs.push_back(spec("turn", ParameterType::rotation, "tetra", 25));
+  specs.back().axis = {1, 2, -0.5};
+  specs.back().pivot_kind = PivotKind::center;
+  specs.push_back(spec("shift", ParameterType::translation, "tetra", -0.7));
+  specs.back().direction = {0, 0.3, 1};
+  specs.push_back(spec("hinge", ParameterType::rotation, "tetra", 40));
+  specs.back().axis = {0, 1, 0};
+  specs.back().pivot_kind = PivotKind::follow;
+  specs.back().pivot = {1, 0, 0};
+  specs.push_back(spec("part_turn", ParameterType::rotation, "tetra", -30));
+  specs.back().axis = {0, 0, 1};
+  specs.back().pivot_kind = PivotKind::center;
+  specs.back().selection = {Selection::Kind::list, {0, 2}, {}, {}};
+  return specs;
+}
+
+TEST(Parameters, TangentOfPivotsThatMoveWithTheShape) {
+  const Scene scene = two_shapes(true);
+  const Parameters parameters(scene, carried_pivots());
+  const std::vector<double> theta = point_near_initial(parameters, 8);
+  const TangentBasis basis = parameters.tangent(theta);
+  for (int column = 0; column < basis.columns; ++column) {
+    const double h = 1e-5;  // truncation h^2 and cancellation 1e-15 / h are both below 1e-9
+    std::vector<double> up = theta, down = theta;
+    up[column] += h, down[column] -= h;
+    const std::vector<double> above = dofs(parameters.apply(up)), below = dofs(parameters.apply(down));
+    for (std::size_t row = 0; row < above.size(); ++row) {
+      double coefficient = 0;
+      for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e) {
+        if (e > basis.row_begin[row]) {
+          EXPECT_LT(basis.entries[e - 1].column, basis.entries[e].column);
+        }
+        if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
+      }
+      EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
+    }
+  }
+}
+
+TEST(Parameters, PivotsMoveWithTheShape) {
+  const Scene scene = two_shapes(true);
+  std::vector<ParameterSpec> specs = {spec("move", ParameterType::translation, "tetra", 0),
+                                      spec("turn", ParameterType::rotation, "tetra", 0)};
+  specs[0].direction = {1, 0, 0};
+  specs[1].axis = {0, 0, 1};
+  // The mean of the tetrahedron's vertices is (0.25, 0.5, 0.75): wherever the shape goes, it turns about it.
+  specs[1].pivot_kind = PivotKind::center;
+  const std::vector<Vec3> spun = Parameters(scene, specs).apply({5, 90}).positions;
+  EXPECT_NEAR(length((spun[0] + spun[1] + spun[2] + spun[3]) / 4 - Vec3{5.25, 0.5, 0.75}), 0, 1e-14);
+  EXPECT_NEAR(length(spun[1] - Vec3{5.75, 1.25, 0}), 0, 1e-14);
+  // A vertex as hinge stays where the translation has put it.
+  specs[1].pivot_kind = PivotKind::follow;
+  specs[1].pivot = {1, 0, 0};
+  EXPECT_NEAR(length(Parameters(scene, specs).apply({5, 90}).positions[1] - Vec3{6, 0, 0}), 0, 1e-14);
+  // A pivot of the world stays.
+  specs[1].pivot_kind = PivotKind::fixed;
+  EXPECT_NEAR(length(Parameters(scene, specs).apply({5, 90}).positions[1] - Vec3{1, 5, 0}), 0, 1e-14);
+}
+
+TEST(Parameters, ScalesByTypeAndAsGiven) {
+  const Scene scene = two_shapes(false);
+  std::vector<ParameterSpec> specs = every_kind();
+  specs.back().initial = {1e3, 4e3, 2e3};
+  specs.back().target = {2e3, 4e3, 2e3};
+  specs[0].scale = 0.25;
+  specs[0].target = {0.8};  // 0.5 from its initial value
+  const Parameters parameters(scene, specs);
+  const auto scale_of = [&](const std::string& name) {
+    for (const Parameters::Block& block : parameters.blocks())
+      if (block.name == name) return block.scale;
+    return 0.0;
+  };
+  EXPECT_EQ(scale_of("move"), 0.25);
+  EXPECT_EQ(scale_of("dent"), 1);
+  EXPECT_NEAR(scale_of("turn"), 57.29577951308232, 1e-13);
+  EXPECT_EQ(scale_of("colour"), 1);
+  EXPECT_EQ(scale_of("power"), 4e3);
+  EXPECT_EQ(parameters.scales()[0], 0.25);
+  // Two scales of `move` and a quarter of a scale of `power` off, over all unknowns.
+  const double squares = 2 * 2 + 0.25 * 0.25;
+  EXPECT_NEAR(parameters.distance_to_target(parameters.initial()), std::sqrt(squares / parameters.size()), 1e-12);
+  EXPECT_NEAR(parameters.distance_to_target(parameters.initial(), parameters.blocks().front()), 0.5, 1e-12);
+  EXPECT_NEAR(parameters.distance_to_target(parameters.initial(), parameters.blocks().back()), 1e3 / std::sqrt(3),
+              1e-9);
+}
+
 TEST(Parameters, TransposeIsTheAdjointOfTheTangent) {
   const Scene scene = two_shapes(false);
   const Parameters parameters(scene, every_kind());

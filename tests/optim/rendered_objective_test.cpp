@@ -157,7 +157,7 @@ TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
     const GatedImage target = problem.make_target(kGoOn);
     const RenderedObjective objective(problem, target, kGoOn);
     const OptimizerSpec& spec = problem.experiment().optimizer;
-    const auto method = make_optimizer(spec, problem.preconditioner());
+    const auto method = make_optimizer(spec, problem.preconditioner(), problem.parameters().scales());
     Checkpoint state;
     state.theta = problem.parameters().initial();
     LoopOptions options;
@@ -168,6 +168,37 @@ TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
     EXPECT_NEAR(state.theta[0], 0, 0.04) << optimizer;
     EXPECT_NEAR(state.theta[1], 10, 0.5) << optimizer;
   }
+}
+
+TEST_F(Rendered, OneRateFindsMetresDegreesAlbedosAndWatts) {
+  const std::string parameters =
+      "parameters=[{name: height, type: translation, shape: block, direction: [0, 1, 0], initial: 0.2, target: 0},"
+      " {name: tilt, type: rotation, shape: block, axis: [0, 0, 1], pivot: center, initial: 12, target: 0},"
+      " {name: grey, type: albedo, material: white, initial: 0.4, target: 0.6},"
+      " {name: power, type: emission, shape: lamp, initial: 800, target: 1000}]";
+  const auto distances = [&](bool scaled) {
+    const Problem problem(load_experiment(
+        file_, {parameters, "optimizer={method: adam, learning_rate: 0.02, iterations: 150}", "target.samples=4096"}));
+    const GatedImage target = problem.make_target(kGoOn);
+    const RenderedObjective objective(problem, target, kGoOn);
+    const OptimizerSpec& spec = problem.experiment().optimizer;
+    const Parameters& all = problem.parameters();
+    const auto method = make_optimizer(spec, problem.preconditioner(), scaled ? all.scales() : std::vector<double>{});
+    Checkpoint state;
+    state.theta = all.initial();
+    LoopOptions options;
+    options.iterations = spec.iterations;
+    options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
+    options.save = [] {};
+    run_loop(objective, *method, 0, options, state);
+    std::vector<double> relative;
+    for (const Parameters::Block& block : all.blocks())
+      relative.push_back(all.distance_to_target(state.theta, block) / all.distance_to_target(all.initial(), block));
+    return relative;
+  };
+  for (double remains : distances(true)) EXPECT_LT(remains, 0.25);
+  // Without scales the same rate moves degrees and watts by 3 at most.
+  EXPECT_GT(distances(false)[3], 0.9);
 }
 
 }  // namespace

@@ -23,9 +23,10 @@ OptimizerSpec spec_of(OptimizerMethod method) {
 }
 
 /// Runs `iterations` steps from (1, 0.2) or from `state`; saves the last checkpoint in it.
-LoopResult run(const Objective& objective, const OptimizerSpec& spec, int iterations, Checkpoint& state) {
+LoopResult run(const Objective& objective, const OptimizerSpec& spec, int iterations, Checkpoint& state,
+               const std::vector<double>& scales = {}) {
   if (state.theta.empty()) state.theta = {1, 0.2};
-  const auto optimizer = make_optimizer(spec, kNone);
+  const auto optimizer = make_optimizer(spec, kNone, scales);
   LoopOptions options;
   options.iterations = iterations;
   options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
@@ -53,6 +54,65 @@ TEST_P(Solvers, ReachTheTargetOfAnExactProblem) {
   EXPECT_NEAR(state.theta[1], 0.7, tolerance);
   // Where there is no noise, Adam's own swings about the optimum are rises.
   EXPECT_LE(state.safeguard.rejected, GetParam() == OptimizerMethod::adam ? 3 : 0);
+}
+
+/// The fit with unknowns in other units: theta' = unit * theta.
+class InOtherUnits : public Objective {
+ public:
+  InOtherUnits(const Objective& fit, const std::vector<double>& unit) : fit_(fit), unit_(unit) {
+    for (std::size_t i = 0; i < unit.size(); ++i) {
+      lower_.push_back(fit.lower()[i] * unit[i]);
+      upper_.push_back(fit.upper()[i] * unit[i]);
+    }
+  }
+  const std::vector<double>& lower() const override { return lower_; }
+  const std::vector<double>& upper() const override { return upper_; }
+  double loss(const std::vector<double>& theta, std::uint32_t iteration) const override {
+    return fit_.loss(own(theta), iteration);
+  }
+  Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override {
+    return converted(fit_.evaluate(own(theta), iteration));
+  }
+  Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override {
+    return converted(fit_.linearise(own(theta), iteration));
+  }
+
+ private:
+  std::vector<double> own(std::vector<double> theta) const {
+    for (std::size_t i = 0; i < theta.size(); ++i) {
+      EXPECT_GE(theta[i], lower_[i]);
+      EXPECT_LE(theta[i], upper_[i]);
+      theta[i] /= unit_[i];
+    }
+    return theta;
+  }
+  Evaluation converted(Evaluation e) const {
+    for (std::size_t i = 0; i < e.gradient.size(); ++i) e.gradient[i] /= unit_[i];
+    for (std::size_t k = 0; k < e.curvature.size(); ++k) {
+      e.curvature[k] /= unit_[k / 2] * unit_[k % 2];
+      e.curvature_bound[k] /= unit_[k / 2] * unit_[k % 2];
+    }
+    return e;
+  }
+
+  const Objective& fit_;
+  std::vector<double> unit_, lower_, upper_;
+};
+
+TEST_P(Solvers, TakeTheSameStepsInAnyUnitsThatTheScalesKnow) {
+  ExponentialFit fit;
+  fit.high = {1.9, 10};  // a bound that is met
+  Checkpoint own, other;
+  const std::vector<double> unit = {1e3, 0.03};
+  other.theta = {1 * unit[0], 0.2 * unit[1]};
+  const InOtherUnits converted(fit, unit);
+  run(fit, spec(), 8, own);
+  run(converted, spec(), 8, other, unit);
+  // Optimisers work on the same numbers but for rounding, which line searches carry on.
+  for (int i : {0, 1}) EXPECT_NEAR(other.theta[i] / unit[i], own.theta[i], 1e-9) << i;
+  if (own.theta[0] == fit.high[0]) {
+    EXPECT_EQ(other.theta[0], converted.upper()[0]);
+  }
 }
 
 TEST_P(Solvers, ReachTheTargetThroughNoise) {

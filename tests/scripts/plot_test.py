@@ -12,8 +12,10 @@ sys.path.insert(0, str(SCRIPTS))
 import exr
 import matplotlib.image
 import numpy as np
+from pictures import curves, reading, sheets
 
 HEADER = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,height\n"
+NOTES = {"isochron.gateCenters": "12 12.5 13 14", "isochron.gateUnit": "ns", "isochron.quantity": "radiance"}
 
 
 def images(gates, channels="Y", component="", value=1.0):
@@ -28,12 +30,12 @@ class PlotTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.folder = pathlib.Path(folder.name)
 
-    def plot(self):
-        command = [sys.executable, str(SCRIPTS / "plot.py"), str(self.folder)]
+    def plot(self, *options):
+        command = [sys.executable, str(SCRIPTS / "plot.py"), str(self.folder), *options]
         return subprocess.run(command, capture_output=True, text=True, check=False)
 
-    def assert_drawn(self, *names):
-        result = self.plot()
+    def assert_drawn(self, *names, options=()):
+        result = self.plot(*options)
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertEqual(sorted(p.name for p in self.folder.glob("*.png*")), sorted(names))
 
@@ -50,11 +52,60 @@ class PlotTest(unittest.TestCase):
         experiment = "name: cube\ngates: {kind: gaussian, centers: [5, 6, 7, 8]}\n"
         (self.folder / "experiment.yaml").write_text(experiment)
         (self.folder / "log.csv").write_text(HEADER + "0,0.5,1,1,0.3,2,0.3\n1,1.0,0.5,0.7,0.2,1,0.2\n")
-        self.assert_drawn("target.png", "initial.png", "final.png", "height.png", "rmse.png")
+        self.assert_drawn("target.png", "initial.png", "final.png", "residual.png", "height.png", "rmse.png")
 
     def test_many_gates_and_colours(self):
         exr.write(self.folder / "render.exr", images(64, "RGB"))
         self.assert_drawn("render.png")
+
+    def test_a_thousand_gates_make_a_picture_of_bounded_size(self):
+        stack = images(1200)
+        for g in list(range(500)) + list(range(900, 1200)):
+            stack[f"gate{g:03d}.Y"] = np.zeros((6, 8))
+        exr.write(self.folder / "render.exr", stack)
+        exr.write(self.folder / "height.exr", images(1200, component="total"))
+        self.assert_drawn("render.png", "height.png")
+        for name in ("render", "height"):
+            height, width = matplotlib.image.imread(self.folder / f"{name}.png").shape[:2]
+            self.assertLess(max(height, width), 2000)
+        self.assertEqual(sheets.pick_gates(5, np.ones((1200, 2, 2)) * (np.arange(1200) // 500 == 1)[:, None, None]),
+                         [500, 625, 750, 874, 999])
+
+    def test_rows_of_zero_terms_are_not_drawn(self):
+        stack = {**images(2, component="total"), **images(2, component="interior"), **images(2, component="visibility")}
+        exr.write(self.folder / "all.exr", stack)
+        exr.write(self.folder / "zero.exr", {**stack, **images(2, component="visibility", value=0)})
+        self.assert_drawn("all.png", "zero.png")
+        rows = [matplotlib.image.imread(self.folder / f"{n}.png").shape[0] for n in ("all", "zero")]
+        self.assertGreater(rows[0], rows[1] + 100)
+
+    def test_gates_name_themselves(self):
+        exr.write(self.folder / "render.exr", images(4), NOTES)
+        folder = reading.Folder(self.folder)
+        gates = folder.gates(self.folder / "render.exr", 4)
+        self.assertEqual([gates.label(g) for g in range(4)], ["12", "12.5", "13", "14"])
+        self.assertEqual((gates.axis, gates.quantity), ("travel time (ns)", "radiance"))
+        self.assertEqual(folder.gates(self.folder / "render.exr", 3).label(1), "gate 1")
+
+    def test_pixel_and_row(self):
+        exr.write(self.folder / "render.exr", images(4), NOTES)
+        exr.write(self.folder / "height.exr", images(4, component="total"), NOTES)
+        self.assert_drawn("render_pixel_7_5.png", "height_pixel_7_5.png", "render_row_5.png", "height_row_5.png",
+                          options=("--pixel", "7,5", "--row", "5"))
+        result = self.plot("--pixel", "8,5")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("there is no column 8 (0 to 7)", result.stderr)
+        self.assertEqual(self.plot("--pixel", "one").returncode, 2)
+
+    def test_errors_of_each_parameter(self):
+        header = HEADER.strip() + ",power,height.rmse,power.rmse,height.gradient,power.gradient\n"
+        rows = "0,0.5,1,1,0.3,2,0.3,800,0.3,200,1,1\n1,1,0.5,0.7,0.2,1,0.2,900,0.15,100,1,1\n"
+        (self.folder / "log.csv").write_text(header + rows)
+        curves_of = curves.parameter_curves(reading.read_log(self.folder / "log.csv"))
+        self.assertEqual([c[0] for c in curves_of], ["height: 0.3 to 0.15", "power: 200 to 100"])
+        for _, values in curves_of:
+            np.testing.assert_allclose(values, [1, 0.5])
+        self.assert_drawn("rmse.png")
 
     def test_black_and_not_finite_pixels(self):
         exr.write(self.folder / "black.exr", images(2, value=0.0))

@@ -1,0 +1,118 @@
+"""What the program wrote, as arrays and words: gated images, the gates' centres and units, log.csv."""
+
+import csv
+import re
+
+import numpy as np
+import yaml
+
+import exr
+
+CHANNEL = re.compile(r"(?:(?P<component>.+)\.)?gate(?P<gate>\d+)\.(?P<channel>[RGBY])")
+
+
+class PlotError(Exception):
+    """Something that keeps a picture from being drawn, in one line."""
+
+
+class Gates:
+    """Centres of an image's gates (None where unknown), their unit, and what a pixel's value is."""
+
+    def __init__(self, count, centers=None, unit="", quantity="pixel value"):
+        self.count, self.unit, self.quantity = count, unit, quantity
+        self.centers = centers if centers is not None and len(centers) == count else None
+
+    @property
+    def axis(self):
+        """Label of an axis along which gates are laid out."""
+        if self.centers is None:
+            return "number of the gate"
+        return f"{'path length' if self.unit == 'scene units' else 'travel time'} ({self.unit})"
+
+    @property
+    def positions(self):
+        return np.arange(self.count) if self.centers is None else np.asarray(self.centers)
+
+    def label(self, gate):
+        """Enough digits to tell neighbours apart."""
+        if self.centers is None:
+            return f"gate {gate}"
+        steps = np.diff(np.unique(self.centers))
+        digits = 5 if not len(steps) else max(3, int(np.ceil(np.log10(max(self.centers) / steps.min()))) + 1)
+        return f"{self.centers[gate]:.{digits}g}"
+
+
+class Folder:
+    """Names and units that the folder's experiment.yaml gives; EXR files that name their own go first."""
+
+    def __init__(self, directory):
+        self.experiment, self.centers, self.unit, self.quantity = directory.name, None, "", "pixel value"
+        path = directory / "experiment.yaml"
+        if not path.exists():
+            return
+        try:
+            data = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+            gates = data.get("gates") or {}
+            self.experiment = str(data.get("name", self.experiment))
+            centers = gates.get("centers")
+            if isinstance(centers, dict):
+                centers = np.linspace(centers["start"], centers["stop"], int(centers["count"]))
+            if centers is not None:
+                self.centers = [float(c) for c in np.atleast_1d(centers)]
+            unit = gates.get("unit", "scene")
+            self.unit = "scene units" if unit == "scene" else str(unit)
+        except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError) as error:
+            raise PlotError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+        steady = gates.get("kind") == "steady"
+        self.quantity = "radiance" if steady else "radiance per scene unit of path length"
+
+    def gates(self, path, count):
+        """Gates of one EXR file."""
+        try:
+            notes = {k: v.decode("utf-8") for k, v in exr.attributes(path).items() if k.startswith("isochron.")}
+            if "isochron.gateUnit" in notes:
+                centers = [float(c) for c in notes.get("isochron.gateCenters", "").split()]
+                return Gates(count, centers or None, notes["isochron.gateUnit"], notes["isochron.quantity"])
+        except (KeyError, ValueError) as error:
+            raise PlotError(f"{path}: attributes of the gates cannot be read: {error}") from error
+        return Gates(count, self.centers, self.unit, self.quantity)
+
+
+def read_stack(path):
+    """component ('' for images) -> array of gates x height x width (grey) or gates x height x width x 3."""
+    stacks = {}
+    for name, image in exr.read(path).items():
+        match = CHANNEL.fullmatch(name)
+        if match:
+            gates = stacks.setdefault(match["component"] or "", {})
+            gates.setdefault(int(match["gate"]), {})[match["channel"]] = image.astype(float)
+    if not stacks:
+        raise PlotError(f"{path}: no channels named gateNNN.R/G/B, gateNNN.Y or COMPONENT.gateNNN.Y")
+    out = {}
+    for component, gates in stacks.items():
+        layers = [gates[g] for g in sorted(gates)]
+        if sorted(gates) != list(range(len(gates))) or any(set(l) not in ({"Y"}, set("RGB")) for l in layers):
+            raise PlotError(f"{path}: incomplete gates or channels")
+        if len({len(l) for l in layers}) != 1:
+            raise PlotError(f"{path}: grey and colour gates in one file")
+        grey = "Y" in layers[0]
+        out[component] = np.stack([l["Y"] if grey else np.stack([l[c] for c in "RGB"], -1) for l in layers])
+    return out
+
+
+def read_log(path):
+    """Column name -> array; empty and unreadable entries are NaN. A last line cut short is left out."""
+    with open(path, newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if not rows or "iteration" not in rows[0]:
+        raise PlotError(f"{path}: no column 'iteration'")
+
+    def number(text):
+        try:
+            return float(text)
+        except ValueError:
+            return np.nan
+
+    table = np.array([[number(x) for x in r] for r in rows[1:] if len(r) == len(rows[0])])
+    table = table.reshape(-1, len(rows[0]))
+    return {name: table[:, i] for i, name in enumerate(rows[0])}

@@ -1,0 +1,167 @@
+"""Sheets of gated images: a cell per image, of bounded size however many gates there are."""
+
+import os
+import textwrap
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib import colors
+from matplotlib.cm import ScalarMappable
+
+COMPONENTS = ["total", "interior", "visibility", "path_length"]
+PERCENTILE = 99.5  # of the non-zero values: the end of the colour scale; outliers must not darken the rest
+NON_FINITE = "magenta"
+MOST_IMAGES, MOST_COLUMNS = 40, 10  # cells of a sheet of images, columns of a sheet with a row per component
+
+
+def scale_of(*arrays):
+    """End of the colour scale: a high percentile of the non-zero magnitudes."""
+    values = np.abs(np.concatenate([a.ravel() for a in arrays]))
+    values = values[np.isfinite(values) & (values > 0)]
+    return float(np.percentile(values, PERCENTILE)) if values.size else 1.0
+
+
+def save(figure, path):
+    temporary = path.with_name(path.name + ".tmp")
+    figure.savefig(temporary, format="png", dpi=110)
+    plt.close(figure)
+    os.replace(temporary, path)
+
+
+def srgb(x):
+    """Display encoding of linear light in [0, 1]."""
+    x = np.clip(x, 0, 1)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def pick_gates(most, *stacks):
+    """At most so many gates, evenly spread from the first to the last in which anything exceeds a hundredth of the scale."""
+    count = len(stacks[0])
+    if count <= most:
+        return list(range(count))
+    peaks = np.max([np.abs(np.nan_to_num(s)).reshape(count, -1).max(1) for s in stacks], axis=0)
+    lit = np.flatnonzero(peaks > 0.01 * scale_of(*stacks))
+    first, last = (lit[0], lit[-1]) if len(lit) else (0, count - 1)
+    return sorted({int(round(g)) for g in np.linspace(first, last, min(most, last - first + 1))})
+
+
+def plain_ticks(axis):
+    """1.25, 0.003 and 2e-7 rather than multiples of a common power of ten."""
+    axis.set_major_formatter(matplotlib.ticker.FuncFormatter(lambda x, _: f"{x:.4g}"))
+
+
+class Sheet:
+    """A figure of equal cells below a title, with row names at the left and a colour bar at the right.
+
+    All lengths are in inches. Columns have a label at the top (`column_labels`), or each cell its own.
+    """
+
+    BOTTOM, RIGHT, LABEL, GAP, LINE = 0.15, 1.15, 0.22, 0.08, 0.19
+
+    def __init__(self, rows, columns, aspect, title, left=0.15):
+        self.cell_width = float(np.clip(11 / columns, 1.0, 2.6))
+        self.cell_height = self.cell_width / aspect
+        # Tall images must not make an endless sheet.
+        shrink = min(1.0, 16 / (rows * (self.cell_height + self.LABEL)))
+        self.cell_width, self.cell_height = shrink * self.cell_width, shrink * self.cell_height
+        self.left, self.rows, self.columns = left, rows, columns
+        self.top = 0.2 + self.LINE * len(title)
+        longest = max(len(line) for line in title)
+        self.width = max(left + columns * (self.cell_width + self.GAP) + self.RIGHT, 0.085 * longest + 0.4, 4.6)
+        self.height = max(self.top + rows * (self.cell_height + self.LABEL) + self.BOTTOM, self.top + 2.6)
+        self.figure = plt.figure(figsize=(self.width, self.height))
+        for i, line in enumerate(title):
+            y = 1 - (0.12 + i * self.LINE) / self.height
+            self.figure.text(0.15 / self.width, y, line, ha="left", va="top", fontsize=10 if i == 0 else 8.5)
+
+    def _axes(self, x, y, w, h):
+        return self.figure.add_axes([x / self.width, y / self.height, w / self.width, h / self.height])
+
+    def cell(self, row, column, text, image):
+        """Axes for one image, labelled; red where some of it is not finite."""
+        x = self.left + column * (self.cell_width + self.GAP)
+        y = self.height - self.top - (row + 1) * (self.cell_height + self.LABEL)
+        axes = self._axes(x, y, self.cell_width, self.cell_height)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        bad = np.count_nonzero(~np.isfinite(image))
+        if bad:
+            text += f" ({bad} not finite)"
+        axes.set_title(text, fontsize=8, pad=3, color="red" if bad else "black")
+        return axes
+
+    def colorbar(self, mappable, label, extend):
+        x = self.left + self.columns * (self.cell_width + self.GAP) + 0.05
+        height = float(np.clip(self.rows * (self.cell_height + self.LABEL) - self.LABEL, 2.2, 5.0))
+        axes = self._axes(x, self.height - self.top - self.LABEL - height, 0.14, height)
+        bar = self.figure.colorbar(mappable, cax=axes, extend=extend)
+        bar.set_label(textwrap.fill(label, 34), fontsize=8)
+        bar.ax.tick_params(labelsize=8)
+        plain_ticks(bar.ax.yaxis)
+
+
+def about_gates(gates, shown):
+    """What the labels of cells are, and which gates were left out."""
+    what = "" if gates.centers is None else f"above each image: its gate's centre, {gates.axis}"
+    left_out = "" if len(shown) == gates.count else f"{len(shown)} of {gates.count} gates, evenly spread from gate {shown[0]} to {shown[-1]}"
+    return [line for line in (what, left_out) if line]
+
+
+def plot_images(path, title, stack, scale, gates):
+    """The gated images of one file: grey scenes in false colour, RGB scenes in their own, equally exposed."""
+    shown = pick_gates(MOST_IMAGES, stack)
+    height, width = stack.shape[1:3]
+    columns = len(shown) if len(shown) <= 6 else int(np.ceil(np.sqrt(1.4 * len(shown))))
+    sheet = Sheet(-(-len(shown) // columns), columns, width / height, [title, *about_gates(gates, shown)])
+    norm = colors.Normalize(0, scale)
+    if stack.ndim == 4:
+        picture = srgb(np.nan_to_num(stack / scale, nan=0, posinf=1, neginf=0))
+        picture[~np.isfinite(stack).all(-1)] = colors.to_rgb(NON_FINITE)
+        cmap = colors.ListedColormap(np.repeat(srgb(np.linspace(0, 1, 256))[:, None], 3, axis=1))
+    else:
+        picture = np.ma.masked_invalid(stack)
+        cmap = matplotlib.colormaps["inferno"].copy()
+        cmap.set_bad(NON_FINITE)
+    for i, g in enumerate(shown):
+        axes = sheet.cell(*divmod(i, columns), gates.label(g), stack[g])
+        axes.imshow(picture[g], cmap=cmap, norm=norm, interpolation="nearest")
+    extend = "max" if np.nanmax(np.nan_to_num(stack[shown]), initial=0) > scale else "neither"
+    sheet.colorbar(ScalarMappable(norm, cmap), gates.quantity, extend)
+    save(sheet.figure, path)
+
+
+def plot_signed(path, title, rows, quantity, gates):
+    """Images of either sign, red above zero, blue below: a row for each of `rows` (name -> stack), a column per gate.
+
+    Rows that are zero everywhere are named instead of drawn.
+    """
+    zero = [name for name, stack in rows.items() if not np.any(np.nan_to_num(stack, nan=1))]
+    drawn = {name: stack for name, stack in rows.items() if name not in zero} or dict(list(rows.items())[:1])
+    shown = pick_gates(MOST_COLUMNS, *drawn.values())
+    height, width = next(iter(drawn.values())).shape[1:3]
+    lines = [title, *about_gates(gates, shown)]
+    if zero:
+        lines.append(f"zero everywhere: {', '.join(name or 'all' for name in zero)}")
+    sheet = Sheet(len(drawn), len(shown), width / height, lines, left=0.4)
+    drawn = {name: stack.mean(-1) if stack.ndim == 4 else stack for name, stack in drawn.items()}
+    scale = scale_of(*(stack[shown] for stack in drawn.values()))
+    norm = colors.Normalize(-scale, scale)
+    cmap = matplotlib.colormaps["RdBu_r"].copy()
+    cmap.set_bad(NON_FINITE)
+    beyond = False
+    for row, (name, stack) in enumerate(drawn.items()):
+        beyond |= bool(np.abs(np.nan_to_num(stack[shown])).max() > scale)
+        for column, g in enumerate(shown):
+            axes = sheet.cell(row, column, gates.label(g) if row == 0 else "", stack[g])
+            axes.imshow(np.ma.masked_invalid(stack[g]), cmap=cmap, norm=norm, interpolation="nearest")
+            if column == 0 and name:
+                axes.set_ylabel(name, fontsize=9)
+    sheet.colorbar(ScalarMappable(norm, cmap), quantity, "both" if beyond else "neither")
+    save(sheet.figure, path)
+
+
+def plot_derivatives(path, title, stacks, parameter, gates):
+    """Derivative images by one parameter: a row per term."""
+    order = [c for c in COMPONENTS if c in stacks] + sorted(c for c in stacks if c not in COMPONENTS)
+    plot_signed(path, title, {c: stacks[c] for c in order}, f"d({gates.quantity}) / d({parameter})", gates)
