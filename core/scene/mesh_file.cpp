@@ -6,14 +6,12 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <sstream>
 
+#include "core/base/file.h"
 #include "core/math/error.h"
 #include "core/scene/mesh.h"
 
@@ -56,14 +54,10 @@ class Silence {
 };
 
 std::string read_file(const std::string& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) throw InputError(file + ": is a folder");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw InputError(file + ": cannot be opened: " + std::strerror(errno));
-  std::ostringstream buffer;
-  if (stream.peek() != std::ifstream::traits_type::eof()) buffer << stream.rdbuf();
-  if (stream.bad() || !buffer) throw InputError(file + ": cannot be read");
-  return std::move(buffer).str();
+  std::string problem;
+  std::optional<std::string> contents = read_regular_file(file, problem);
+  if (!contents) throw InputError(file + ": " + problem);
+  return std::move(*contents);
 }
 
 }  // namespace
