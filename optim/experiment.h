@@ -147,6 +147,7 @@ struct Experiment {
   std::string file;  ///< absolute path, for messages
   std::string name;
   std::string scene;  ///< absolute path
+  std::vector<std::string> number_files;  ///< absolute paths of the files that gates and parameters were read from
   /// Pixels, {width, height}, in place of the scene's; {0, 0}: as the scene says. The field of view stays across the
   /// width.
   std::array<int, 2> resolution{0, 0};

@@ -11,6 +11,7 @@
 #include "core/math/error.h"
 #include "optim/checkpoint.h"
 #include "optim/files.h"
+#include "optim/inputs.h"
 #include "optim/log.h"
 #include "optim/loss.h"
 #include "optim/problem.h"
@@ -122,24 +123,40 @@ class Run {
 
 }  // namespace
 
-RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
-  const Problem problem(experiment, options.warning);
+namespace {
+
+/// Goes on in a locked folder that holds a run.
+RunStatus go_on(const RunOptions& options, const std::function<void(const std::string&)>& warning_of_scene) {
+  const Problem problem(load_experiment(options.folder + "/experiment.yaml"), warning_of_scene);
   problem.require_parameters();
   require_jacobian_fits(problem);
-  prepare_run_folder(options.folder, options.force, options.warning);
-  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(experiment, options.folder));
   return Run(problem, options).execute();
 }
 
+}  // namespace
+
+RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
+  {
+    const Problem problem(experiment, options.warning);
+    problem.require_parameters();
+    require_jacobian_fits(problem);
+  }
+  const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
+  const FolderLock lock = prepare_run_folder(options.folder, options.force, options.warning);
+  Experiment copied = experiment;
+  write_inputs(options.folder, inputs, copied);
+  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  // As a resumed run does, so that both see the same to the last bit.
+  return go_on(options, {});
+}
+
 RunStatus resume_run(const RunOptions& options) {
-  const std::string file = options.folder + "/experiment.yaml";
-  if (!std::filesystem::exists(file))
+  if (!std::filesystem::exists(options.folder + "/experiment.yaml"))
     throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
-  const Problem problem(load_experiment(file), options.warning);
-  problem.require_parameters();
-  require_jacobian_fits(problem);
   make_output_folder(options.folder);
-  return Run(problem, options).execute();
+  const FolderLock lock(options.folder, options.warning);
+  check_inputs(options.folder, options.warning);
+  return go_on(options, options.warning);
 }
 
 }  // namespace isochron
