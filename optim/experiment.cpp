@@ -312,6 +312,14 @@ void read_settings(YamlMap& map, Experiment& experiment) {
   }
   if (const auto value = map.find("loss")) experiment.loss = read_loss(*value);
   if (const auto value = map.find("optimizer")) experiment.optimizer = read_optimizer(*value);
+  if (const auto value = map.find("output")) {
+    YamlMap output = value->map();
+    if (const auto geometry = output.find("geometry"))
+      experiment.output.geometry = static_cast<GeometryFormat>(geometry->choice({"ply", "obj", "none"}));
+    if (const auto every = output.find("every"))
+      experiment.output.every = static_cast<int>(every->integer(0, std::numeric_limits<int>::max()));
+    output.reject_unknown();
+  }
   if (const auto seed = map.find("seed"))
     experiment.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
 }

@@ -11,7 +11,7 @@
 //   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);
 //     lbfgs: inner_iterations 5
 //   target: samples 4096, seed 7, max_bounces as above, noise none     seed 1
-//   resolution: the camera's
+//   resolution: the camera's           output: geometry ply, every 0
 #pragma once
 #include <array>
 #include <cmath>
@@ -143,6 +143,14 @@ struct OptimizerSpec {
   int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
 };
 
+enum class GeometryFormat { ply, obj, none };
+
+/// What a run writes besides images and tables: see geometry_files.h.
+struct OutputSpec {
+  GeometryFormat geometry = GeometryFormat::ply;
+  int every = 0;  ///< meshes of every so many iterations besides the first and the last; 0: of none
+};
+
 struct Experiment {
   std::string file;  ///< absolute path, for messages
   std::string name;
@@ -160,6 +168,7 @@ struct Experiment {
   GradientSpec gradient;
   LossSpec loss;
   OptimizerSpec optimizer;
+  OutputSpec output;
   std::uint64_t seed = 1;
 };
 

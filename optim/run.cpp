@@ -11,6 +11,7 @@
 #include "core/math/error.h"
 #include "optim/checkpoint.h"
 #include "optim/files.h"
+#include "optim/geometry_files.h"
 #include "optim/inputs.h"
 #include "optim/log.h"
 #include "optim/loss.h"
@@ -70,6 +71,8 @@ class Run {
     const OptimizerSpec& spec = problem_.experiment().optimizer;
     const RenderedObjective objective(problem_, target_, [this] { poll(); });
     const auto optimizer = make_optimizer(spec, problem_.preconditioner());
+    const GeometryFiles geometry(options_.folder, problem_.experiment().output, parameters_);
+    if (state_.iteration == 0) geometry.write("target", parameters_.target());
     Log log(path("log.csv"), parameters_, state_.iteration);
     GatedImage final_image;
     const Clock::time_point call_start = Clock::now();
@@ -85,11 +88,13 @@ class Run {
           std::sqrt(now.mean_squared_error),    parameters_.distance_to_target(theta),           norm(now.gradient)};
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image);
+        geometry.write("initial", theta);
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
           options_.warning("no light reaches the gates, neither at the target nor at the initial values");
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
+      if (!closing) geometry.write_iteration(last_.iteration, theta);
       log.append(last_, theta);
       final_image = now.image;
       if (!closing) report(first, seconds_since(call_start));
@@ -101,6 +106,7 @@ class Run {
       poll();
     };
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
+    geometry.write("final", state_.theta);
     write_exr(path("final.exr"), final_image);
     return result;
   }

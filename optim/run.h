@@ -2,7 +2,7 @@
 // the rows of log.csv.
 //
 // Order of writing: inputs/ (see inputs.h), experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before
-// them, in iteration 0, initial.exr), at last final.exr and summary.yaml. Every random number depends on
+// them, in iteration 0, initial.exr), at last geometry/final_SHAPE, final.exr and summary.yaml. Every random number depends on
 // (seed, iteration, pass) alone and the target is used as target.exr holds it (rounded to float), so a run
 // that was killed anywhere and resumed gives the same bits.
 #pragma once

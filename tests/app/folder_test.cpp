@@ -1,4 +1,5 @@
 // The folder of a run: its lock, its copies of the inputs.
+#include "core/scene/mesh.h"
 #include "tests/app/program.h"
 
 namespace isochron {
@@ -91,6 +92,38 @@ TEST_F(Program, ChangedInputsAreNoticed) {
       << refused.errors;
   std::filesystem::remove(folder_.file("a/inputs/scene/block.obj"));
   EXPECT_NE(run(resume).errors.find("a/inputs/scene/block.obj: has gone since the run began"), std::string::npos);
+}
+
+TEST_F(Program, RunsWriteTheGeometryThatMoves) {
+  folder_.write("scene.yaml", replaced(folder_.read("scene.yaml"), "name: block,", "name: a/block,"));
+  folder_.write("tiny.yaml", replaced(tiny_experiment(), "shape: block", "shape: a/block"));
+  const std::vector<std::string> set = {"--set", "output={every: 2}"};
+  ASSERT_EQ(run(run_command("whole", set)).status, 0);
+  run(run_command("killed", set), SIGKILL, [&] { return rows("killed") >= 4; });
+  ASSERT_EQ(run({"resume", folder_.file("killed"), "--no-plots", "--quiet"}).status, 0);
+  for (const char* name : {"initial", "target", "final", "000002", "000004", "000006"}) {
+    const std::string file = std::string("/geometry/") + name + "_a_block.ply";
+    EXPECT_TRUE(folder_.has("whole" + file)) << file;
+    EXPECT_EQ(folder_.read("whole" + file), folder_.read("killed" + file)) << file;
+  }
+  const auto files = std::filesystem::directory_iterator(folder_.file("whole/geometry"));
+  EXPECT_EQ(std::distance(files, {}), 6);  // neither the floor nor the lamp
+  EXPECT_NEAR(read_mesh(folder_.file("whole/geometry/initial_a_block.ply")).positions[0].y, 0.7, 1e-6);
+  EXPECT_NEAR(read_mesh(folder_.file("whole/geometry/target_a_block.ply")).positions[0].y, 0.5, 1e-6);
+  const std::string log = folder_.read("whole/log.csv");
+  const std::size_t last = log.rfind('\n', log.size() - 2);
+  std::istringstream row(log.substr(last));
+  std::string cell;
+  for (int i = 0; i < 7; ++i) std::getline(row, cell, ',');
+  EXPECT_NEAR(read_mesh(folder_.file("whole/geometry/final_a_block.ply")).positions[0].y, 0.5 + std::stod(cell), 1e-6);
+
+  ASSERT_EQ(run(run_command("obj", {"--set", "output={geometry: obj}"})).status, 0);
+  EXPECT_TRUE(folder_.has("obj/geometry/final_a_block.obj"));
+  EXPECT_FALSE(folder_.has("obj/geometry/000002_a_block.obj"));
+  ASSERT_EQ(run(run_command("none", {"--set", "output={geometry: none, every: 1}"})).status, 0);
+  EXPECT_FALSE(folder_.has("none/geometry"));
+  ASSERT_EQ(run(run_command("whole", {"--set", "output={geometry: none}", "--force"})).status, 0);
+  EXPECT_FALSE(folder_.has("whole/geometry"));
 }
 
 TEST_F(Program, AFolderOfTheUsersIsNotWrittenTo) {
