@@ -4,11 +4,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <cmath>
-#include <cstdint>
 #include <filesystem>
 #include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "core/math/error.h"
@@ -20,13 +20,6 @@ namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr const char* kChecksumKey = "checksum: ";
-
-/// FNV-1a, 64 bits: finds torn and edited files, no protection against intent.
-std::string checksum(const std::string& text) {
-  std::uint64_t hash = 0xcbf29ce484222325u;
-  for (unsigned char c : text) hash = (hash ^ c) * 0x100000001b3u;
-  return fmt::format("{:016x}", hash);
-}
 
 std::string list(const std::vector<double>& values) {
   return fmt::format("[{}]", fmt::join(values, ", "));
@@ -52,7 +45,7 @@ std::vector<std::pair<const char*, std::vector<double>*>> lists_of(SafeguardStat
 
 Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters) {
   const std::size_t tail = text.rfind(kChecksumKey);
-  if (tail == std::string::npos || text.substr(tail) != kChecksumKey + checksum(text.substr(0, tail)) + "\n")
+  if (tail == std::string::npos || text.substr(tail) != kChecksumKey + checksum(std::string_view(text).substr(0, tail)) + "\n")
     throw Damaged("checksum does not match");
   const YAML::Node root = YAML::Load(text);
   const std::string version = root["version"].as<std::string>();

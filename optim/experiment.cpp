@@ -30,25 +30,36 @@ std::string file_name(const YamlValue& value) {
   return name;
 }
 
-std::string existing_file(const YamlValue& value, const std::filesystem::path& folder) {
+/// Where paths start from, and the files of numbers that were read.
+struct Folder {
+  std::filesystem::path path;
+  std::vector<std::string> number_files;
+};
+
+std::string existing_file(const YamlValue& value, const Folder& folder) {
   const std::string text = value.text();
   std::error_code none;  // such as of names that are too long
-  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text, none);
+  const std::filesystem::path path = std::filesystem::weakly_canonical(folder.path / text, none);
   if (none || !std::filesystem::is_regular_file(path, none))
     value.fail("there is no file " + quote(text), "a path relative to the experiment file");
   return path.string();
 }
 
+/// Rows of a file of numbers.
+std::vector<std::vector<double>> read_numbers(const YamlValue& value, Folder& folder, int columns = 0) {
+  folder.number_files.push_back(existing_file(value, folder));
+  return read_number_file(folder.number_files.back(), columns);
+}
+
 /// A number, a list of numbers or the name of a text file of numbers.
-std::vector<double> read_values(const YamlValue& value, const std::filesystem::path& folder) {
+std::vector<double> read_values(const YamlValue& value, Folder& folder) {
   if (value.is_number()) return {value.number()};
   if (value.is_map()) value.fail("is a map", "a number, a list of numbers or a text file");
   std::vector<double> values;
   if (value.is_list()) {
     values = value.numbers();
   } else {
-    for (const auto& row : read_number_file(existing_file(value, folder)))
-      values.insert(values.end(), row.begin(), row.end());
+    for (const auto& row : read_numbers(value, folder)) values.insert(values.end(), row.begin(), row.end());
   }
   if (values.empty()) value.fail("holds no number", "at least one");
   return values;
@@ -73,7 +84,7 @@ std::vector<double> read_centers(const YamlValue& value) {
   return centers;
 }
 
-GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder) {
+GateSpec read_gates(const YamlValue& value, Folder& folder) {
   YamlMap map = value.map();
   GateSpec gates;
   constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar, GateKind::truncated_gaussian,
@@ -91,8 +102,7 @@ GateSpec read_gates(const YamlValue& value, const std::filesystem::path& folder)
   if (gates.kind == GateKind::truncated_gaussian) gates.half_width = positive("half_width");
   if (gates.kind == GateKind::tabulated) {
     if (const auto file = map.find("file")) {
-      const std::string path = existing_file(*file, folder);
-      for (const auto& row : read_number_file(path, 2)) {
+      for (const auto& row : read_numbers(*file, folder, 2)) {
         gates.offsets.push_back(row[0]);
         gates.values.push_back(row[1]);
       }
@@ -155,7 +165,7 @@ void read_pivot(const YamlValue& value, ParameterSpec& spec) {
   }
 }
 
-ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path& folder, bool target_required) {
+ParameterSpec read_parameter(const YamlValue& value, Folder& folder, bool target_required) {
   YamlMap map = value.map();
   ParameterSpec spec;
   spec.where.emplace("", value);
@@ -216,7 +226,7 @@ ParameterSpec read_parameter(const YamlValue& value, const std::filesystem::path
   return spec;
 }
 
-void read_target(const YamlValue& value, const std::filesystem::path& folder, TargetSpec& target) {
+void read_target(const YamlValue& value, const Folder& folder, TargetSpec& target) {
   YamlMap map = value.map();
   if (const auto images = map.find("images")) {
     target.images = existing_file(*images, folder);
@@ -320,6 +330,14 @@ void read_settings(YamlMap& map, Experiment& experiment) {
   }
   if (const auto value = map.find("loss")) experiment.loss = read_loss(*value);
   if (const auto value = map.find("optimizer")) experiment.optimizer = read_optimizer(*value);
+  if (const auto value = map.find("output")) {
+    YamlMap output = value->map();
+    if (const auto geometry = output.find("geometry"))
+      experiment.output.geometry = static_cast<GeometryFormat>(geometry->choice({"ply", "obj", "none"}));
+    if (const auto every = output.find("every"))
+      experiment.output.every = static_cast<int>(every->integer(0, std::numeric_limits<int>::max()));
+    output.reject_unknown();
+  }
   if (const auto seed = map.find("seed"))
     experiment.seed = static_cast<std::uint64_t>(seed->integer(0, std::numeric_limits<long long>::max()));
 }
@@ -376,7 +394,7 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
   YamlMap map = root.map();
   Experiment experiment;
   experiment.file = std::filesystem::absolute(file).string();
-  const std::filesystem::path folder = std::filesystem::absolute(file).parent_path();
+  Folder folder{std::filesystem::absolute(file).parent_path(), {}};
   experiment.name = file_name(map.require("name"));
   experiment.scene = existing_file(map.require("scene"), folder);
   if (const auto resolution = map.find("resolution")) experiment.resolution = read_resolution(*resolution);
@@ -394,6 +412,7 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
     }
   }
   read_settings(map, experiment);
+  experiment.number_files = folder.number_files;
   for (const ParameterSpec& spec : experiment.parameters)
     if (spec.diffusion > 0 && experiment.optimizer.method != OptimizerMethod::adam)
       spec.fail("smoothing", "diffusion works with the method adam alone", "slopes for the other methods");

@@ -12,7 +12,7 @@
 //   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);
 //     lbfgs: inner_iterations 5
 //   target: samples 4096, seed 7, max_bounces as above, noise none     seed 1
-//   resolution: the camera's
+//   resolution: the camera's           output: geometry ply, every 0
 #pragma once
 #include <array>
 #include <cmath>
@@ -156,10 +156,19 @@ struct OptimizerSpec {
   int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
 };
 
+enum class GeometryFormat { ply, obj, none };
+
+/// What a run writes besides images and tables: see geometry_files.h.
+struct OutputSpec {
+  GeometryFormat geometry = GeometryFormat::ply;
+  int every = 0;  ///< meshes of every so many iterations besides the first and the last; 0: of none
+};
+
 struct Experiment {
   std::string file;  ///< absolute path, for messages
   std::string name;
   std::string scene;  ///< absolute path
+  std::vector<std::string> number_files;  ///< absolute paths of the files that gates and parameters were read from
   /// Pixels, {width, height}, in place of the scene's; {0, 0}: as the scene says. The field of view stays across the
   /// width.
   std::array<int, 2> resolution{0, 0};
@@ -172,6 +181,7 @@ struct Experiment {
   GradientSpec gradient;
   LossSpec loss;
   OptimizerSpec optimizer;
+  OutputSpec output;
   std::uint64_t seed = 1;
 };
 

@@ -136,6 +136,9 @@ std::string resolved_yaml(const Experiment& e, const std::string& folder) {
     fmt::format_to(out, "  decay: {{start: {}, half_life: {}}}\n", optimizer.decay.start, optimizer.decay.half_life);
   if (optimizer.method == OptimizerMethod::lbfgs)
     fmt::format_to(out, "  inner_iterations: {}\n", optimizer.inner_iterations);
+  constexpr const char* kGeometry[] = {"ply", "obj", "none"};
+  fmt::format_to(out, "output:\n  geometry: {}\n  every: {}\n", kGeometry[static_cast<int>(e.output.geometry)],
+                 e.output.every);
   fmt::format_to(out, "seed: {}\n", e.seed);
   return text;
 }

@@ -1,15 +1,13 @@
-// Small helpers for files that must survive a kill at any moment, and for numbers written without loss.
+// Small helpers for output folders and for numbers written without loss; files are written by core/base/file.h.
 #pragma once
 #include <optional>
 #include <string>
 
+#include "core/base/file.h"
+
 namespace isochron {
 
-/// Replaces `file` by `text` so that a reader sees the old text or the new one, also after a crash: temporary
-/// file, fsync, rename, fsync of the folder. Throws std::runtime_error.
-void write_file_atomically(const std::string& file, const std::string& text);
-
-/// Whole content of a file; empty when it cannot be read.
+/// Whole content of a file; empty when it cannot be read or is no regular file.
 std::optional<std::string> read_file(const std::string& file);
 
 /// Makes the folder (and its parents) and checks that files can be made in it. Throws InputError.

@@ -4,16 +4,20 @@
 
 #include <charconv>
 #include <cmath>
-#include <fstream>
+#include <optional>
+#include <sstream>
 #include <string_view>
 
+#include "core/base/file.h"
 #include "core/math/error.h"
 
 namespace isochron {
 
 std::vector<std::vector<double>> read_number_file(const std::string& file, int columns) {
-  std::ifstream in(file);
-  if (!in) throw InputError(fmt::format("{}: cannot be read", file));
+  std::string problem;
+  const std::optional<std::string> contents = read_regular_file(file, problem);
+  if (!contents) throw InputError(fmt::format("{}: {}", file, problem));
+  std::istringstream in(*contents);
   constexpr std::string_view kSeparators = " \t,\r";
   std::vector<std::vector<double>> rows;
   std::string line;

@@ -320,6 +320,13 @@ Vec3 Parameters::move(int shape_index, int v, const std::vector<CarriedPoint>& p
   return p;
 }
 
+std::vector<int> Parameters::moving_shapes() const {
+  std::vector<int> shapes;
+  for (std::size_t s = 0; s < motions_.size(); ++s)
+    if (!motions_[s].empty()) shapes.push_back(static_cast<int>(s));
+  return shapes;
+}
+
 Scene Parameters::apply(const std::vector<double>& theta) const {
   Scene scene = scene_;
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {

@@ -67,6 +67,10 @@ class Parameters {
   const std::vector<double>& lower() const { return lower_; }  ///< -infinity where there is none
   const std::vector<double>& upper() const { return upper_; }
 
+  const Scene& scene() const { return scene_; }  ///< as loaded
+  /// Indices of the shapes that parameters move, as a whole or by their vertices.
+  std::vector<int> moving_shapes() const;
+
   /// The loaded scene with theta applied.
   Scene apply(const std::vector<double>& theta) const;
 

@@ -11,6 +11,8 @@
 #include "core/math/error.h"
 #include "optim/checkpoint.h"
 #include "optim/files.h"
+#include "optim/geometry_files.h"
+#include "optim/inputs.h"
 #include "optim/log.h"
 #include "optim/loss.h"
 #include "optim/memory.h"
@@ -69,7 +71,13 @@ class Run {
   LoopResult optimise() {
     const OptimizerSpec& spec = problem_.experiment().optimizer;
     const RenderedObjective objective(problem_, target_, [this] { poll(); });
+<<<<<<< HEAD
     const auto optimizer = make_optimizer(spec, problem_.preconditioner(), parameters_.scales());
+=======
+    const auto optimizer = make_optimizer(spec, problem_.preconditioner());
+    const GeometryFiles geometry(options_.folder, problem_.experiment().output, parameters_);
+    if (state_.iteration == 0) geometry.write("target", parameters_.target());
+>>>>>>> folder
     Log log(path("log.csv"), parameters_, state_.iteration);
     GatedImage final_image;
     const Clock::time_point call_start = Clock::now();
@@ -87,13 +95,23 @@ class Run {
                parameters_.distance_to_target(theta),
                scaled_norm(now.gradient)};
       if (last_.iteration == 0) {
+<<<<<<< HEAD
         write_exr(path("initial.exr"), now.image, notes_);
+=======
+        write_exr(path("initial.exr"), now.image);
+        geometry.write("initial", theta);
+>>>>>>> folder
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
           options_.warning("no light reaches the gates, neither at the target nor at the initial values");
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
+<<<<<<< HEAD
       log.append(last_, theta, now.gradient);
+=======
+      if (!closing) geometry.write_iteration(last_.iteration, theta);
+      log.append(last_, theta);
+>>>>>>> folder
       final_image = now.image;
       if (!closing) report(first, seconds_since(call_start));
     };
@@ -109,7 +127,12 @@ class Run {
       stage.advance();
     };
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
+<<<<<<< HEAD
     write_exr(path("final.exr"), final_image, notes_);
+=======
+    geometry.write("final", state_.theta);
+    write_exr(path("final.exr"), final_image);
+>>>>>>> folder
     return result;
   }
 
@@ -138,26 +161,54 @@ class Run {
 
 }  // namespace
 
-RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
-  const Problem problem(experiment, options.warning);
+namespace {
+
+/// Goes on in a locked folder that holds a run.
+RunStatus go_on(const RunOptions& options, const std::function<void(const std::string&)>& warning_of_scene) {
+  const Problem problem(load_experiment(options.folder + "/experiment.yaml"), warning_of_scene);
   problem.require_parameters();
   require_jacobian_fits(problem);
+<<<<<<< HEAD
   require_memory(problem, run_memory(problem));
   prepare_run_folder(options.folder, options.force, options.warning);
   write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(experiment, options.folder));
+=======
+>>>>>>> folder
   return Run(problem, options).execute();
 }
 
+}  // namespace
+
+RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
+  {
+    const Problem problem(experiment, options.warning);
+    problem.require_parameters();
+    require_jacobian_fits(problem);
+    require_memory(problem, run_memory(problem));
+  }
+  const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
+  const FolderLock lock = prepare_run_folder(options.folder, options.force, options.warning);
+  Experiment copied = experiment;
+  write_inputs(options.folder, inputs, copied);
+  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  // As a resumed run does, so that both see the same to the last bit.
+  return go_on(options, {});
+}
+
 RunStatus resume_run(const RunOptions& options) {
-  const std::string file = options.folder + "/experiment.yaml";
-  if (!std::filesystem::exists(file))
+  if (!std::filesystem::exists(options.folder + "/experiment.yaml"))
     throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
+<<<<<<< HEAD
   const Problem problem(load_experiment(file), options.warning);
   problem.require_parameters();
   require_jacobian_fits(problem);
   require_memory(problem, run_memory(problem));
+=======
+>>>>>>> folder
   make_output_folder(options.folder);
-  return Run(problem, options).execute();
+  const FolderLock lock(options.folder, options.warning);
+  check_inputs(options.folder, options.warning);
+  return go_on(options, options.warning);
 }
 
 }  // namespace isochron

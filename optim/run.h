@@ -1,8 +1,8 @@
 // A run and its folder: the loop of loop.h with files. See checkpoint.h for what survives a kill, log.h for
 // the rows of log.csv.
 //
-// Order of writing: experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before
-// them, in iteration 0, initial.exr), at last final.exr and summary.yaml. Every random number depends on
+// Order of writing: inputs/ (see inputs.h), experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before
+// them, in iteration 0, initial.exr), at last geometry/final_SHAPE, final.exr and summary.yaml. Every random number depends on
 // (seed, iteration, pass) alone and the target is used as target.exr holds it (rounded to float), so a run
 // that was killed anywhere and resumed gives the same bits.
 #pragma once

@@ -1,8 +1,14 @@
 #include "optim/run_folder.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "core/math/error.h"
 #include "optim/files.h"
@@ -16,6 +22,7 @@ void clear_run(const std::string& folder) {
        {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml", "target.exr",
         "initial.exr", "final.exr", "target.png", "initial.png", "final.png", "rmse.png"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
+  for (const char* part : {"inputs", "geometry"}) std::filesystem::remove_all(std::filesystem::path(folder) / part);
 }
 
 /// Renames a folder to the first free of FOLDER.1, FOLDER.2, ...; returns the new name.
@@ -37,16 +44,49 @@ std::string set_aside(const std::string& folder) {
 
 }  // namespace
 
-void prepare_run_folder(const std::string& folder, bool force, const std::function<void(const std::string&)>& warning) {
-  make_output_folder(folder);
-  if (!std::filesystem::exists(folder + "/experiment.yaml")) return;
-  if (force) {
-    clear_run(folder);
+FolderLock::FolderLock(const std::string& folder, const std::function<void(const std::string&)>& warning) {
+  const std::string file = folder + "/.lock";
+  const auto complain = [&] {
+    if (warning)
+      warning(fmt::format("{}: cannot be locked: {}; make sure that nothing else runs in its folder", file,
+                          std::strerror(errno)));
+  };
+  descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) {
+    complain();
     return;
   }
-  const std::string kept = set_aside(folder);
+  int result = 0;
+  do result = ::flock(descriptor_, LOCK_EX | LOCK_NB);
+  while (result != 0 && errno == EINTR);
+  if (result == 0) return;
+  if (errno == EWOULDBLOCK) {
+    ::close(descriptor_);
+    throw InputError(
+        fmt::format("{}: another isochron is running in this folder (allowed: -o for another, or wait)", folder));
+  }
+  complain();
+}
+
+FolderLock::~FolderLock() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+FolderLock::FolderLock(FolderLock&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+FolderLock prepare_run_folder(const std::string& folder, bool force,
+                              const std::function<void(const std::string&)>& warning) {
+  make_output_folder(folder);
+  FolderLock lock(folder, warning);
+  if (!std::filesystem::exists(folder + "/experiment.yaml")) return lock;
+  if (force) {
+    clear_run(folder);
+    return lock;
+  }
+  const std::string kept = set_aside(folder);  // and the lock with it, until this returns
   if (warning) warning(fmt::format("{} held a run already: moved to {}", folder, kept));
   make_output_folder(folder);
+  return FolderLock(folder, warning);
 }
 
 }  // namespace isochron

@@ -15,8 +15,8 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "core/base/file.h"
 #include "core/image/exr_check.h"
-#include "core/image/file.h"
 #include "core/image/image.h"
 #include "core/math/error.h"
 

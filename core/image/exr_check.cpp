@@ -2,14 +2,14 @@
 
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <sstream>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
+#include <utility>
 
+#include "core/base/file.h"
 #include "core/math/error.h"
 
 namespace isochron {
@@ -63,9 +63,10 @@ bool is_list_of_channels(std::string_view value) {
 }  // namespace
 
 std::string read_checked_exr(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw InputError(file + ": cannot be opened: " + std::strerror(errno));
-  std::string contents = (std::ostringstream() << stream.rdbuf()).str();
+  std::string problem;
+  std::optional<std::string> read = read_regular_file(file, problem);
+  if (!read) throw InputError(file + ": " + problem);
+  std::string contents = std::move(*read);
 
   constexpr std::int32_t kMagic = 20000630, kTiled = 0x200, kDeep = 0x800, kParts = 0x1000;
   Bytes bytes(contents);

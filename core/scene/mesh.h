@@ -16,8 +16,8 @@ struct Mesh {
 };
 
 /// Reads OBJ, OFF, PLY (text or binary) or STL (text or binary), chosen by the file's extension. Vertices and
-/// faces are those of the file, in its order, manifold or not; polygons become fans around their first
-/// corner, which is right where they are convex, and triangles with a corner twice are left out. Of STL,
+/// faces are those of the file, in its order, manifold or not; polygons are
+/// cut into triangles, concave ones too (see cut_polygon), and one that crosses itself is refused. Of STL,
 /// vertices at equal positions are one already. Coordinates are rounded to float. Throws InputError
 /// `FILE[:LINE]: what is wrong`.
 Mesh read_mesh(const std::string& file);

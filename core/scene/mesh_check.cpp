@@ -19,7 +19,7 @@ using Point = std::array<float, 3>;
 CheckedMeshFile check_obj(const std::string& file, const std::string& contents) {
   MeshText text(file, contents, '#');
   long long vertices = 0, highest = 0;  // faces may refer to vertices further down
-  std::size_t triangles = 0;
+  std::size_t faces = 0;
   int highest_line = 0;
   std::vector<int> corners;
   while (text.next()) {
@@ -39,7 +39,7 @@ CheckedMeshFile check_obj(const std::string& file, const std::string& contents) 
         if (index > highest) highest = index, highest_line = text.line();
         corners.push_back(static_cast<int>(index > 0 ? index - 1 : vertices + index));
       }
-      triangles += text.triangles(corners);
+      faces += text.check_face(corners);
     } else {
       text.skip_line();
     }
@@ -47,7 +47,7 @@ CheckedMeshFile check_obj(const std::string& file, const std::string& contents) 
   if (highest > vertices)
     throw InputError(
         fmt::format("{}:{}: there is no vertex {} (the file has {})", file, highest_line, highest, vertices));
-  return text.found(vertices, triangles);
+  return text.found(vertices, faces);
 }
 
 CheckedMeshFile check_off(const std::string& file, const std::string& contents) {
@@ -61,9 +61,9 @@ CheckedMeshFile check_off(const std::string& file, const std::string& contents) 
   const long long vertices = text.count(), faces = text.count();
   text.copy = fmt::format("OFF\n{} {} 0", vertices, faces);
   for (long long v = 0; v < vertices; ++v) text.require_next(), text.point();
-  std::size_t triangles = 0;
-  for (long long f = 0; f < faces; ++f) text.require_next(), triangles += text.triangles(text.face(vertices));
-  return text.found(vertices, triangles);
+  std::size_t kept = 0;
+  for (long long f = 0; f < faces; ++f) text.require_next(), kept += text.check_face(text.face(vertices));
+  return text.found(vertices, kept);
 }
 
 /// OpenMesh leaves out facets with equal corners.
@@ -75,7 +75,7 @@ CheckedMeshFile check_stl(const std::string& file, std::string contents) {
   static_assert(std::endian::native == std::endian::little, "STL files are little-endian");
   constexpr std::size_t kHeader = 84, kFacet = 50, kNormal = 12;
   Point points[3];
-  std::size_t triangles = 0;
+  std::size_t kept = 0;
   // A text file can begin like a binary one and the reverse; the size tells.
   std::uint32_t facets = 0;
   if (contents.size() >= kHeader) std::memcpy(&facets, contents.data() + kHeader - 4, sizeof facets);
@@ -86,9 +86,9 @@ CheckedMeshFile check_stl(const std::string& file, std::string contents) {
         if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2]))
           throw InputError(fmt::format("{}: facet {} has a coordinate that is not a finite number", file, f + 1));
       }
-      triangles += is_triangle(points);
+      kept += is_triangle(points);
     }
-    return {std::move(contents), true, std::nullopt, triangles};
+    return {std::move(contents), true, std::nullopt, kept};
   }
   MeshText text(file, contents, '\0');
   text.require_next();
@@ -100,12 +100,12 @@ CheckedMeshFile check_stl(const std::string& file, std::string contents) {
       points[corners++ % 3] = text.point();
     } else if (keyword == "endloop") {
       if (corners != 3) text.fail(fmt::format("a facet of {} vertices (three)", corners));
-      triangles += is_triangle(points);
+      kept += is_triangle(points);
       corners = 0;
     }
   }
   if (corners != 0) text.fail("the file ends within a facet");
-  return text.found(std::nullopt, triangles);
+  return text.found(std::nullopt, kept);
 }
 
 }  // namespace
@@ -117,11 +117,9 @@ CheckedMeshFile check_mesh_file(const std::string& file, const std::string& exte
                                : check_stl(file, std::move(contents));
 }
 
-void add_fan(const std::vector<int>& corners, std::vector<std::array<int, 3>>& triangles) {
-  for (std::size_t k = 2; k < corners.size(); ++k) {
-    const int a = corners[0], b = corners[k - 1], c = corners[k];
-    if (a != b && b != c && c != a) triangles.push_back({a, b, c});
-  }
+bool has_three_corners(const std::vector<int>& vertices) {
+  const auto other = std::find_if(vertices.begin(), vertices.end(), [&](int v) { return v != vertices[0]; });
+  return std::any_of(other, vertices.end(), [&](int v) { return v != vertices[0] && v != *other; });
 }
 
 }  // namespace isochron

@@ -6,16 +6,15 @@
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <sstream>
 
+#include "core/base/file.h"
 #include "core/math/error.h"
 #include "core/scene/mesh.h"
+#include "core/scene/polygon.h"
 
 namespace isochron {
 namespace {
@@ -29,17 +28,21 @@ class Importer final : public OpenMesh::IO::ImporterT<HalfEdgeMesh> {
  public:
   explicit Importer(HalfEdgeMesh& vertices) : ImporterT(vertices) {}
 
-  OpenMesh::FaceHandle add_face(const VHandles& corners) override {
-    corners_.clear();
-    for (const OpenMesh::VertexHandle v : corners) corners_.push_back(v.idx());
-    add_fan(corners_, triangles);
+  OpenMesh::FaceHandle add_face(const VHandles& polygon) override {
+    face_.clear();
+    for (const OpenMesh::VertexHandle v : polygon) face_.push_back(v.idx());
+    if (has_three_corners(face_)) {
+      corners.insert(corners.end(), face_.begin(), face_.end());
+      ends.push_back(corners.size());
+    }
     return OpenMesh::FaceHandle();  // none to attach colors and the like to
   }
 
-  std::vector<std::array<int, 3>> triangles;
+  std::vector<int> corners;       ///< of all polygons
+  std::vector<std::size_t> ends;  ///< in `corners`, of each polygon
 
  private:
-  std::vector<int> corners_;
+  std::vector<int> face_;
 };
 
 /// Keeps what OpenMesh prints from the user, who gets one message instead.
@@ -56,14 +59,10 @@ class Silence {
 };
 
 std::string read_file(const std::string& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) throw InputError(file + ": is a folder");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw InputError(file + ": cannot be opened: " + std::strerror(errno));
-  std::ostringstream buffer;
-  if (stream.peek() != std::ifstream::traits_type::eof()) buffer << stream.rdbuf();
-  if (stream.bad() || !buffer) throw InputError(file + ": cannot be read");
-  return std::move(buffer).str();
+  std::string problem;
+  std::optional<std::string> contents = read_regular_file(file, problem);
+  if (!contents) throw InputError(file + ": " + problem);
+  return std::move(*contents);
 }
 
 }  // namespace
@@ -76,7 +75,7 @@ Mesh read_mesh(const std::string& file) {
     throw InputError(
         fmt::format("{}: {} is not a kind of mesh (allowed: .obj, .ply, .off, .stl)", file, quote(extension)));
   CheckedMeshFile checked = check_mesh_file(file, extension, read_file(file));
-  if (checked.triangles == 0) throw InputError(file + ": has no faces");
+  if (checked.faces == 0) throw InputError(file + ": has no faces");
 
   HalfEdgeMesh vertices;
   Importer importer(vertices);
@@ -89,15 +88,14 @@ Mesh read_mesh(const std::string& file) {
     read = OpenMesh::IO::IOManager().read(stream, extension, importer, options);
   }
   if (!read || checked.vertices.value_or(vertices.n_vertices()) != vertices.n_vertices() ||
-      checked.triangles != importer.triangles.size()) {
+      checked.faces != importer.ends.size()) {
     std::transform(extension.begin(), extension.end(), extension.begin(),
                    [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
-    throw InputError(fmt::format("{}: cannot be read as {}: OpenMesh finds {} vertices and {} triangles there", file,
-                                 extension.substr(1), vertices.n_vertices(), importer.triangles.size()));
+    throw InputError(fmt::format("{}: cannot be read as {}: OpenMesh finds {} vertices and {} faces there", file,
+                                 extension.substr(1), vertices.n_vertices(), importer.ends.size()));
   }
 
   Mesh mesh;
-  mesh.faces = std::move(importer.triangles);
   mesh.positions.reserve(vertices.n_vertices());
   for (const OpenMesh::VertexHandle v : vertices.vertices()) {
     const OpenMesh::Vec3f& p = vertices.point(v);
@@ -105,10 +103,21 @@ Mesh read_mesh(const std::string& file) {
       throw InputError(fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, v.idx()));
     mesh.positions.push_back({p[0], p[1], p[2]});
   }
-  for (const auto& face : mesh.faces) {
-    for (const int v : face) {
-      if (v < 0 || v >= static_cast<int>(mesh.positions.size()))
-        throw InputError(fmt::format("{}: there is no vertex {} (0 to {})", file, v, mesh.positions.size() - 1));
+  for (const int v : importer.corners) {
+    if (v < 0 || v >= static_cast<int>(mesh.positions.size()))
+      throw InputError(fmt::format("{}: there is no vertex {} (0 to {})", file, v, mesh.positions.size() - 1));
+  }
+  mesh.faces.reserve(importer.ends.size());
+  std::vector<int> corners;
+  auto begin = importer.corners.begin();
+  for (std::size_t f = 0; f < importer.ends.size(); ++f) {
+    const auto end = importer.corners.begin() + static_cast<std::ptrdiff_t>(importer.ends[f]);
+    corners.assign(begin, end);
+    begin = end;
+    if (const std::string wrong = cut_polygon(mesh.positions, corners, mesh.faces); !wrong.empty()) {
+      const Vec3& first = mesh.positions[corners[0]];
+      throw InputError(fmt::format("{}: the face of {} corners that begins at ({:.6g}, {:.6g}, {:.6g}) {}", file,
+                                   corners.size(), first.x, first.y, first.z, wrong));
     }
   }
   return mesh;

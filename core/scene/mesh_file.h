@@ -2,7 +2,6 @@
 // wrong without saying so: it takes what is not a number for zero, skips vertices, which shifts the indices
 // of those behind, passes on indices of vertices that do not exist, and takes colors or comments for data.
 #pragma once
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +13,7 @@ struct CheckedMeshFile {
   std::string contents;                 ///< of text and PLY only what OpenMesh has to see
   bool binary = false;                  ///< of PLY or STL
   std::optional<std::size_t> vertices;  ///< not known of STL: OpenMesh joins equal ones
-  std::size_t triangles = 0;            ///< as of `add_fan`
+  std::size_t faces = 0;                ///< with three different corners; OpenMesh may drop others
 };
 
 /// Checks that the file holds as much as it declares, that every coordinate is a finite float, and every
@@ -22,7 +21,7 @@ struct CheckedMeshFile {
 /// what is wrong`, with lines counted from one.
 CheckedMeshFile check_mesh_file(const std::string& file, const std::string& extension, std::string contents);
 
-/// Appends the fan of triangles around a polygon's first corner, but for those that have a corner twice.
-void add_fan(const std::vector<int>& corners, std::vector<std::array<int, 3>>& triangles);
+/// Whether three of the vertices differ.
+bool has_three_corners(const std::vector<int>& vertices);
 
 }  // namespace isochron

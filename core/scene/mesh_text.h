@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
@@ -88,11 +89,9 @@ class MeshText {
     }
     return corners;
   }
-  std::size_t triangles(const std::vector<int>& corners) {
+  std::size_t check_face(const std::vector<int>& corners) {  ///< 1 where it counts in CheckedMeshFile::faces, else 0
     if (corners.size() < 3) fail(fmt::format("a face of {} vertices (at least three)", corners.size()));
-    fan_.clear();
-    add_fan(corners, fan_);
-    return fan_.size();
+    return has_three_corners(corners);
   }
   void rewrite(std::string_view word, std::string_view by) {  ///< of the copy's last word
     copy.resize(copy.size() - word.size());
@@ -104,8 +103,8 @@ class MeshText {
   [[noreturn]] void fail(const std::string& what) const {
     throw InputError(fmt::format("{}:{}: {}", file_, line_, what));
   }
-  CheckedMeshFile found(std::optional<std::size_t> vertices, std::size_t triangles) {
-    return {std::move(copy) + '\n', false, vertices, triangles};
+  CheckedMeshFile found(std::optional<std::size_t> vertices, std::size_t faces) {
+    return {std::move(copy) + '\n', false, vertices, faces};
   }
 
   std::string copy;
@@ -118,7 +117,6 @@ class MeshText {
   char comment_;
   int line_ = 0;
   std::size_t line_start_ = 0;  // in the copy
-  std::vector<std::array<int, 3>> fan_;
 };
 
 /// PLY, text or binary.

@@ -6,16 +6,13 @@
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <numeric>
 #include <sstream>
 #include <string_view>
 
+#include "core/base/file.h"
 #include "core/math/error.h"
 
 namespace isochron {
@@ -118,14 +115,10 @@ YAML::Node parse_document(const std::string& source, const std::string& text) {
 }
 
 std::string read_text(const std::string& file) {
-  std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) throw InputError(file + ":1:1: file: is a folder (a YAML file)");
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream) throw InputError(file + ":1:1: file: cannot be opened: " + std::strerror(errno));
-  if (stream.peek() != std::ifstream::traits_type::eof()) text << stream.rdbuf();
-  if (stream.bad() || !text) throw InputError(file + ":1:1: file: cannot be read");
-  return text.str();
+  std::string problem;
+  const std::optional<std::string> text = read_regular_file(file, problem);
+  if (!text) throw InputError(file + ":1:1: file: " + problem + (problem.starts_with("is ") ? " (a YAML file)" : ""));
+  return *text;
 }
 
 /// One step of an override's path: a key, or an index into a list.

@@ -1,6 +1,8 @@
 // The commands: what they write, what they say of wrong input.
 #include "tests/app/program.h"
 
+#include <sys/stat.h>
+
 #include <cmath>
 
 #include "core/image/image.h"
@@ -45,6 +47,28 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
     EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
   }
   EXPECT_FALSE(folder_.has("out/experiment.yaml"));
+}
+
+TEST_F(Program, AFileThatCannotBeReplacedIsAMistakeInTheInput) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  std::filesystem::create_directories(out + "/render.exr");
+  const Result result = run({"render", file, "-o", out, "--no-plots", "--quiet"});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_EQ(result.errors, "isochron: error: " + out + "/render.exr: cannot be written: Is a directory\n");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(out), {}), 1);  // nothing beside it
+}
+
+TEST_F(Program, APipeIsNoExperiment) {
+  const std::string pipe = folder_.file("pipe.yaml");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  bool waits = false;
+  const auto start = std::chrono::steady_clock::now();
+  const Result result = run({"render", pipe}, SIGKILL, [&] {
+    return waits = std::chrono::steady_clock::now() - start > std::chrono::seconds(20);
+  });
+  EXPECT_FALSE(waits);
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.errors.find("is a pipe or a device"), std::string::npos) << result.errors;
 }
 
 TEST_F(Program, HelpShowsExamples) {

@@ -1,7 +1,8 @@
-#include "core/image/file.h"
+#include "core/base/file.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 
 #include <csignal>
 
@@ -49,7 +50,13 @@ TEST(WriteFileAtomically, FailureLeavesTheOldFileAndNothingElse) {
   std::string message;
   {
     const FileSizeLimit limit(4096);
-    message = error_of([&] { write_file_atomically(folder.path("f"), std::string(10000, 'x')); });
+    try {
+      write_file_atomically(folder.path("f"), std::string(10000, 'x'));
+    } catch (const InputError&) {
+      FAIL() << "a full disk is no mistake in the input";
+    } catch (const std::runtime_error& error) {
+      message = error.what();
+    }
   }
   EXPECT_EQ(message, folder.path("f") + ": cannot be written: File too large");
   EXPECT_EQ(folder.read("f"), "old");
@@ -64,6 +71,38 @@ TEST(WriteFileAtomically, NamesPathAndReason) {
   EXPECT_EQ(error_of([&] { write_file_atomically(folder.path("d"), "x"); }),
             folder.path("d") + ": cannot be written: Is a directory");
   EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(ReadRegularFile, ReadsWholeFiles) {
+  TemporaryFolder folder;
+  const std::string large = std::string(300'000, 'x') + std::string("\0\n", 2);
+  folder.write("f", large);
+  folder.write("empty", "");
+  std::string problem;
+  EXPECT_EQ(read_regular_file(folder.path("f"), problem), large);
+  EXPECT_EQ(read_regular_file(folder.path("empty"), problem), "");
+  EXPECT_GT(read_regular_file("/proc/self/stat", problem).value_or("").size(), 0u);  // of no size beforehand
+}
+
+TEST(ReadRegularFile, NeverWaits) {
+  TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo(folder.path("pipe").c_str(), 0600), 0);
+  std::string problem;
+  for (const std::string& file : {folder.path("pipe"), std::string("/dev/null")}) {
+    EXPECT_FALSE(read_regular_file(file, problem));
+    EXPECT_EQ(problem, "is a pipe or a device, not a regular file");
+  }
+  EXPECT_FALSE(read_regular_file(folder.path("."), problem));
+  EXPECT_EQ(problem, "is a folder");
+  EXPECT_FALSE(read_regular_file(folder.path("none"), problem));
+  EXPECT_EQ(problem, "cannot be opened: No such file or directory");
+}
+
+TEST(Checksum, IsFnv1a) {
+  // Values of the algorithm's authors.
+  EXPECT_EQ(checksum(""), "cbf29ce484222325");
+  EXPECT_EQ(checksum("a"), "af63dc4c8601ec8c");
+  EXPECT_EQ(checksum("foobar"), "85944171f73967e8");
 }
 
 }  // namespace

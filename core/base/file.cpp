@@ -1,0 +1,122 @@
+#include "core/base/file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <iterator>
+#include <stdexcept>
+
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+/// Opens a file that did not exist before, in the folder of `path`.
+int create_beside(const std::string& path, std::string& name) {
+  static std::atomic<unsigned> counter{0};
+  int descriptor = -1;
+  do {
+    name = fmt::format("{}.{}-{}.tmp", path, ::getpid(), counter++);
+    descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  } while (descriptor < 0 && errno == EEXIST);
+  return descriptor;
+}
+
+/// 0, or the errno of what failed.
+int write_all(int descriptor, const std::string& contents) {
+  for (std::size_t done = 0; done < contents.size();) {
+    const ssize_t written = ::write(descriptor, contents.data() + done, contents.size() - done);
+    if (written < 0 && errno != EINTR) return errno;
+    if (written > 0) done += static_cast<std::size_t>(written);
+  }
+  return ::fsync(descriptor) == 0 ? 0 : errno;
+}
+
+/// Makes the rename itself durable. Not every file system can; the file is whole either way.
+void flush_folder(const std::string& path) {
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  const int descriptor = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
+}
+
+/// The path is at fault, as given by the user, rather than a device that is full or broken.
+bool is_fault_of_path(int error) {
+  constexpr int kFaults[] = {EACCES, EPERM,        EROFS,  ENOENT, ENOTDIR, EISDIR,
+                             ELOOP,  ENAMETOOLONG, EINVAL, EEXIST, EBUSY,   ENOTEMPTY};
+  return std::find(std::begin(kFaults), std::end(kFaults), error) != std::end(kFaults);
+}
+
+[[noreturn]] void fail_to_write(const std::string& path, int error) {
+  const std::string message = fmt::format("{}: cannot be written: {}", path, std::strerror(error));
+  if (is_fault_of_path(error)) throw InputError(message);
+  throw std::runtime_error(message);
+}
+
+}  // namespace
+
+void write_file_atomically(const std::string& path, const std::string& contents) {
+  std::string temporary;
+  const int descriptor = create_beside(path, temporary);
+  if (descriptor < 0) fail_to_write(path, errno);
+  int error = write_all(descriptor, contents);
+  if (::close(descriptor) != 0 && error == 0) error = errno;
+  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) {
+    ::unlink(temporary.c_str());
+    fail_to_write(path, error);
+  }
+  flush_folder(path);
+}
+
+std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {
+  // Without O_NONBLOCK, opening a named pipe would wait for a writer.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) {
+    problem = fmt::format("cannot be opened: {}", std::strerror(errno));
+    return std::nullopt;
+  }
+  struct stat status = {};
+  std::string contents;
+  problem.clear();
+  if (::fstat(descriptor, &status) != 0) {
+    problem = fmt::format("cannot be read: {}", std::strerror(errno));
+  } else if (S_ISDIR(status.st_mode)) {
+    problem = "is a folder";
+  } else if (!S_ISREG(status.st_mode)) {
+    problem = "is a pipe or a device, not a regular file";
+  } else {
+    contents.resize(static_cast<std::size_t>(status.st_size));
+    std::size_t done = 0;
+    for (;;) {  // the file may be longer than it was, or be one of /proc, which have no size
+      if (done == contents.size()) contents.resize(done + (1 << 16));
+      const ssize_t n = ::read(descriptor, contents.data() + done, contents.size() - done);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) problem = fmt::format("cannot be read: {}", std::strerror(errno));
+      if (n <= 0) break;
+      done += static_cast<std::size_t>(n);
+    }
+    contents.resize(done);
+  }
+  ::close(descriptor);
+  if (!problem.empty()) return std::nullopt;
+  return contents;
+}
+
+std::string checksum(std::string_view contents) {
+  std::uint64_t hash = 0xcbf29ce484222325u;
+  for (const unsigned char c : contents) hash = (hash ^ c) * 0x100000001b3u;
+  return fmt::format("{:016x}", hash);
+}
+
+}  // namespace isochron

@@ -1,0 +1,71 @@
+#include "core/scene/scene_copy.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include "core/base/file.h"
+#include "core/math/error.h"
+
+namespace isochron {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool lies_below(const fs::path& relative) {
+  return relative.is_relative() && !relative.empty() && *relative.begin() != "..";
+}
+
+}  // namespace
+
+FileCopy copy_of_file(const std::string& original, const std::string& name) {
+  std::string problem;
+  std::optional<std::string> contents = read_regular_file(original, problem);
+  if (!contents) throw InputError(original + ": " + problem);
+  std::string sum = checksum(*contents);
+  return {original, name, std::move(*contents), std::move(sum)};
+}
+
+std::string free_name(const std::string& name, const std::vector<FileCopy>& taken) {
+  const fs::path path(name);
+  std::string candidate = name;
+  for (int i = 2; std::any_of(taken.begin(), taken.end(), [&](const FileCopy& f) { return f.name == candidate; }); ++i)
+    candidate =
+        (path.parent_path() / fmt::format("{}_{}{}", path.stem().string(), i, path.extension().string())).string();
+  return candidate;
+}
+
+std::vector<FileCopy> copy_of_scene(const std::string& file) {
+  std::vector<FileCopy> copies{copy_of_file(file, fs::path(file).filename().string())};
+  YAML::Node scene = YAML::Load(copies[0].contents);
+  bool changed = false;
+  for (YAML::Node shape : scene["shapes"]) {
+    const std::string text = shape["file"].Scalar();
+    const std::string original = (fs::path(file).parent_path() / text).lexically_normal().string();
+    const auto known =
+        std::find_if(copies.begin() + 1, copies.end(), [&](const FileCopy& copy) { return copy.original == original; });
+    const fs::path normal = fs::path(text).lexically_normal();
+    std::string name;
+    if (known != copies.end()) {
+      name = known->name;
+    } else {
+      name = lies_below(normal) ? normal.string() : "elsewhere/" + fs::path(original).filename().string();
+      name = free_name(name, copies);
+      copies.push_back(copy_of_file(original, name));
+    }
+    if (name == normal) continue;
+    shape["file"] = name;
+    changed = true;
+  }
+  if (changed) {
+    YAML::Emitter text;
+    text << scene;
+    copies[0].contents = std::string("# Written anew, as its meshes have moved.\n") + text.c_str() + "\n";
+  }
+  return copies;
+}
+
+}  // namespace isochron

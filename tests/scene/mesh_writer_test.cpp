@@ -1,0 +1,49 @@
+#include "core/scene/mesh_writer.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "core/scene/mesh.h"
+#include "tests/scene/temporary_folder.h"
+
+namespace isochron {
+namespace {
+
+/// Two shapes, of which the second is looked at; its coordinates have more digits than a float.
+Scene two_shapes() {
+  Scene scene;
+  scene.positions = {{9, 9, 9}, {0.1, 1.0 / 3, -2e-7}, {1, 0, 0}, {0, 1e5 + 1e-9, 0}, {1, 1, 0}};
+  scene.triangles = {{{0, 0, 0}, 0}, {{1, 2, 3}, 1}, {{2, 4, 3}, 1}};
+  scene.shapes.resize(2);
+  scene.shapes[1].first_vertex = 1, scene.shapes[1].vertex_count = 4;
+  scene.shapes[1].first_triangle = 1, scene.shapes[1].triangle_count = 2;
+  return scene;
+}
+
+TEST(MeshWriter, BothKindsAreReadBackInTheSameOrderRoundedToFloat) {
+  const Scene scene = two_shapes();
+  TemporaryFolder folder;
+  folder.write("m.ply", to_ply(scene, scene.shapes[1]));
+  folder.write("m.obj", to_obj(scene, scene.shapes[1]));
+  for (const char* name : {"m.ply", "m.obj"}) {
+    const Mesh mesh = read_mesh(folder.path(name));
+    ASSERT_EQ(mesh.positions.size(), 4u) << name;
+    for (int v = 0; v < 4; ++v)
+      for (int axis = 0; axis < 3; ++axis)
+        EXPECT_EQ(mesh.positions[v][axis], static_cast<double>(static_cast<float>(scene.positions[v + 1][axis])));
+    EXPECT_EQ(mesh.faces, (std::vector<std::array<int, 3>>{{0, 1, 2}, {1, 3, 2}})) << name;
+  }
+}
+
+TEST(MeshWriter, FilesHoldEveryDigit) {
+  const Scene scene = two_shapes();
+  const std::string ply = to_ply(scene, scene.shapes[1]), obj = to_obj(scene, scene.shapes[1]);
+  double value = 0;
+  std::memcpy(&value, ply.data() + ply.find("end_header\n") + 11 + sizeof value, sizeof value);
+  EXPECT_EQ(value, 1.0 / 3);
+  EXPECT_EQ(obj.substr(0, obj.find('\n')), "v 0.1 0.3333333333333333 -2e-07");
+}
+
+}  // namespace
+}  // namespace isochron
