@@ -16,7 +16,7 @@ namespace {
 constexpr int kMostColumns = 16;
 
 std::string header(const Parameters& parameters) {
-  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm";
+  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,loss_noise";
   for (const Parameters::Block& block : parameters.blocks()) {
     if (block.count > kMostColumns) {
       text += fmt::format(",{}.norm", block.name);
@@ -45,8 +45,9 @@ Log::Log(const std::string& file, const Parameters& parameters, int next) : name
 
 void Log::append(const LogRow& row, const std::vector<double>& theta) {
   const auto number = [](double value) { return std::isfinite(value) ? exact(value) : std::string(); };
-  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss),
-                                 number(row.image_rmse), number(row.param_rmse), number(row.gradient_norm));
+  std::string text =
+      fmt::format("{},{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss), number(row.image_rmse),
+                  number(row.param_rmse), number(row.gradient_norm), number(row.loss_noise));
   for (const Parameters::Block& block : parameters_.blocks()) {
     if (block.count > kMostColumns) {
       double sum = 0;

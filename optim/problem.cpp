@@ -37,6 +37,13 @@ Pass pass_of(Term term) {
   throw std::logic_error("unknown term");
 }
 
+SplitImage render_halves(const Renderer& renderer, const Stream& stream, SampleRange range) {
+  if (range.count() < 2) return {renderer.render(stream, range), {}, 1};
+  const int middle = range.begin + (range.count() + 1) / 2;
+  const SampleRange first{range.begin, middle}, second{middle, range.end};
+  return join_halves(renderer.render(stream, first), first.count(), renderer.render(stream, second), second.count());
+}
+
 void ImageMean::add(const GatedImage& image, int samples) {
   if (samples_ == 0) sum_ = GatedImage(image.width, image.height, image.gates, image.channels);
   for (std::size_t i = 0; i < image.data.size(); ++i) sum_.data[i] += samples * image.data[i];
@@ -47,6 +54,13 @@ GatedImage ImageMean::mean() const {
   GatedImage mean = sum_;
   for (double& value : mean.data) value /= static_cast<double>(samples_);
   return mean;
+}
+
+void set_loss(const LossEstimate& estimate, Evaluation& into) {
+  into.loss = estimate.value;
+  into.loss_noise = estimate.noise;
+  into.mean_squared_error = estimate.mean_squared_error;
+  into.mean_squared_error_noise = estimate.mean_squared_error_noise;
 }
 
 Problem::Problem(Experiment experiment, const std::function<void(const std::string&)>& warning)
@@ -133,9 +147,10 @@ RobustLoss Problem::robust_loss(const GatedImage& target) const {
   return scale > 0 ? RobustLoss{experiment_.loss.kind, scale} : RobustLoss{};
 }
 
-double Problem::loss(const GatedImage& image, const GatedImage& target, const std::vector<double>& theta) const {
-  const double of_image = mean_loss(image, target, robust_loss(target));
-  return penalty_.empty() ? of_image : of_image + mean_square(target) * penalty_.value(theta);
+LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
+  LossEstimate estimate = estimate_loss(image, target, robust_loss(target));
+  if (!penalty_.empty()) estimate.value += mean_square(target) * penalty_.value(theta);
+  return estimate;
 }
 
 EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) const {
@@ -151,11 +166,11 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);
   const Renderer renderer(scene, gates_, estimator(share.of(samples.visibility).count()), &basis);
+  SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
   Evaluation result;
-  result.image = renderer.render(stream(Pass::primal, iteration), share.of(samples.primal));
-  result.loss = loss(result.image, target, theta);
-  result.mean_squared_error = mean_loss(result.image, target);
-  const GatedImage adjoint = loss_adjoint(result.image, target, robust_loss(target));
+  set_loss(loss(image, target, theta), result);
+  const GatedImage adjoint = loss_adjoint(image, target, robust_loss(target));
+  result.image = std::move(image.image);
   poll();
   if (experiment_.gradient.method == GradientMethod::finite_difference) {
     for (int i = 0; i < parameters_->size(); ++i) {

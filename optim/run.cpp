@@ -39,7 +39,7 @@ class Run {
     if (!warning.empty() && options_.warning) options_.warning(warning);
     if (saved) state_ = *saved;
     if (!saved) state_.theta = parameters_.initial();
-    last_.loss = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
+    last_.loss = last_.loss_noise = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
     LoopResult result;
     try {
       load_target();
@@ -79,9 +79,13 @@ class Run {
     loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_));
     loop.warning = options_.warning;
     loop.row = [&](const Evaluation& now, const std::vector<double>& theta, bool closing) {
-      last_ = {
-          state_.iteration + (closing ? 1 : 0), state_.seconds + seconds_since(iteration_start), now.loss,
-          std::sqrt(now.mean_squared_error),    parameters_.distance_to_target(theta),           norm(now.gradient)};
+      last_ = {state_.iteration + (closing ? 1 : 0),
+               state_.seconds + seconds_since(iteration_start),
+               now.loss,
+               root_mean_square_error(now.mean_squared_error),
+               parameters_.distance_to_target(theta),
+               norm(now.gradient),
+               now.loss_noise};
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image);
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
@@ -125,6 +129,7 @@ class Run {
 RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
   const Problem problem(experiment, options.warning);
   problem.require_parameters();
+  require_two_samples(problem);
   require_jacobian_fits(problem);
   prepare_run_folder(options.folder, options.force, options.warning);
   write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(experiment, options.folder));
@@ -137,6 +142,7 @@ RunStatus resume_run(const RunOptions& options) {
     throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
   const Problem problem(load_experiment(file), options.warning);
   problem.require_parameters();
+  require_two_samples(problem);
   require_jacobian_fits(problem);
   make_output_folder(options.folder);
   return Run(problem, options).execute();
