@@ -56,7 +56,8 @@ std::vector<std::pair<const char*, std::vector<double>*>> lists_of(DescentState&
   return {{"first", &state.first},
           {"first_noise", &state.first_noise},
           {"recent", &state.recent},
-          {"recent_noise", &state.recent_noise}};
+          {"recent_noise", &state.recent_noise},
+          {"theta_sum", &state.theta_sum}};
 }
 
 Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters) {
@@ -103,6 +104,7 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   for (const auto& [key, values] : lists_of(c.safeguard)) *values = safeguard[key].as<std::vector<double>>();
   const YAML::Node descent = root["descent"];
   c.descent.judged = descent["judged"].as<bool>();
+  c.descent.summed = descent["summed"].as<int>();
   for (const auto& [key, values] : lists_of(c.descent)) *values = descent[key].as<std::vector<double>>();
   c.steps_rejected = root["steps_rejected"].as<int>();
   c.steps_rejected_in_row = root["steps_rejected_in_row"].as<int>();
@@ -137,7 +139,7 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
                  scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row, scalar(safeguard.best_level));
   for (const auto& [key, values] : lists_of(safeguard)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
   DescentState descent = c.descent;
-  fmt::format_to(out, "descent:\n  judged: {}\n", descent.judged);
+  fmt::format_to(out, "descent:\n  judged: {}\n  summed: {}\n", descent.judged, descent.summed);
   for (const auto& [key, values] : lists_of(descent)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
   fmt::format_to(out, "steps_rejected: {}\nsteps_rejected_in_row: {}\n", c.steps_rejected, c.steps_rejected_in_row);
   text += kChecksumKey + checksum(text) + "\n";

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,13 +12,23 @@
 namespace isochron {
 namespace {
 
-constexpr int kLeastBlock = 5, kMostBlock = 50, kSpreadRows = 20, kLeastSpreadRows = 5;
-constexpr double kVisible = 2;  // standard errors
+constexpr int kLeastBlock = 5, kMostBlock = 50, kMostRecent = 100, kSpreadRows = 20, kLeastSpreadRows = 5;
+constexpr double kVisible = 2, kFalls = 3;  // standard errors
 
 double mean_of_squares(const std::vector<double>& values) {
   double sum = 0;
   for (double v : values) sum += v * v;
   return sum / static_cast<double>(values.size());
+}
+
+/// By how much the mean of losses lies below that of earlier ones, and its standard error.
+struct Fall {
+  double value, error;
+};
+Fall fall(const std::vector<double>& before, const std::vector<double>& noise_before, const std::vector<double>& after,
+          const std::vector<double>& noise_after) {
+  return {mean(before) - mean(after), std::sqrt(mean_of_squares(noise_before) / static_cast<double>(before.size()) +
+                                                mean_of_squares(noise_after) / static_cast<double>(after.size()))};
 }
 
 std::vector<double> tail(const std::vector<double>& values, int count) {
@@ -26,15 +37,23 @@ std::vector<double> tail(const std::vector<double>& values, int count) {
 
 void keep_last(std::vector<double>& values, double next) {
   values.push_back(next);
-  if (values.size() > kMostBlock) values.erase(values.begin());
+  if (values.size() > kMostRecent) values.erase(values.begin());
 }
 
 }  // namespace
 
 Descent::Descent(int iterations, DescentState state)
-    : iterations_(iterations), block_(std::clamp(iterations / 10, kLeastBlock, kMostBlock)), state_(std::move(state)) {}
+    : iterations_(iterations),
+      block_(std::clamp(iterations / 10, kLeastBlock, kMostBlock)),
+      averaged_(std::clamp(3 * iterations / 4, 1, kMostRecent)),
+      state_(std::move(state)) {}
 
-std::string Descent::observe(int iteration, double loss, double noise) {
+std::string Descent::observe(int iteration, const std::vector<double>& theta, double loss, double noise) {
+  if (iteration > iterations_ - averaged_) {
+    state_.theta_sum.resize(theta.size(), 0.0);
+    for (std::size_t i = 0; i < theta.size(); ++i) state_.theta_sum[i] += theta[i];
+    ++state_.summed;
+  }
   if (!std::isfinite(loss) || !std::isfinite(noise)) return {};
   keep_last(state_.recent, loss);
   keep_last(state_.recent_noise, noise);
@@ -45,16 +64,38 @@ std::string Descent::observe(int iteration, double loss, double noise) {
     return {};
   }
   if ((iteration + 1) % block_ != 0 || iteration + 1 < 2 * block_) return {};
-  const double fall = mean(state_.first) - mean(tail(state_.recent, block_));
-  const double error =
-      std::sqrt((mean_of_squares(state_.first_noise) + mean_of_squares(tail(state_.recent_noise, block_))) / block_);
-  state_.judged = fall >= kVisible * error;
-  if (state_.judged || fall <= -kVisible * error || 5 * (iteration + 1) < iterations_) return {};
+  const auto [fallen, error] =
+      fall(state_.first, state_.first_noise, tail(state_.recent, block_), tail(state_.recent_noise, block_));
+  state_.judged = fallen >= kVisible * error;
+  if (state_.judged || fallen <= -kVisible * error || 5 * (iteration + 1) < iterations_) return {};
   state_.judged = true;
   return fmt::format(
       "noise hides whether the loss descends: between the first {0} iterations and the last {0} it fell by {1:.2g}, "
       "which has a standard error of {2:.2g} (samples.primal makes it smaller)",
-      block_, fall, error);
+      block_, fallen, error);
+}
+
+void Descent::restart_average() {
+  state_.theta_sum.clear();
+  state_.summed = 0;
+}
+
+bool Descent::settled() const {
+  if (state_.summed < averaged_ || averaged_ < 2 || std::ssize(state_.recent) < averaged_) return false;
+  const auto halves = [&](const std::vector<double>& values) {
+    const std::vector<double> rows = tail(values, averaged_);
+    const auto middle = rows.begin() + averaged_ / 2;
+    return std::array{std::vector<double>(rows.begin(), middle), std::vector<double>(middle, rows.end())};
+  };
+  const auto losses = halves(state_.recent), noises = halves(state_.recent_noise);
+  const auto [fallen, error] = fall(losses[0], noises[0], losses[1], noises[1]);
+  return fallen < kFalls * error;
+}
+
+std::vector<double> Descent::settled_theta() const {
+  std::vector<double> theta = state_.theta_sum;
+  for (double& value : theta) value /= state_.summed;
+  return theta;
 }
 
 LossSpread loss_spread(const DescentState& state) {

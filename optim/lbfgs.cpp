@@ -131,6 +131,7 @@ class Lbfgs : public Optimizer {
     return next;
   }
   bool rejected() const override { return rejected_; }
+  bool scatters() const override { return true; }
   void reset() override { squares_.clear(); }
   OptimizerState state() const override { return {{"squares", squares_}}; }
   void restore(const OptimizerState& state) override { squares_ = state.at("squares"); }

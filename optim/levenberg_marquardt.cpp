@@ -135,6 +135,7 @@ class LevenbergMarquardt : public Optimizer {
     return next;
   }
   bool rejected() const override { return rejected_; }
+  bool scatters() const override { return true; }
   void reset() override { radius_ = kFirstRadius; }
   OptimizerState state() const override { return {{"radius", {radius_}}}; }
   void restore(const OptimizerState& state) override { radius_ = state.at("radius").at(0); }

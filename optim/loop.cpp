@@ -50,7 +50,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
       state.loss_noise_initial = now.loss_noise;
     }
     Descent descent(options.iterations, state.descent);
-    const std::string hidden = descent.observe(state.iteration, now.loss, now.loss_noise);
+    const std::string hidden = descent.observe(state.iteration, state.theta, now.loss, now.loss_noise);
     options.row(now, state.theta, false);
 
     const bool finite = std::isfinite(now.loss) && all_finite(now.gradient);
@@ -70,6 +70,9 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
       } else if (verdict == Verdict::settled) {
         result = {RunStatus::converged, FinalChoice::average};
         chosen = safeguard.settled_theta();
+      } else if (optimizer.scatters() && descent.settled()) {
+        result.choice = FinalChoice::average;
+        chosen = descent.settled_theta();
       }
       if (chosen != state.theta) options.row(optimizer.evaluate(objective, chosen, iteration + 1), chosen, true);
       state.safeguard = safeguard.state();
@@ -85,6 +88,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
     std::vector<double> next;
     if (verdict == Verdict::reject) {
       optimizer.reset();
+      descent.restart_average();
       next = safeguard.state().best_theta;
       warn(fmt::format("{}; going on from the best parameters with {} of the rate",
                        finite ? "the loss has risen" : "loss or gradient is not finite", safeguard.state().rate));

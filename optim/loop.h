@@ -3,7 +3,8 @@
 // Row i is the evaluation at the parameters before step i, with the random numbers of iteration i. At the end
 // one more row is evaluated where the final parameters are not those of the last row.
 //
-// Final parameters: the mean over the last window where the loss has settled (see safeguard.h); those of the
+// Final parameters: the mean over the last window where the loss has settled (see safeguard.h), over the last three quarters of
+// the iterations where those of the optimiser scatter and the loss no longer falls (see descent.h); those of the
 // lowest level where the optimisation diverged; else the last. Not those of the least loss: near the optimum
 // that picks noise.
 #pragma once
