@@ -19,6 +19,8 @@ namespace isochron {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+/// Of the file's keys and what they mean; raised where they change within a version of the program.
+constexpr int kFormat = 2;
 constexpr const char* kChecksumKey = "checksum: ";
 
 std::string list(const std::vector<double>& values) {
@@ -43,6 +45,14 @@ std::vector<std::pair<const char*, std::vector<double>*>> lists_of(SafeguardStat
           {"theta_sum", &state.theta_sum}};
 }
 
+std::vector<std::pair<const char*, std::vector<double>*>> lists_of(DescentState& state) {
+  return {{"first", &state.first},
+          {"first_noise", &state.first_noise},
+          {"recent", &state.recent},
+          {"recent_noise", &state.recent_noise},
+          {"theta_sum", &state.theta_sum}};
+}
+
 Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters) {
   const std::size_t tail = text.rfind(kChecksumKey);
   if (tail == std::string::npos || text.substr(tail) != kChecksumKey + checksum(std::string_view(text).substr(0, tail)) + "\n")
@@ -51,10 +61,15 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   const std::string version = root["version"].as<std::string>();
   if (version != program_version())
     throw InputError(fmt::format("{}: version: written by {}; allowed: {}", file, version, program_version()));
+  const int format = root["format"].as<int>(1);
+  if (format != kFormat)
+    throw InputError(
+        fmt::format("{}: format: {} is that of another build of {}; allowed: {}", file, format, version, kFormat));
   Checkpoint c;
   c.iteration = root["iteration"].as<int>();
   c.seconds = root["seconds"].as<double>();
   c.loss_initial = root["loss_initial"].as<double>();
+  c.loss_noise_initial = root["loss_noise_initial"].as<double>();
   c.image_rmse_initial = root["image_rmse_initial"].as<double>();
   c.param_rmse_initial = root["param_rmse_initial"].as<double>();
   const YAML::Node entries = root["parameters"];
@@ -80,20 +95,31 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   c.safeguard.rejected_in_row = safeguard["rejected_in_row"].as<int>();
   c.safeguard.best_level = safeguard["best_level"].as<double>();
   for (const auto& [key, values] : lists_of(c.safeguard)) *values = safeguard[key].as<std::vector<double>>();
+  const YAML::Node descent = root["descent"];
+  c.descent.judged = descent["judged"].as<bool>();
+  c.descent.summed = descent["summed"].as<int>();
+  for (const auto& [key, values] : lists_of(c.descent)) *values = descent[key].as<std::vector<double>>();
+  c.steps_rejected = root["steps_rejected"].as<int>();
+  c.steps_rejected_in_row = root["steps_rejected_in_row"].as<int>();
   return c;
 }
 
 }  // namespace
 
-Checkpoint::Checkpoint() : loss_initial(kUnknown), image_rmse_initial(kUnknown), param_rmse_initial(kUnknown) {}
+Checkpoint::Checkpoint()
+    : loss_initial(kUnknown),
+      loss_noise_initial(kUnknown),
+      image_rmse_initial(kUnknown),
+      param_rmse_initial(kUnknown) {}
 
 void save_checkpoint(const std::string& folder, const Checkpoint& c, const Parameters& parameters) {
   std::string text = fmt::format(
-      "version: {}\niteration: {}\nseconds: {}\nloss_initial: {}\nimage_rmse_initial: "
+      "version: {}\nformat: {}\niteration: {}\nseconds: {}\nloss_initial: {}\nloss_noise_initial: "
+      "{}\nimage_rmse_initial: "
       "{}\nparam_rmse_initial: {}\n"
       "parameters:{}\n",
-      program_version(), c.iteration, scalar(c.seconds), scalar(c.loss_initial), scalar(c.image_rmse_initial),
-      scalar(c.param_rmse_initial), parameters.blocks().empty() ? " []" : "");
+      program_version(), kFormat, c.iteration, scalar(c.seconds), scalar(c.loss_initial), scalar(c.loss_noise_initial),
+      scalar(c.image_rmse_initial), scalar(c.param_rmse_initial), parameters.blocks().empty() ? " []" : "");
   auto out = std::back_inserter(text);
   for (const Parameters::Block& block : parameters.blocks()) {
     const auto begin = c.theta.begin() + block.begin;
@@ -105,6 +131,10 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
   fmt::format_to(out, "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n",
                  scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row, scalar(safeguard.best_level));
   for (const auto& [key, values] : lists_of(safeguard)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
+  DescentState descent = c.descent;
+  fmt::format_to(out, "descent:\n  judged: {}\n  summed: {}\n", descent.judged, descent.summed);
+  for (const auto& [key, values] : lists_of(descent)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
+  fmt::format_to(out, "steps_rejected: {}\nsteps_rejected_in_row: {}\n", c.steps_rejected, c.steps_rejected_in_row);
   text += kChecksumKey + checksum(text) + "\n";
   const std::string latest = folder + "/checkpoint.yaml", previous = folder + "/checkpoint.previous.yaml";
   const std::string fresh = folder + "/checkpoint.new.yaml";

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "optim/descent.h"
 #include "optim/optimizer.h"
 #include "optim/parameters.h"
 #include "optim/safeguard.h"
@@ -17,8 +18,10 @@ struct Checkpoint {
   std::vector<double> theta;
   OptimizerState optimizer;  ///< empty before the first iteration
   SafeguardState safeguard;
+  DescentState descent;
+  int steps_rejected = 0, steps_rejected_in_row = 0;  ///< by the optimiser itself, see Optimizer::rejected()
   /// Of iteration 0, for the summary; NaN before it.
-  double loss_initial, image_rmse_initial, param_rmse_initial;
+  double loss_initial, loss_noise_initial, image_rmse_initial, param_rmse_initial;
   Checkpoint();
 };
 

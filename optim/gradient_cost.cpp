@@ -37,7 +37,7 @@ Times time_evaluation(const Problem& problem, const std::vector<double>& theta, 
   const TangentBasis basis = problem.parameters().tangent(theta);
   const Renderer renderer(scene, problem.gates(), problem.estimator(samples[2]), &basis);
   lap(0);
-  const GatedImage image = renderer.render(stream_of(problem, Pass::primal, index), {0, samples[0]});
+  const SplitImage image = render_halves(renderer, stream_of(problem, Pass::primal, index), {0, samples[0]});
   const GatedImage adjoint = loss_adjoint(image, target, problem.robust_loss(target));
   lap(1);
   std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
@@ -152,7 +152,7 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
   const RobustLoss robust = problem.robust_loss(target);
   std::vector<GatedImage> adjoints;
   for (int i = 0; i < kImages; ++i) {
-    const GatedImage image = renderer.render(stream_of(problem, Pass::primal, i), {0, samples[0]});
+    const SplitImage image = render_halves(renderer, stream_of(problem, Pass::primal, i), {0, samples[0]});
     adjoints.push_back(loss_adjoint(image, target, robust));
     poll();
   }

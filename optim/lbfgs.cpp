@@ -108,6 +108,7 @@ class Lbfgs : public Optimizer {
                            std::uint32_t iteration, double rate) override {
     auto* loss = new ScaledLoss(objective, now, theta, iteration, first_step_, gradient_size(now.gradient));
     const ceres::GradientProblem problem(loss);  // owns it
+    rejected_ = false;
     if (!loss->can_move()) return theta;
     ceres::GradientProblemSolver::Options options;
     options.line_search_direction_type = ceres::LBFGS;
@@ -125,9 +126,12 @@ class Lbfgs : public Optimizer {
     // found.
     loss->rethrow();
     std::vector<double> next = loss->best();
+    rejected_ = next == theta;
     for (std::size_t i = 0; i < next.size(); ++i) next[i] = theta[i] + rate * (next[i] - theta[i]);
     return next;
   }
+  bool rejected() const override { return rejected_; }
+  bool scatters() const override { return true; }
   void reset() override { squares_.clear(); }
   OptimizerState state() const override { return {{"squares", squares_}}; }
   void restore(const OptimizerState& state) override { squares_ = state.at("squares"); }
@@ -148,6 +152,7 @@ class Lbfgs : public Optimizer {
   double first_step_;
   int inner_iterations_;
   std::vector<double> squares_;
+  bool rejected_ = false;
 };
 
 }  // namespace

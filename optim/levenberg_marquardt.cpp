@@ -16,13 +16,18 @@ namespace {
 /// The loss of one iteration as n + 1 residuals of the n unknowns of a QuadraticModel. Ceres sees J'J and J'r
 /// through the model and half the sum of squares through the loss (its last residual makes up the
 /// difference), which are all that Levenberg-Marquardt uses: the residuals of all pixels and gates never
-/// reach it. At any other point than the first the Jacobian is zero, which ends the solver after its first
+/// reach it. To the loss a constant is added, which changes no difference, so that estimates below 0 have roots, too. At any other point than the first the Jacobian is zero, which ends the solver after its first
 /// accepted step: the next linearisation has the random numbers of the next iteration.
 class CondensedLoss : public ceres::CostFunction {
  public:
   CondensedLoss(const Objective& objective, const Evaluation& now, const QuadraticModel& model,
                 const std::vector<double>& start, std::uint32_t iteration)
-      : objective_(objective), model_(model), start_(start), iteration_(iteration), loss_at_start_(now.loss) {
+      : objective_(objective),
+        model_(model),
+        start_(start),
+        iteration_(iteration),
+        loss_at_start_(now.loss),
+        unit_(most_fall(now)) {
     set_num_residuals(static_cast<int>(start.size()) + 1);
     mutable_parameter_block_sizes()->push_back(static_cast<int>(start.size()));
   }
@@ -35,7 +40,8 @@ class CondensedLoss : public ceres::CostFunction {
       Eigen::Map<Eigen::VectorXd> residual(residuals, n + 1);
       residual.setZero();
       if (first) residual.head(n) = model_.residual;
-      const double squares = loss_at(theta) / loss_at_start_;
+      // At the start twice what the model can take away; losses that fall further are taken to fall as far.
+      const double squares = 2 + (loss_at(theta) - loss_at_start_) / unit_;
       if (!std::isfinite(squares)) return false;
       residual[n] = std::sqrt(std::max(0.0, squares - residual.squaredNorm()));
       if (jacobians && jacobians[0]) {
@@ -72,7 +78,7 @@ class CondensedLoss : public ceres::CostFunction {
   const QuadraticModel& model_;
   std::vector<double> start_;
   std::uint32_t iteration_;
-  double loss_at_start_;
+  double loss_at_start_, unit_;
   GuardedCalls guarded_;
   mutable std::vector<double> last_theta_;
   mutable double last_loss_ = 0;
@@ -94,7 +100,8 @@ class LevenbergMarquardt : public Optimizer {
       if ((theta[i] == objective.lower()[i] && now.gradient[i] >= 0) ||
           (theta[i] == objective.upper()[i] && now.gradient[i] <= 0))
         fixed.push_back(static_cast<int>(i));
-    if (!(now.loss > 0) || fixed.size() == theta.size()) return theta;
+    rejected_ = false;
+    if (!(most_fall(now) > 0) || fixed.size() == theta.size()) return theta;
     const QuadraticModel model = quadratic_model(now);
     auto* loss = new CondensedLoss(objective, now, model, theta, iteration);
     ceres::Problem problem;
@@ -123,9 +130,12 @@ class LevenbergMarquardt : public Optimizer {
     if (!summary.iterations.empty())
       radius_ = std::clamp(summary.iterations.back().trust_region_radius, kLeastRadius, kFirstRadius);
     std::vector<double> next = loss->point(u.data());
+    rejected_ = next == theta;
     for (std::size_t i = 0; i < next.size(); ++i) next[i] = theta[i] + rate * (next[i] - theta[i]);
     return next;
   }
+  bool rejected() const override { return rejected_; }
+  bool scatters() const override { return true; }
   void reset() override { radius_ = kFirstRadius; }
   OptimizerState state() const override { return {{"radius", {radius_}}}; }
   void restore(const OptimizerState& state) override { radius_ = state.at("radius").at(0); }
@@ -136,6 +146,7 @@ class LevenbergMarquardt : public Optimizer {
   /// the least halves a step: noise can make all trials of an iteration fail, which must not stop the next.
   static constexpr double kFirstRadius = 1e4, kLeastRadius = 1;
   double radius_ = kFirstRadius;
+  bool rejected_ = false;
 };
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 constexpr int kMostColumns = 16;
 
 std::string header(const Parameters& parameters) {
-  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm";
+  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,loss_noise";
   const auto columns = [&](const char* norm, const char* suffix) {
     for (const Parameters::Block& block : parameters.blocks()) {
       if (block.count > kMostColumns) {
@@ -51,8 +51,9 @@ Log::Log(const std::string& file, const Parameters& parameters, int next) : name
 
 void Log::append(const LogRow& row, const std::vector<double>& theta, const std::vector<double>& gradient) {
   const auto number = [](double value) { return std::isfinite(value) ? exact(value) : std::string(); };
-  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss),
-                                 number(row.image_rmse), number(row.param_rmse), number(row.gradient_norm));
+  std::string text = fmt::format("{},{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss),
+                                 number(row.image_rmse), number(row.param_rmse), number(row.gradient_norm),
+                                 number(row.loss_noise));
   const auto columns = [&](const std::vector<double>& values) {
     for (const Parameters::Block& block : parameters_.blocks()) {
       if (block.count > kMostColumns) {

@@ -12,10 +12,12 @@ namespace isochron {
 
 struct LogRow {
   int iteration = 0;
-  double seconds = 0;  ///< spent in iterations so far, this one included
-  double loss = 0, image_rmse = 0;
-  double param_rmse = 0;     ///< NaN where target values are unknown: written as an empty field
+  double seconds = 0;     ///< spent in iterations so far, this one included
+  double loss = 0;        ///< can lie below 0, see loss.h
+  double image_rmse = 0;  ///< see root_mean_square_error
+  double param_rmse = 0;  ///< NaN where target values are unknown: written as an empty field
   double gradient_norm = 0;  ///< of dLoss/dtheta times scale
+  double loss_noise = 0;  ///< standard error of `loss`
 };
 
 class Log {

@@ -3,7 +3,8 @@
 // Row i is the evaluation at the parameters before step i, with the random numbers of iteration i. At the end
 // one more row is evaluated where the final parameters are not those of the last row.
 //
-// Final parameters: the mean over the last window where the loss has settled (see safeguard.h); those of the
+// Final parameters: the mean over the last window where the loss has settled (see safeguard.h), over the last three quarters of
+// the iterations where those of the optimiser scatter and the loss no longer falls (see descent.h); those of the
 // lowest level where the optimisation diverged; else the last. Not those of the least loss: near the optimum
 // that picks noise.
 #pragma once
@@ -22,12 +23,15 @@ const char* name(RunStatus status);
 enum class FinalChoice { last, average, best };
 const char* name(FinalChoice choice);
 
-/// A run that ends with more than this times the loss it began with has diverged.
+/// A run that ends with more than this times the loss it began with has diverged; both losses are taken three standard
+/// errors to the benefit of the doubt.
 inline constexpr double kDivergedLossRatio = 10;
 
 struct LoopOptions {
   int iterations = 100;
-  double converged_rmse = 0;  ///< ends the loop once the image's root mean square error is at most this; 0: never
+  /// Ends the loop once the image's mean squared error lies two standard errors below the square of this (where it is
+  /// not below, one row says so wrongly with probability 0.023); 0: never. So it cannot be reached where noise is larger.
+  double converged_rmse = 0;
   /// After every evaluation, before the step; `closing`: of the final parameters.
   std::function<void(const Evaluation& now, const std::vector<double>& theta, bool closing)> row;
   std::function<void()> save;                       ///< after every step, with the state ready for a checkpoint

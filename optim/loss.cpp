@@ -4,6 +4,18 @@
 #include <limits>
 
 namespace isochron {
+namespace {
+
+/// Sums over all values, and over pixels the squares of what their values add up to.
+struct Sums {
+  double value = 0, pixel_error = 0, squares = 0;
+  void end_pixel() {
+    squares += pixel_error * pixel_error;
+    pixel_error = 0;
+  }
+};
+
+}  // namespace
 
 double RobustLoss::value(double r) const {
   if (kind == LossKind::huber && std::abs(r) > scale) return scale * (2 * std::abs(r) - scale);
@@ -17,10 +29,64 @@ double RobustLoss::weight(double r) const {
   return 1;
 }
 
-double mean_loss(const GatedImage& image, const GatedImage& target, const RobustLoss& rho) {
-  double sum = 0;
-  for (std::size_t i = 0; i < image.data.size(); ++i) sum += rho.value(image.data[i] - target.data[i]);
-  return std::isfinite(sum) ? sum / static_cast<double>(image.data.size()) : std::numeric_limits<double>::quiet_NaN();
+double RobustLoss::second(double r) const {
+  if (kind == LossKind::huber && std::abs(r) > scale) return 0;
+  if (kind == LossKind::cauchy) {
+    const double t = (r / scale) * (r / scale);
+    return 2 * (1 - t) / ((1 + t) * (1 + t));
+  }
+  return 2;
+}
+
+double RobustLoss::third(double r) const {
+  if (kind != LossKind::cauchy) return 0;
+  const double x = r / scale, t = x * x;
+  return -4 * x * (3 - t) / ((1 + t) * (1 + t) * (1 + t)) / scale;
+}
+
+SplitImage join_halves(const GatedImage& first, int first_samples, const GatedImage& second, int second_samples) {
+  SplitImage joined{first, first, static_cast<double>(first_samples) / (first_samples + second_samples)};
+  for (std::size_t i = 0; i < first.data.size(); ++i) {
+    const double difference = first.data[i] - second.data[i];
+    joined.difference.data[i] = difference;
+    joined.image.data[i] = second.data[i] + joined.first * difference;
+  }
+  return joined;
+}
+
+LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, const RobustLoss& rho) {
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  if (!image.halved()) return {kUnknown, kUnknown, kUnknown, kUnknown};
+  const double first = image.first, second = 1 - first;
+  const std::size_t values = target.data.size(), per_pixel = values / static_cast<std::size_t>(target.pixels());
+  Sums loss, squared;
+  for (std::size_t i = 0; i < values; ++i) {
+    const double r = image.image.data[i] - target.data[i], d = image.difference.data[i];
+    // Halves of unequal size add a term whose expectation is 0: so the squared loss is their product exactly.
+    const double slope = 2 * rho.weight(r) * r, variance = first * second * d * d, odd = (second - first) / 2 * d;
+    loss.value += rho.value(r) + odd * slope - rho.second(r) / 2 * variance;
+    loss.pixel_error += slope * d / 2;
+    squared.value += (r + second * d) * (r - first * d);
+    squared.pixel_error += r * d;
+    if ((i + 1) % per_pixel == 0) {
+      loss.end_pixel();
+      squared.end_pixel();
+    }
+  }
+  if (!std::isfinite(loss.value) || !std::isfinite(squared.value)) return {kUnknown, kUnknown, kUnknown, kUnknown};
+  const auto n = static_cast<double>(values);
+  return {loss.value / n, std::sqrt(loss.squares) / n, squared.value / n, std::sqrt(squared.squares) / n};
+}
+
+GatedImage loss_adjoint(const SplitImage& image, const GatedImage& target, const RobustLoss& rho) {
+  GatedImage adjoint = loss_adjoint(image.image, target, rho);
+  if (rho.kind != LossKind::cauchy || !image.halved()) return adjoint;  // rho''' is 0, or v unknown
+  const double variance = image.first * (1 - image.first), n = static_cast<double>(target.data.size());
+  for (std::size_t i = 0; i < adjoint.data.size(); ++i) {
+    const double r = image.image.data[i] - target.data[i], d = image.difference.data[i];
+    adjoint.data[i] -= rho.third(r) / 2 * variance * d * d / n;
+  }
+  return adjoint;
 }
 
 GatedImage loss_adjoint(const GatedImage& image, const GatedImage& target, const RobustLoss& rho) {
@@ -31,6 +97,10 @@ GatedImage loss_adjoint(const GatedImage& image, const GatedImage& target, const
     adjoint.data[i] = scale * rho.weight(residual) * residual;
   }
   return adjoint;
+}
+
+double root_mean_square_error(double mean_squared_error) {
+  return mean_squared_error <= 0 ? 0 : std::sqrt(mean_squared_error);
 }
 
 double mean_square(const GatedImage& image) {

@@ -206,13 +206,14 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
     return result;
   }
   const int primal = problem_.experiment().samples.primal;
-  GatedImage image;
+  SplitImage image;
+  const Scene scene = problem_.parameters().apply(theta);
   if (kind_ == Method::Gradient::finite_difference) {
-    image = problem_.render(theta, problem_.stream(Pass::primal, iteration), {0, primal});
+    const Renderer renderer(scene, problem_.gates(), problem_.estimator());
+    image = render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, primal});
     poll();
   } else {
-    const Scene scene = problem_.parameters().apply(theta);
-    image = gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number) {
+    image.image = gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number) {
       return renderer.render(problem_.stream(Pass::primal, number), {0, primal});
     });
   }

@@ -10,9 +10,12 @@ namespace isochron {
 /// Estimates at one point.
 struct Evaluation {
   GatedImage image;
-  double loss = 0;                ///< what is minimised
-  double mean_squared_error = 0;  ///< of the image alone
-  std::vector<double> gradient;   ///< of the loss, one entry per unknown
+  /// What is minimised, an estimate that is right on average; so it can lie below 0 where the least possible is 0.
+  double loss = 0;
+  double loss_noise = 0;  ///< standard error of `loss`, of a single evaluation
+  /// Of the image alone, unbiased as the loss, and its standard error.
+  double mean_squared_error = 0, mean_squared_error_noise = 0;
+  std::vector<double> gradient;  ///< of the loss, one entry per unknown
   /// Of linearise() alone: the Gauss-Newton matrix of the loss, its second derivative where residuals are
   /// linear; symmetric, row after row. Two estimates from a noisy Jacobian, their difference is its noise:
   /// one from two independent halves of the samples (unbiased, may be indefinite), one from all of them at

@@ -27,6 +27,11 @@ class Optimizer {
   /// its loss and gradient are finite. Every step is shortened by `rate`, in (0, 1].
   virtual std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
                                    std::uint32_t iteration, double rate) = 0;
+  /// Whether the last step() stayed where it was because no point that it tried had a lower loss.
+  virtual bool rejected() const { return false; }
+  /// Whether each iteration solves the problem of its own random numbers, so that near the optimum the parameters of
+  /// iterations scatter about it, and their mean is nearer to it than the last.
+  virtual bool scatters() const { return false; }
   /// Forgets what it learnt, after a step was rejected.
   virtual void reset() = 0;
   virtual OptimizerState state() const = 0;

@@ -37,6 +37,13 @@ Pass pass_of(Term term) {
   throw std::logic_error("unknown term");
 }
 
+SplitImage render_halves(const Renderer& renderer, const Stream& stream, SampleRange range) {
+  if (range.count() < 2) return {renderer.render(stream, range), {}, 1};
+  const int middle = range.begin + (range.count() + 1) / 2;
+  const SampleRange first{range.begin, middle}, second{middle, range.end};
+  return join_halves(renderer.render(stream, first), first.count(), renderer.render(stream, second), second.count());
+}
+
 void ImageMean::add(const GatedImage& image, int samples) {
   if (samples_ == 0) sum_ = GatedImage(image.width, image.height, image.gates, image.channels);
   for (std::size_t i = 0; i < image.data.size(); ++i) sum_.data[i] += samples * image.data[i];
@@ -47,6 +54,13 @@ GatedImage ImageMean::mean() const {
   GatedImage mean = sum_;
   for (double& value : mean.data) value /= static_cast<double>(samples_);
   return mean;
+}
+
+void set_loss(const LossEstimate& estimate, Evaluation& into) {
+  into.loss = estimate.value;
+  into.loss_noise = estimate.noise;
+  into.mean_squared_error = estimate.mean_squared_error;
+  into.mean_squared_error_noise = estimate.mean_squared_error_noise;
 }
 
 Problem::Problem(Experiment experiment, const std::function<void(const std::string&)>& warning)
@@ -135,9 +149,10 @@ RobustLoss Problem::robust_loss(const GatedImage& target) const {
   return scale > 0 ? RobustLoss{experiment_.loss.kind, scale} : RobustLoss{};
 }
 
-double Problem::loss(const GatedImage& image, const GatedImage& target, const std::vector<double>& theta) const {
-  const double of_image = mean_loss(image, target, robust_loss(target));
-  return penalty_.empty() ? of_image : of_image + mean_square(target) * penalty_.value(theta);
+LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
+  LossEstimate estimate = estimate_loss(image, target, robust_loss(target));
+  if (!penalty_.empty()) estimate.value += mean_square(target) * penalty_.value(theta);
+  return estimate;
 }
 
 EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) const {
@@ -157,11 +172,11 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
   const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
   ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
-  result.image = renderer.render(stream(Pass::primal, iteration), share.of(samples.primal));
+  SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
   stage.advance();
-  result.loss = loss(result.image, target, theta);
-  result.mean_squared_error = mean_loss(result.image, target);
-  const GatedImage adjoint = loss_adjoint(result.image, target, robust_loss(target));
+  set_loss(loss(image, target, theta), result);
+  const GatedImage adjoint = loss_adjoint(image, target, robust_loss(target));
+  result.image = std::move(image.image);
   poll();
   if (differences) {
     for (int i = 0; i < parameters_->size(); ++i) {

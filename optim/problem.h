@@ -92,11 +92,10 @@ class Problem {
   RobustLoss robust_loss(const GatedImage& target) const;
 
   /// Loss of an image rendered at theta, the penalty included.
-  double loss(const GatedImage& image, const GatedImage& target, const std::vector<double>& theta) const;
+  LossEstimate loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const;
 
-  /// Image, loss and gradient at theta from the random numbers of one iteration. Unbiased for image and
-  /// gradient (the loss has the variance of the image added to it; for robust losses both hold for small
-  /// noise only).
+  /// Image, loss and gradient at theta from the random numbers of one iteration, unbiased (robust losses: as loss.h
+  /// says). The loss is NaN where the share has a single sample of the image.
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}) const;
 
@@ -118,6 +117,12 @@ class Problem {
 };
 
 Pass pass_of(Term term);
+
+/// Gated images from two halves of a range, each of which is a range by itself: independent of each other, with
+/// low-discrepancy numbers of their own. The first half has one sample more where their number is odd.
+SplitImage render_halves(const Renderer& renderer, const Stream& stream, SampleRange range);
+
+void set_loss(const LossEstimate& estimate, Evaluation& into);
 
 /// Average of images weighted by their samples.
 class ImageMean {

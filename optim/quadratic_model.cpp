@@ -7,6 +7,11 @@
 
 namespace isochron {
 
+double most_fall(const Evaluation& at) {
+  const double error = std::isfinite(at.loss_noise) ? 2 * at.loss_noise : 0;
+  return std::max(0.0, at.loss) + error;
+}
+
 QuadraticModel quadratic_model(const Evaluation& at) {
   using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   constexpr double kLeastRatio = 1e-9;  // of eigenvalues: what round-off leaves of a singular matrix
@@ -29,7 +34,7 @@ QuadraticModel quadratic_model(const Evaluation& at) {
                               width.asDiagonal();
 
   QuadraticModel model;
-  const double unit = 2 * at.loss;
+  const double unit = 2 * most_fall(at);
   model.scale = (curvature.diagonal() / unit).cwiseSqrt();
   const Eigen::VectorXd inverse = model.scale.cwiseInverse();
   curvature = inverse.asDiagonal() * curvature * inverse.asDiagonal() / unit;

@@ -68,11 +68,25 @@ void require_jacobian_fits(const Problem& problem) {
         problem.experiment().file, bytes / 1e9, residuals, unknowns, kMostLinearisationBytes / 1e9));
 }
 
-double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {
-  const GatedImage image =
-      problem_.render(theta, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
+void require_two_samples(const Problem& problem) {
+  if (problem.experiment().samples.primal < 2)
+    throw InputError(fmt::format(
+        "{}: samples.primal: 1 is too few: the loss comes from two independent halves of the samples (allowed: at "
+        "least 2)",
+        problem.experiment().file));
+}
+
+SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint32_t iteration) const {
+  const Scene scene = problem_.parameters().apply(theta);
+  const Renderer renderer(scene, problem_.gates(), problem_.estimator());
+  SplitImage image =
+      render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
   poll_();
-  return problem_.loss(image, target_, theta);
+  return image;
+}
+
+double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {
+  return problem_.loss(render(theta, iteration), target_, theta).value;
 }
 
 Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::uint32_t iteration) const {
@@ -81,19 +95,17 @@ Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::ui
 
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
   const RobustLoss robust = problem_.robust_loss(target_);
+  SplitImage image = render(theta, iteration);
   Evaluation result;
-  result.image =
-      problem_.render(theta, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
-  poll_();
-  result.loss = problem_.loss(result.image, target_, theta);
-  result.mean_squared_error = mean_loss(result.image, target_);
+  set_loss(problem_.loss(image, target_, theta), result);
 
   JacobianHalves jacobian(target_.data.size(), theta.size());
   for (int half : {0, 1}) add_half(problem_, theta, iteration, half, poll_, jacobian);
   std::vector<double> weight;  // Gauss-Newton for a robust loss: rho'' is left out
   for (std::size_t i = 0; i < target_.data.size(); ++i)
-    weight.push_back(robust.weight(result.image.data[i] - target_.data[i]));
-  gauss_newton(jacobian, loss_adjoint(result.image, target_, robust).data, weight, result);
+    weight.push_back(robust.weight(image.image.data[i] - target_.data[i]));
+  gauss_newton(jacobian, loss_adjoint(image, target_, robust).data, weight, result);
+  result.image = std::move(image.image);
   const double mean = mean_square(target_);
   const int unknowns = static_cast<int>(theta.size());
   problem_.penalty().add_gradient(theta, mean, result.gradient);

@@ -12,6 +12,9 @@ inline constexpr double kMostLinearisationBytes = 2e9;
 /// Throws InputError when the experiment's method is Levenberg-Marquardt and that would be more.
 void require_jacobian_fits(const Problem& problem);
 
+/// Throws InputError when the image has a single sample per pixel, of which no loss can be estimated without bias.
+void require_two_samples(const Problem& problem);
+
 class RenderedObjective : public Objective {
  public:
   /// All must outlive this. `poll` is called between passes; what it throws leaves every function.
@@ -20,6 +23,7 @@ class RenderedObjective : public Objective {
 
   const std::vector<double>& lower() const override { return problem_.parameters().lower(); }
   const std::vector<double>& upper() const override { return problem_.parameters().upper(); }
+  /// From two halves of the image's samples, as all losses here; see loss.h.
   double loss(const std::vector<double>& theta, std::uint32_t iteration) const override;
   Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
   /// Each term's samples are cut into two halves, an odd number rounded up. The Jacobian is rendered for a
@@ -27,6 +31,8 @@ class RenderedObjective : public Objective {
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
 
  private:
+  SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;
+
   const Problem& problem_;
   const GatedImage& target_;
   Poll poll_;

@@ -42,7 +42,7 @@ class Run {
     if (!warning.empty() && options_.warning) options_.warning(warning);
     if (saved) state_ = *saved;
     if (!saved) state_.theta = parameters_.initial();
-    last_.loss = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
+    last_.loss = last_.loss_noise = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
     LoopResult result;
     try {
       load_target();
@@ -71,13 +71,9 @@ class Run {
   LoopResult optimise() {
     const OptimizerSpec& spec = problem_.experiment().optimizer;
     const RenderedObjective objective(problem_, target_, [this] { poll(); });
-<<<<<<< HEAD
     const auto optimizer = make_optimizer(spec, problem_.preconditioner(), parameters_.scales());
-=======
-    const auto optimizer = make_optimizer(spec, problem_.preconditioner());
     const GeometryFiles geometry(options_.folder, problem_.experiment().output, parameters_);
     if (state_.iteration == 0) geometry.write("target", parameters_.target());
->>>>>>> folder
     Log log(path("log.csv"), parameters_, state_.iteration);
     GatedImage final_image;
     const Clock::time_point call_start = Clock::now();
@@ -91,27 +87,20 @@ class Run {
       last_ = {state_.iteration + (closing ? 1 : 0),
                state_.seconds + seconds_since(iteration_start),
                now.loss,
-               std::sqrt(now.mean_squared_error),
+               root_mean_square_error(now.mean_squared_error),
                parameters_.distance_to_target(theta),
-               scaled_norm(now.gradient)};
+               scaled_norm(now.gradient),
+               now.loss_noise};
       if (last_.iteration == 0) {
-<<<<<<< HEAD
         write_exr(path("initial.exr"), now.image, notes_);
-=======
-        write_exr(path("initial.exr"), now.image);
         geometry.write("initial", theta);
->>>>>>> folder
         if (options_.warning && mean_square(target_) == 0 && mean_square(now.image) == 0)
           options_.warning("no light reaches the gates, neither at the target nor at the initial values");
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
-<<<<<<< HEAD
-      log.append(last_, theta, now.gradient);
-=======
       if (!closing) geometry.write_iteration(last_.iteration, theta);
-      log.append(last_, theta);
->>>>>>> folder
+      log.append(last_, theta, now.gradient);
       final_image = now.image;
       if (!closing) report(first, seconds_since(call_start));
     };
@@ -127,12 +116,8 @@ class Run {
       stage.advance();
     };
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
-<<<<<<< HEAD
-    write_exr(path("final.exr"), final_image, notes_);
-=======
     geometry.write("final", state_.theta);
-    write_exr(path("final.exr"), final_image);
->>>>>>> folder
+    write_exr(path("final.exr"), final_image, notes_);
     return result;
   }
 
@@ -159,21 +144,12 @@ class Run {
   LogRow last_;
 };
 
-}  // namespace
-
-namespace {
-
 /// Goes on in a locked folder that holds a run.
 RunStatus go_on(const RunOptions& options, const std::function<void(const std::string&)>& warning_of_scene) {
   const Problem problem(load_experiment(options.folder + "/experiment.yaml"), warning_of_scene);
   problem.require_parameters();
+  require_two_samples(problem);
   require_jacobian_fits(problem);
-<<<<<<< HEAD
-  require_memory(problem, run_memory(problem));
-  prepare_run_folder(options.folder, options.force, options.warning);
-  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(experiment, options.folder));
-=======
->>>>>>> folder
   return Run(problem, options).execute();
 }
 
@@ -183,6 +159,7 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
   {
     const Problem problem(experiment, options.warning);
     problem.require_parameters();
+    require_two_samples(problem);
     require_jacobian_fits(problem);
     require_memory(problem, run_memory(problem));
   }
@@ -198,13 +175,6 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
 RunStatus resume_run(const RunOptions& options) {
   if (!std::filesystem::exists(options.folder + "/experiment.yaml"))
     throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
-<<<<<<< HEAD
-  const Problem problem(load_experiment(file), options.warning);
-  problem.require_parameters();
-  require_jacobian_fits(problem);
-  require_memory(problem, run_memory(problem));
-=======
->>>>>>> folder
   make_output_folder(options.folder);
   const FolderLock lock(options.folder, options.warning);
   check_inputs(options.folder, options.warning);
