@@ -89,7 +89,8 @@ def plot_pixel(path, output, experiment, stacks, gates, pixel):
     axes.axhline(0, color="black", lw=0.5)
     axes.set_xlabel(f"gate's centre: {gates.axis}" if gates.centers is not None else gates.axis)
     axes.set_ylabel(gates.quantity if set(stacks) == {""} else f"d({gates.quantity}) / d({path.stem})", fontsize=8)
-    axes.set_title(f"{experiment}: {path.stem}, pixel in column {column}, row {row}", fontsize=10)
+    dark = "" if any(np.any(stack[:, row, column] != 0) for stack in stacks.values()) else " (zero through every gate)"
+    axes.set_title(f"{experiment}: {path.stem}, pixel in column {column}, row {row}{dark}", fontsize=10)
     plain_ticks(axes.yaxis)
     axes.grid(True, lw=0.4, alpha=0.4)
     if axes.get_legend_handles_labels()[1]:
