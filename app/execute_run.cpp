@@ -1,10 +1,12 @@
 #include "app/execute_run.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "optim/report.h"
 
 namespace isochron {
 
@@ -18,6 +20,8 @@ int execute_run(const std::string& folder, const CommonOptions& common, bool for
   options.stop = interrupted;
   options.progress = [&](const Progress& progress) { display.show(progress); };
   options.warning = warn;
+  std::string report;
+  options.report = [&](const std::string& text) { report = text; };
   const RunStatus status = start(options);
   display.end();
   if (status == RunStatus::interrupted) {
@@ -25,6 +29,7 @@ int execute_run(const std::string& folder, const CommonOptions& common, bool for
     return 1;
   }
   const bool plotted = common.no_plots || draw_plots(folder);
+  if (!common.quiet) fmt::print("{}{}", report, files_to_look_at(folder, !common.no_plots && plotted));
   if (status == RunStatus::diverged) {
     spdlog::error("{}: the run diverged; see log.csv and summary.yaml there", folder);
     return 1;

@@ -1,18 +1,34 @@
 #include "optim/loss.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 namespace isochron {
 namespace {
 
-/// Sums over all values, and over pixels the squares of what their values add up to.
-struct Sums {
-  double value = 0, pixel_error = 0, squares = 0;
-  void end_pixel() {
-    squares += pixel_error * pixel_error;
-    pixel_error = 0;
+/// Adds up a mean and its variance over pixels, each of which has values of its own.
+class PixelSums {
+ public:
+  /// `error`: what both halves disagree in, of the value.
+  void add(double value, double error) {
+    pixel_value_ += value;
+    pixel_error_ += error;
   }
+  void end_pixel() {
+    value_ += pixel_value_;
+    squared_values_ += pixel_value_ * pixel_value_;
+    squared_errors_ += pixel_error_ * pixel_error_;
+    pixel_value_ = pixel_error_ = 0;
+  }
+  double value() const { return value_; }
+  double standard_error(int pixels) const {
+    const double scatter = squared_values_ - value_ * value_ / pixels;
+    return std::sqrt(std::max(0.0, std::min(squared_errors_, scatter)));
+  }
+
+ private:
+  double value_ = 0, squared_values_ = 0, squared_errors_ = 0, pixel_value_ = 0, pixel_error_ = 0;
 };
 
 }  // namespace
@@ -59,23 +75,22 @@ LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, co
   if (!image.halved()) return {kUnknown, kUnknown, kUnknown, kUnknown};
   const double first = image.first, second = 1 - first;
   const std::size_t values = target.data.size(), per_pixel = values / static_cast<std::size_t>(target.pixels());
-  Sums loss, squared;
+  PixelSums loss, squared;
   for (std::size_t i = 0; i < values; ++i) {
     const double r = image.image.data[i] - target.data[i], d = image.difference.data[i];
     // Halves of unequal size add a term whose expectation is 0: so the squared loss is their product exactly.
     const double slope = 2 * rho.weight(r) * r, variance = first * second * d * d, odd = (second - first) / 2 * d;
-    loss.value += rho.value(r) + odd * slope - rho.second(r) / 2 * variance;
-    loss.pixel_error += slope * d / 2;
-    squared.value += (r + second * d) * (r - first * d);
-    squared.pixel_error += r * d;
+    loss.add(rho.value(r) + odd * slope - rho.second(r) / 2 * variance, slope * d / 2);
+    squared.add((r + second * d) * (r - first * d), r * d);
     if ((i + 1) % per_pixel == 0) {
       loss.end_pixel();
       squared.end_pixel();
     }
   }
-  if (!std::isfinite(loss.value) || !std::isfinite(squared.value)) return {kUnknown, kUnknown, kUnknown, kUnknown};
+  if (!std::isfinite(loss.value()) || !std::isfinite(squared.value())) return {kUnknown, kUnknown, kUnknown, kUnknown};
   const auto n = static_cast<double>(values);
-  return {loss.value / n, std::sqrt(loss.squares) / n, squared.value / n, std::sqrt(squared.squares) / n};
+  const int pixels = target.pixels();
+  return {loss.value() / n, loss.standard_error(pixels) / n, squared.value() / n, squared.standard_error(pixels) / n};
 }
 
 GatedImage loss_adjoint(const SplitImage& image, const GatedImage& target, const RobustLoss& rho) {

@@ -52,9 +52,12 @@ struct LossEstimate {
 };
 
 /// Of images of one shape. All NaN when a pixel is not finite, or where the image has a single sample and thus no
-/// halves. Standard errors take pixels for independent, the values of one pixel not: with
-/// e = rho'(I - T) D / 2 they are the root of sum over pixels (sum of e within the pixel)^2, over the number of values;
-/// for the product of two normal residuals, of whatever correlation, the square of that sum is its variance on average.
+/// halves. Standard errors take the values of one pixel for correlated, as the gates of one path are, and pixels for
+/// independent. The variance of the sum over a pixel is on average the square of its sum of e = rho'(I - T) D / 2, for
+/// normal noise of whatever correlation; few bright samples make that too large. The scatter of the sums over pixels
+/// bounds it, too, being too large by how much the residuals differ between pixels: the smaller of both is taken.
+/// Stated over true: 0.71 to 1.13 at the start and the target of seven scenes, but 2.4 once, where the random numbers of an
+/// image are spread over it, so that errors of pixels cancel, which this does not see.
 LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, const RobustLoss& rho = {});
 
 /// d(loss)/d(image), an estimate without the bias of the residual's noise (as above). `image` must come from random

@@ -18,6 +18,7 @@
 #include "optim/memory.h"
 #include "optim/problem.h"
 #include "optim/rendered_objective.h"
+#include "optim/report.h"
 #include "optim/run_folder.h"
 #include "optim/summary.h"
 #include "optim/vector_math.h"
@@ -52,6 +53,7 @@ class Run {
       result.status = RunStatus::interrupted;
     }
     write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_));
+    if (options_.report) options_.report(run_report(result, state_, last_, parameters_));
     return result.status;
   }
 

@@ -28,6 +28,7 @@ struct RunOptions {
   std::function<bool()> stop;                       ///< asked between passes; true: leave a checkpoint and return
   std::function<void(const Progress&)> progress;    ///< after every row of the log
   std::function<void(const std::string&)> warning;  ///< one line
+  std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
 };
 
 /// Optimises from the initial values. Throws InputError, before any rendering, when the experiment does not
