@@ -71,6 +71,8 @@ class Scaled : public Optimizer {
       if (next[i] == u[i]) result[i] = theta[i];  // what does not move keeps its bits
     return result;
   }
+  bool rejected() const override { return inner_->rejected(); }
+  bool scatters() const override { return inner_->scatters(); }
   void reset() override { inner_->reset(); }
   OptimizerState state() const override { return inner_->state(); }
   void restore(const OptimizerState& state) override { inner_->restore(state); }

@@ -78,7 +78,7 @@ TEST(Gradient, OfAnEmissionIsKnown) {
 TEST(Gradient, ResidualAndDerivativeAreIndependent) {
   // At the target, with one sample per pixel, all that is left of the residual is noise. The gradient
   // averages to zero, but to 2 Var(I) / e for the emission e if residual and derivative came from the same
-  // random numbers; the loss there is Var(I).
+  // random numbers; the mean square of the residual there is Var(I).
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
@@ -90,7 +90,9 @@ TEST(Gradient, ResidualAndDerivativeAreIndependent) {
   BatchStatistics statistics;
   for (std::uint32_t i = 0; i < 1000; ++i) {
     const Evaluation e = problem.evaluate(theta, target, i, go_on);
-    statistics.add({e.gradient[1], e.loss}, 1);
+    GatedImage residual = e.image;
+    for (std::size_t k = 0; k < residual.data.size(); ++k) residual.data[k] -= target.data[k];
+    statistics.add({e.gradient[1], mean_square(residual)}, 1);
   }
   const Statistics result = statistics.result();
   const double bias_if_shared = 2 * result.mean[1] / theta[1];

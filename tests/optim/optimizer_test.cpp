@@ -11,7 +11,6 @@
 #include "optim/adam.h"
 #include "optim/checkpoint.h"
 #include "optim/log.h"
-#include "optim/loss.h"
 #include "tests/optim/synthetic_objective.h"
 #include "tests/optim/temporary_folder.h"
 
@@ -62,30 +61,6 @@ TEST(Adam, StaysWithinBoundsAndDoesNotDependOnTheLossesUnit) {
   adam_step(options, {0x1p-200, -0x1p-200, 0.0}, lower, upper, scaled_state, scaled);
   EXPECT_EQ(theta, (std::vector<double>{0, 1, 0.5}));
   EXPECT_EQ(scaled, theta);
-}
-
-TEST(Loss, AdjointIsTheDerivativeOfTheLoss) {
-  GatedImage image(2, 1, 2, 3), target(2, 1, 2, 3);
-  for (std::size_t i = 0; i < image.data.size(); ++i) {
-    image.data[i] = std::sin(1.0 + static_cast<double>(i));
-    target.data[i] = std::cos(2.0 * static_cast<double>(i));
-  }
-  for (const RobustLoss& rho : {RobustLoss{}, RobustLoss{LossKind::huber, 0.5}, RobustLoss{LossKind::cauchy, 0.5}}) {
-    const GatedImage adjoint = loss_adjoint(image, target, rho);
-    for (std::size_t i = 0; i < image.data.size(); ++i) {
-      GatedImage up = image, down = image;
-      up.data[i] += 1e-4, down.data[i] -= 1e-4;
-      const double slope = (mean_loss(up, target, rho) - mean_loss(down, target, rho)) / 2e-4;
-      EXPECT_NEAR(adjoint.data[i], slope, 1e-8);  // entries of up to 0.3
-    }
-  }
-  GatedImage shifted = target;
-  for (double& value : shifted.data) value += 0.5;
-  EXPECT_NEAR(mean_loss(shifted, target), 0.25, 1e-15);
-  EXPECT_NEAR(mean_loss(shifted, target, {LossKind::huber, 0.2}), 0.2 * (2 * 0.5 - 0.2), 1e-15);
-  EXPECT_NEAR(mean_loss(shifted, target, {LossKind::cauchy, 0.2}), 0.04 * std::log(1 + 0.25 / 0.04), 1e-15);
-  shifted.data[3] = kInfinity;
-  EXPECT_TRUE(std::isnan(mean_loss(shifted, target)));
 }
 
 /// Four albedos: as many unknowns as the tests need, without geometry.
@@ -186,6 +161,24 @@ TEST(Checkpoint, IsOfOneVersionAndOneSetOfParameters) {
   EXPECT_THROW(load_checkpoint(folder.path(), Parameters(bound.scene, fewer), nullptr), InputError);
 }
 
+TEST(Checkpoint, KeepsWhatIsKnownOfTheDescent) {
+  const Bound bound;
+  const TemporaryFolder folder;
+  const Parameters parameters(bound.scene, bound.specs);
+  Checkpoint saved = awkward_checkpoint();
+  saved.descent = {{1, 2}, {0.5, 0.25}, {3}, {1.0 / 3}, {1, 2, 3, 4}, 5, true};
+  saved.steps_rejected = 6;
+  save_checkpoint(folder.path(), saved, parameters);
+  const auto loaded = load_checkpoint(folder.path(), parameters, nullptr);
+  ASSERT_TRUE(loaded.has_value());
+  EXPECT_EQ(loaded->descent.first, saved.descent.first);
+  EXPECT_EQ(bits(loaded->descent.recent_noise), bits(saved.descent.recent_noise));
+  EXPECT_EQ(loaded->descent.theta_sum, saved.descent.theta_sum);
+  EXPECT_EQ(loaded->descent.summed, 5);
+  EXPECT_TRUE(loaded->descent.judged);
+  EXPECT_EQ(loaded->steps_rejected, 6);
+}
+
 TEST(Log, CutsWhatTheCheckpointDoesNotKnow) {
   const Bound bound;
   const Parameters parameters(bound.scene, bound.specs);
@@ -195,13 +188,13 @@ TEST(Log, CutsWhatTheCheckpointDoesNotKnow) {
   {
     Log log(folder.file("log.csv"), parameters, 0);
     for (int i = 0; i < 3; ++i)
-      log.append({i, 0.5, 0.25, 0.5, nan, i == 1 ? nan : 2}, theta, {4, 5, 6, i == 1 ? nan : 7});
+      log.append({i, 0.5, 0.25, 0.5, nan, i == 1 ? nan : 2, 0.125}, theta, {4, 5, 6, i == 1 ? nan : 7});
   }
   const std::string header =
-      "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,a,b,c,d,a.rmse,b.rmse,c.rmse,"
+      "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,loss_noise,a,b,c,d,a.rmse,b.rmse,c.rmse,"
       "d.rmse,a.gradient,b.gradient,c.gradient,d.gradient\n";
-  const std::string rest = ",0.5,0.25,0.5,,2,1,2,3,0.1,,,,,4,5,6,7\n",
-                    unknown = ",0.5,0.25,0.5,,,1,2,3,0.1,,,,,4,5,6,\n";
+  const std::string rest = ",0.5,0.25,0.5,,2,0.125,1,2,3,0.1,,,,,4,5,6,7\n",
+                    unknown = ",0.5,0.25,0.5,,,0.125,1,2,3,0.1,,,,,4,5,6,\n";
   EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + unknown + "2" + rest);
   folder.write("log.csv", folder.read("log.csv") + "1,0.5");  // torn by a kill
   { Log log(folder.file("log.csv"), parameters, 2); }

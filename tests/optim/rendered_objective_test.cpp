@@ -50,7 +50,9 @@ TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
       }
     }
     const RobustLoss robust = problem.robust_loss(target);
-    const GatedImage adjoint = loss_adjoint(at.image, target, robust);
+    const SplitImage image = render_halves(renderer, problem.stream(Pass::primal, 5), {0, 16});
+    EXPECT_EQ(image.image.data, at.image.data);
+    const GatedImage adjoint = loss_adjoint(image, target, robust);
     for (int i : {0, 1}) {
       const double slope = inner_product(adjoint, jacobian[i]);
       EXPECT_NEAR(at.gradient[i], slope, 1e-12 * std::abs(slope));
@@ -102,6 +104,11 @@ TEST_F(Rendered, CurvatureIsUnbiased) {
     EXPECT_LT(std::abs(mean.mean[i] - expected[i]), 5 * mean.standard_error[i]) << i;
   EXPECT_GT(expected[0], 10 * mean.standard_error[0]);
   EXPECT_GT(mean.mean[3] - expected[0], 10 * mean.standard_error[3]);  // what the halves are for
+}
+
+TEST_F(Rendered, LossNeedsTwoSamples) {
+  EXPECT_NO_THROW(require_two_samples(Problem(load_experiment(file_, {"samples.primal=2"}))));
+  EXPECT_THROW(require_two_samples(Problem(load_experiment(file_, {"samples.primal=1"}))), InputError);
 }
 
 TEST_F(Rendered, SizeOfTheJacobianIsLimited) {

@@ -161,6 +161,38 @@ TEST(Loop, RejectsARiseAndRecoversWithHalfTheRate) {
   EXPECT_NEAR(outcome.state.theta[0], 0, 0.05);
 }
 
+TEST(Loop, JudgesLossesByTheirStandardErrors) {
+  // At the optimum, estimates about 0: neither ten times the first one, which noise made negative, nor one lucky
+  // estimate below the tolerance says anything.
+  class AtTheOptimum : public NoisyQuadratic {
+   public:
+    double stated = 0.1;
+    Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override {
+      Evaluation result;
+      result.loss = result.mean_squared_error = iteration % 2 == 0 ? -0.1 : 0.1;
+      result.loss_noise = result.mean_squared_error_noise = stated;
+      result.gradient = {0 * theta[0]};
+      return result;
+    }
+  } objective;
+  const auto status = [&](double rmse, int iterations) {
+    Checkpoint state;
+    state.theta = {0};
+    const Preconditioner none;
+    const auto optimizer = make_adam(0.1, none);
+    LoopOptions options;
+    options.iterations = iterations;
+    options.converged_rmse = rmse;
+    options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
+    options.save = [] {};
+    return run_loop(objective, *optimizer, 0, options, state).status;
+  };
+  EXPECT_EQ(status(0.2, 7), RunStatus::iterations_reached);
+  EXPECT_EQ(status(0.4, 7), RunStatus::converged);  // -0.1 + 2 x 0.1 < 0.16
+  objective.stated = 1e-4;
+  EXPECT_EQ(status(0, 7), RunStatus::diverged);
+}
+
 TEST(Loop, GivesUpAndReturnsTheBest) {
   NoisyQuadratic objective;
   objective.noise = 0.01;

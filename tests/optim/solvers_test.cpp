@@ -208,6 +208,43 @@ TEST_P(Solvers, SurviveALossThatIsNotFinite) {
   EXPECT_GT(state.theta[0], 1.3);
 }
 
+TEST_P(Solvers, TellOfRejectedSteps) {
+  // No point but the start is any good.
+  ExponentialFit fit;
+  fit.inject = [](const std::vector<double>& theta, double loss) { return theta[0] == 1 ? loss : 1e6; };
+  Checkpoint state;
+  state.theta = {1, 0.2};
+  const auto optimizer = make_optimizer(spec(), kNone, {1, 2});
+  EXPECT_EQ(optimizer->scatters(), GetParam() != OptimizerMethod::adam);
+  std::vector<std::string> warnings;
+  LoopOptions options;
+  options.iterations = 7;
+  options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
+  options.save = [] {};
+  options.warning = [&](const std::string& text) { warnings.push_back(text); };
+  run_loop(fit, *optimizer, 0, options, state);
+  if (GetParam() == OptimizerMethod::adam) {  // steps without a look at the loss
+    EXPECT_EQ(state.steps_rejected, 0);
+    return;
+  }
+  EXPECT_EQ(state.theta, (std::vector<double>{1, 0.2}));
+  EXPECT_EQ(state.steps_rejected, 7);
+  ASSERT_EQ(warnings.size(), 1u);  // after five, once
+  EXPECT_NE(warnings[0].find("iteration 4: 5 iterations in a row found no lower loss"), std::string::npos);
+}
+
+TEST_P(Solvers, GoOnWhereTheLossIsBelowZero) {
+  // An unbiased estimate near the optimum; the constant is beside the point.
+  ExponentialFit fit;
+  fit.loss_noise = 0.01;
+  fit.inject = [](auto&, double loss) { return loss - 0.01; };
+  Checkpoint state;
+  state.theta = {1.95, 0.68};  // a loss of 6e-4 less the constant
+  run(fit, spec(), GetParam() == OptimizerMethod::adam ? 600 : 15, state);
+  EXPECT_NEAR(state.theta[0], 2, 1e-3);
+  EXPECT_NEAR(state.theta[1], 0.7, 1e-3);
+}
+
 TEST(Lbfgs, NeedsFarFewerGradientsThanAdam) {
   const ExponentialFit lbfgs_fit, lm_fit;
   Checkpoint a, b;

@@ -14,6 +14,7 @@ namespace isochron {
 class ExponentialFit : public Objective {
  public:
   double residual_noise = 0, jacobian_noise = 0;  ///< standard deviations of single entries
+  double loss_noise = 0;                          ///< stated, not made
   std::vector<double> low{-10, -10}, high{10, 10};
   /// Called with theta and the loss of every evaluation; what it returns is the loss.
   std::function<double(const std::vector<double>&, double)> inject = [](auto&, double loss) { return loss; };
@@ -38,6 +39,7 @@ class ExponentialFit : public Objective {
     Evaluation result;
     result.loss = loss(theta, iteration);
     result.mean_squared_error = result.loss;
+    result.loss_noise = loss_noise;
     result.gradient.assign(2, 0.0);
     result.curvature.assign(4, 0.0);
     result.curvature_bound.assign(4, 0.0);

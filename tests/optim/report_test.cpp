@@ -1,0 +1,96 @@
+#include "optim/report.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "optim/summary.h"
+
+namespace isochron {
+namespace {
+
+class Report : public testing::Test {
+ protected:
+  Report() {
+    scene_.materials.push_back({.name = "wall"});
+    scene_.materials.push_back({.name = "thing"});
+    state_.iteration = 12;
+    state_.seconds = 3.25;
+    state_.loss_initial = 0.5;
+    state_.loss_noise_initial = 0.01;
+    state_.image_rmse_initial = 0.7;
+    state_.steps_rejected = 3;
+    state_.safeguard.rejected = 1;
+    for (int i = 0; i < 8; ++i) {
+      state_.descent.recent.push_back(i % 2 == 0 ? 1 : -1);  // variance 8 / 7
+      state_.descent.recent_noise.push_back(0.5);
+    }
+    last_.loss = 1e-4;
+    last_.loss_noise = 2e-4;
+    last_.image_rmse = 0.01;
+  }
+  ParameterSpec albedo(const char* material, std::vector<double> initial, std::vector<double> target) const {
+    ParameterSpec spec;
+    spec.name = spec.material = material;
+    spec.type = ParameterType::albedo;
+    spec.initial = std::move(initial);
+    spec.target = std::move(target);
+    return spec;
+  }
+  Scene scene_;
+  Checkpoint state_;
+  LogRow last_;
+};
+
+TEST_F(Report, ShowsParametersErrorsAndNoise) {
+  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
+  state_.theta = {0.6875, 0.375};
+  const std::string text = run_report({RunStatus::converged, FinalChoice::average}, state_, last_, parameters);
+  EXPECT_EQ(text,
+            "converged after 12 iterations, 3.25 s, 4 steps rejected; final parameters: average\n"
+            "  parameter        initial          found         target          error  initial error\n"
+            "  wall                 0.5         0.6875            0.7        -0.0125           -0.2\n"
+            "  thing               0.25          0.375              -              -              -\n"
+            "  loss 0.0001 +- 0.0002 (at the start 0.5 +- 0.01): it cannot be told from 0\n"
+            "  noise makes 22 % of the loss's variance over the last 8 iterations\n"
+            "  image RMSE 0.01 (at the start 0.7)\n");
+  EXPECT_EQ(files_to_look_at("runs/x", false),
+            "  runs/x: summary.yaml, log.csv, final.exr beside target.exr and initial.exr\n");
+  EXPECT_NE(files_to_look_at("runs/x", true).find("rmse.png"), std::string::npos);
+
+  const std::string summary = summary_yaml({RunStatus::converged, FinalChoice::average}, state_, last_, parameters);
+  EXPECT_NE(summary.find("rejected_steps: 4\n"), std::string::npos) << summary;
+  EXPECT_NE(summary.find("loss_noise_initial: 0.01\nloss_noise_final: 0.0002\nnoise_share: 0.21875\n"),
+            std::string::npos)
+      << summary;
+}
+
+TEST_F(Report, ManyComponentsAreOneRow) {
+  scene_.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}};
+  scene_.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0}, {{1, 2, 3}, 0}};
+  scene_.shapes = {{.name = "tetra",
+                    .file = "",
+                    .material = 0,
+                    .emission = {},
+                    .first_vertex = 0,
+                    .vertex_count = 4,
+                    .first_triangle = 0,
+                    .triangle_count = 4}};
+  ParameterSpec dent;
+  dent.name = "dent";
+  dent.type = ParameterType::vertices;
+  dent.shape = "tetra";
+  dent.direction = {0, 1, 0};
+  dent.initial = {1};
+  dent.target = {0};
+  const Parameters parameters(scene_, {dent});
+  state_.theta = {0.3, -0.3, 0.1, -0.1};
+  // The root of (0.09 + 0.09 + 0.01 + 0.01) / 4.
+  const std::string text = run_report({}, state_, last_, parameters);
+  EXPECT_NE(text.find("  dent (rms of 4)              1        0.22361              0        0.22361              1\n"),
+            std::string::npos)
+      << text;
+}
+
+}  // namespace
+}  // namespace isochron
