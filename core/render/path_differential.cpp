@@ -86,12 +86,13 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
   // Each material point counts its area but that of x1, which the pixel holds.
   for (int k = 2; k < count; ++k) extra[k].area = 1;
 
-  // What an area of the surface at x1 takes of the image: W_e = (n . ray) / (forward . ray)^3, up to a factor; theory
-  // section 8.
   const Vec3 ray = x[1].p - x[0].p;
-  const Vec3& forward = scene.camera.forward;
   const double height = dot(x[1].n, ray);
-  const Vec3 log_density = x[1].n / height - forward * (3 / dot(forward, ray));
+  // Gradient of what an area of the surface at x1 takes of the image, ln |n . ray| / (forward . ray)^3 (theory section 8).
+  const auto log_density = [&] {
+    const Vec3& forward = scene.camera.forward;
+    return x[1].n / height - forward * (3 / dot(forward, ray));
+  };
   VertexFlows::Pair before, after;
   Extra lost_by_pixel;
   for (int k = 1; k < count; ++k) {
@@ -99,7 +100,7 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
     const VertexFlow flow = VertexFlows::at(before, after, k);
     before = after;
     if (!flow.follows()) continue;
-    const Extra lost = let_follow(flow, x[k], g[k], k == 1 ? log_density : Vec3(), &extra[k - 1], &extra[k],
+    const Extra lost = let_follow(flow, x[k], g[k], k == 1 ? log_density() : Vec3(), &extra[k - 1], &extra[k],
                                   k + 1 < count ? &extra[k + 1] : nullptr);
     if (k == 1) {
       lost_by_pixel = lost;
@@ -112,9 +113,12 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
   }
 
   // The pixel flow: along the ray, as far as the surface moves along its normal.
-  const Vec3 squeezed = g[1].position - lost_by_pixel.position + log_density * lost_by_pixel.area;
-  g[1].normal += ray * (lost_by_pixel.area / height);
-  g[1].position = x[1].n * (dot(ray, squeezed) / height);
+  Vec3 through_ray = g[1].position - lost_by_pixel.position;
+  if (lost_by_pixel.area > 0) {
+    through_ray += log_density() * lost_by_pixel.area;
+    g[1].normal += ray * (lost_by_pixel.area / height);
+  }
+  g[1].position = x[1].n * (dot(ray, through_ray) / height);
   g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
   for (int k = 1; k < count; ++k) {
     g[k].position += extra[k].position;
