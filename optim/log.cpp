@@ -68,7 +68,7 @@ void Log::append(const LogRow& row, const std::vector<double>& theta, const std:
   for (const Parameters::Block& block : parameters_.blocks())
     text += fmt::format(",{}", number(parameters_.distance_to_target(theta, block)));
   columns(gradient);
-  text += "," + number(row.loss_noise) + "\n";
+  text += fmt::format(",{}\n", number(row.loss_noise));
   // The row must be on the disk before the checkpoint that follows it: a resume never writes it again.
   if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0 ||
       fsync(fileno(file_.get())) != 0)
