@@ -16,7 +16,7 @@ namespace {
 constexpr int kMostColumns = 16;
 
 std::string header(const Parameters& parameters) {
-  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,loss_noise";
+  std::string text = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm";
   const auto columns = [&](const char* norm, const char* suffix) {
     for (const Parameters::Block& block : parameters.blocks()) {
       if (block.count > kMostColumns) {
@@ -30,7 +30,7 @@ std::string header(const Parameters& parameters) {
   columns(".norm", "");
   for (const Parameters::Block& block : parameters.blocks()) text += fmt::format(",{}.rmse", block.name);
   columns(".gradient_norm", ".gradient");
-  return text + "\n";
+  return text + ",loss_noise\n";
 }
 
 }  // namespace
@@ -51,9 +51,8 @@ Log::Log(const std::string& file, const Parameters& parameters, int next) : name
 
 void Log::append(const LogRow& row, const std::vector<double>& theta, const std::vector<double>& gradient) {
   const auto number = [](double value) { return std::isfinite(value) ? exact(value) : std::string(); };
-  std::string text = fmt::format("{},{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss),
-                                 number(row.image_rmse), number(row.param_rmse), number(row.gradient_norm),
-                                 number(row.loss_noise));
+  std::string text = fmt::format("{},{},{},{},{},{}", row.iteration, row.seconds, number(row.loss),
+                                 number(row.image_rmse), number(row.param_rmse), number(row.gradient_norm));
   const auto columns = [&](const std::vector<double>& values) {
     for (const Parameters::Block& block : parameters_.blocks()) {
       if (block.count > kMostColumns) {
@@ -69,7 +68,7 @@ void Log::append(const LogRow& row, const std::vector<double>& theta, const std:
   for (const Parameters::Block& block : parameters_.blocks())
     text += fmt::format(",{}", number(parameters_.distance_to_target(theta, block)));
   columns(gradient);
-  text += "\n";
+  text += fmt::format(",{}\n", number(row.loss_noise));
   // The row must be on the disk before the checkpoint that follows it: a resume never writes it again.
   if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0 ||
       fsync(fileno(file_.get())) != 0)

@@ -191,10 +191,10 @@ TEST(Log, CutsWhatTheCheckpointDoesNotKnow) {
       log.append({i, 0.5, 0.25, 0.5, nan, i == 1 ? nan : 2, 0.125}, theta, {4, 5, 6, i == 1 ? nan : 7});
   }
   const std::string header =
-      "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,loss_noise,a,b,c,d,a.rmse,b.rmse,c.rmse,"
-      "d.rmse,a.gradient,b.gradient,c.gradient,d.gradient\n";
-  const std::string rest = ",0.5,0.25,0.5,,2,0.125,1,2,3,0.1,,,,,4,5,6,7\n",
-                    unknown = ",0.5,0.25,0.5,,,0.125,1,2,3,0.1,,,,,4,5,6,\n";
+      "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,a,b,c,d,a.rmse,b.rmse,c.rmse,"
+      "d.rmse,a.gradient,b.gradient,c.gradient,d.gradient,loss_noise\n";
+  const std::string rest = ",0.5,0.25,0.5,,2,1,2,3,0.1,,,,,4,5,6,7,0.125\n",
+                    unknown = ",0.5,0.25,0.5,,,1,2,3,0.1,,,,,4,5,6,,0.125\n";
   EXPECT_EQ(folder.read("log.csv"), header + "0" + rest + "1" + unknown + "2" + rest);
   folder.write("log.csv", folder.read("log.csv") + "1,0.5");  // torn by a kill
   { Log log(folder.file("log.csv"), parameters, 2); }
