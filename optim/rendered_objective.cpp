@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/math/error.h"
 #include "optim/gauss_newton.h"
@@ -69,6 +70,7 @@ void require_jacobian_fits(const Problem& problem) {
 }
 
 double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {
+  if (!problem_.can_render(theta)) return std::numeric_limits<double>::infinity();
   const GatedImage image =
       problem_.render(theta, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
   poll_();
@@ -80,6 +82,7 @@ Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::ui
 }
 
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
+  if (!problem_.can_render(theta)) return problem_.no_evaluation(target_);
   const RobustLoss robust = problem_.robust_loss(target_);
   Evaluation result;
   result.image =
