@@ -5,6 +5,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "core/image/image.h"
+#include "optim/darkness.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 
@@ -15,10 +16,12 @@ int render(const CommonOptions& options) {
   begin_session(options);
   const Problem problem(read_experiment(options), warn);
   const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
-  const std::string folder = output_folder(options, problem.experiment());
+  const std::string folder = output_folder(options, problem.experiment(), "-render");
   make_output_folder(folder);
   catch_interrupts();
   const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
+  require_finite(estimate.image, "the image");
+  if (const std::string dark = darkness_warning(problem, theta, estimate.image, "the image"); !dark.empty()) warn(dark);
   write_exr(folder + "/render.exr", estimate.image);
   std::string table = "gate,mean,standard_error\n";
   for (int g = 0; g < problem.gates().size(); ++g)

@@ -26,6 +26,9 @@ struct GatedImage {
   }
 };
 
+/// Throws std::runtime_error where a value is not finite, or would not be as a 32-bit float; `what` says of which image.
+void require_finite(const GatedImage& image, const std::string& what);
+
 /// Writes 32-bit float channels `gateNNN.R/G/B` (three channels) or `gateNNN.Y` (one), by temporary name and rename.
 /// Throws InputError when the file cannot be written.
 void write_exr(const std::string& file, const GatedImage& image);
