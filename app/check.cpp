@@ -6,10 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <stdexcept>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "optim/darkness.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
 #include "optim/memory.h"
@@ -38,6 +40,11 @@ std::vector<int> components_to_check(const Parameters& parameters, const Paramet
   return components;
 }
 
+/// Neither derivative nor finite difference has seen anything.
+bool is_empty(const Comparison& row) {
+  return row.total == 0 && row.standard_error == 0 && row.finite_difference == 0 && row.finite_difference_error == 0;
+}
+
 void print_table(const std::vector<Comparison>& table, double limit) {
   std::size_t width = std::string_view("parameter").size();
   for (const Comparison& row : table) width = std::max(width, row.parameter.size());
@@ -49,7 +56,9 @@ void print_table(const std::vector<Comparison>& table, double limit) {
         "{:>7.2f}  {}\n",
         row.parameter, width, row.gate, row.terms[0], row.terms[1], row.terms[2], row.total, row.standard_error,
         row.finite_difference, row.finite_difference_error, row.z,
-        disagreements({row}, limit).empty() ? "ok" : "DIFFERS");
+        is_empty(row)                         ? "nothing"
+        : disagreements({row}, limit).empty() ? "ok"
+                                              : "DIFFERS");
 }
 
 int check(const CheckCommand& command) {
@@ -61,7 +70,7 @@ int check(const CheckCommand& command) {
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
   require_memory(problem, derivative_memory(problem, 1, 6));
-  const std::string folder = output_folder(command.common, problem.experiment());
+  const std::string folder = output_folder(command.common, problem.experiment(), "-check");
   make_output_folder(folder);
   catch_interrupts();
   for (const std::string& note : notes) fmt::print("{}\n", note);
@@ -81,26 +90,38 @@ int check(const CheckCommand& command) {
   display.end();
   const int comparisons = static_cast<int>(table.size());
   const double limit = false_alarm_limit(comparisons, check_batches(problem) - 1);
+  for (const Comparison& row : table)
+    if (!std::isfinite(row.total) || !std::isfinite(row.finite_difference))
+      throw std::runtime_error(fmt::format("the derivative by {} is not finite: values overflow", row.parameter));
+  write_file_atomically(folder + "/check.csv", check_csv(table));
   print_table(table, limit);
   const std::size_t wrong = disagreements(table, limit).size();
   fmt::print("{} of {} differ; limit |z| = {:.2f} (1 % chance of a false alarm in the whole table)\n", wrong,
              comparisons, limit);
   if (wrong > 0)
     fmt::print("Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
-  write_file_atomically(folder + "/check.csv", check_csv(table));
+  const auto empty = static_cast<int>(std::count_if(table.begin(), table.end(), is_empty));
+  if (empty > 0) {
+    fmt::print("{} of {} compare nothing with nothing\n", empty, comparisons);
+    const GatedImage image =
+        problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
+    const std::string dark = darkness_warning(problem, theta, image, "the image");
+    if (!dark.empty()) warn(dark);
+    if (empty == comparisons) spdlog::error("nothing was checked: every derivative is zero, as is every difference");
+  }
   HeavyTails tails;
   for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.kurtosis);
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {}/check.csv", folder);
-  return wrong == 0 ? 0 : 1;
+  return wrong == 0 && empty < comparisons ? 0 : 1;
 }
 
 }  // namespace
 
 void add_check(CLI::App& app, Action& action) {
   auto command = std::make_shared<CheckCommand>();
-  CLI::App* sub =
-      app.add_subcommand("check", "Compare the derivatives with finite differences; exit status 1 if they differ");
+  CLI::App* sub = app.add_subcommand(
+      "check", "Compare the derivatives with finite differences; exit status 1 if they differ or are all zero");
   add_experiment_options(*sub, command->common);
   add_parameter_option(*sub, command->parameter);
   sub->footer(

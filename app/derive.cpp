@@ -8,9 +8,11 @@
 #include "app/plots.h"
 #include "app/progress.h"
 #include "core/image/image.h"
+#include "optim/darkness.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
+#include "optim/loss.h"
 #include "optim/memory.h"
 
 namespace isochron {
@@ -31,7 +33,7 @@ int derive(const DeriveCommand& command) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block block = chosen_parameter(parameters, command.parameter);
-  const std::string folder = output_folder(command.common, problem.experiment());
+  const std::string folder = output_folder(command.common, problem.experiment(), "-derive");
 
   const Camera& camera = problem.scene().camera;
   const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
@@ -45,6 +47,7 @@ int derive(const DeriveCommand& command) {
   ProgressStage stage("rendering the derivatives", (block.count + group - 1) / group);
   std::string table = "parameter,gate,component,mean,standard_error,kurtosis\n";
   HeavyTails tails;
+  bool dark = true;  // every derivative is exactly zero
   for (int first = block.begin; first < block.begin + block.count; first += group) {
     const int count = std::min(group, block.begin + block.count - first);
     const auto components = estimate_derivatives(problem, theta, first, count, poll_interrupt);
@@ -55,6 +58,8 @@ int derive(const DeriveCommand& command) {
       for (const DerivativeEstimate& component : components) {
         names.push_back(component.component);
         images.push_back(component.images[i]);
+        require_finite(images.back(), fmt::format("{} of {}", component.component, name));
+        dark = dark && mean_square(images.back()) == 0;
       }
       write_exr_components(folder + "/" + name + ".exr", names, images, exr_notes(problem.experiment().gates));
       for (int g = 0; g < problem.gates().size(); ++g)
@@ -69,6 +74,12 @@ int derive(const DeriveCommand& command) {
   }
   display.end();
   write_file_atomically(folder + "/derive.csv", table);
+  if (dark) {
+    const GatedImage image =
+        problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
+    const std::string warning = darkness_warning(problem, theta, image, "the image");
+    warn(warning.empty() ? "every derivative is zero: no parameter changes what the gates see" : warning);
+  }
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote derivative images and {}/derive.csv", folder);
   return command.common.no_plots || draw_plots(folder) ? 0 : 1;

@@ -2,10 +2,13 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <cmath>
+#include <stdexcept>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "optim/darkness.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/heavy_tail.h"
@@ -21,12 +24,15 @@ int gradient(const CommonOptions& options) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(options.at.empty() ? "initial" : options.at);
   require_memory(problem, image_memory(problem));
-  const std::string folder = output_folder(options, problem.experiment());
+  const std::string folder = output_folder(options, problem.experiment(), "-gradient");
   make_output_folder(folder);
   catch_interrupts();
   gradient_repeats(problem);  // too few samples must show before the target is rendered
   ProgressDisplay display(options.quiet);
   const GatedImage target = problem.make_target(poll_interrupt);
+  if (const std::string dark = darkness_warning(problem, point_of_target(problem, theta), target, "the target");
+      !dark.empty())
+    warn(dark);
   const auto start = std::chrono::steady_clock::now();
   const GradientEstimate estimate = estimate_gradient(problem, theta, target, poll_interrupt);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -36,6 +42,8 @@ int gradient(const CommonOptions& options) {
   HeavyTails tails;
   for (int i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.component_names()[i];
+    if (!std::isfinite(estimate.gradient.mean[i]) || !std::isfinite(estimate.gradient.standard_error[i]))
+      throw std::runtime_error(fmt::format("the gradient of {} is not finite: values overflow", name));
     table += fmt::format("{},{},{},{},{}\n", name, theta[i], estimate.gradient.mean[i],
                          estimate.gradient.standard_error[i], estimate.gradient.kurtosis[i]);
     tails.add(name, -1, estimate.gradient.kurtosis[i]);

@@ -1,21 +1,48 @@
 // The program: parses the command line, runs one command, turns exceptions into messages and exit statuses
 // (0: done, 1: failed, 2: the input cannot be used).
+#include <fmt/format.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <csignal>
+#include <cstdio>
 #include <exception>
+#include <iostream>
 #include <new>
 #include <string>
+#include <vector>
 
 #include "app/commands.h"
 #include "app/progress.h"
 #include "core/math/error.h"
 #include "core/render/parallel.h"
 #include "core/render/progress.h"
+#include "core/scene/yaml_reader.h"
+#include "optim/problem.h"
 
 namespace {
+
+/// A mistyped command, and the one that is probably meant.
+std::string suggestion(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return {};
+  std::vector<std::string> known;
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+    known.push_back(command->get_name());
+  if (std::find(known.begin(), known.end(), argv[1]) != known.end()) return {};
+  const std::string near = isochron::nearest_word(argv[1], known);
+  return fmt::format("{} is not a command{}", isochron::quote(argv[1]),
+                     near.empty() ? "" : fmt::format(", did you mean '{}'?", near));
+}
+
+/// Reports what of the standard output could not be written, as on a full disk; status 1 then.
+int flushed(int status) {
+  std::cout.flush();
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return status;
+  spdlog::error("the standard output cannot be written");
+  return status == 0 ? 1 : status;
+}
 
 std::string one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
@@ -26,6 +53,7 @@ std::string one_line(std::string text) {
 
 int main(int argc, char** argv) {
   isochron::keep_freed_memory();
+  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of its write
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   isochron::keep_messages_off_the_bar();
@@ -45,11 +73,12 @@ int main(int argc, char** argv) {
   isochron::add_stability(app, action);
   try {
     app.parse(argc, argv);
-    return action();
+    return flushed(action());
   } catch (const CLI::Success& request) {
-    return app.exit(request);
+    return flushed(app.exit(request));
   } catch (const CLI::ParseError& error) {
-    spdlog::error("{} (see isochron --help)", one_line(error.what()));
+    const std::string mistyped = suggestion(app, argc, argv);
+    spdlog::error("{} (see isochron --help)", mistyped.empty() ? one_line(error.what()) : mistyped);
     return 2;
   } catch (const isochron::InputError& error) {
     spdlog::error("{}", one_line(error.what()));

@@ -21,8 +21,10 @@ void add_session_options(CLI::App& command, CommonOptions& options) {
 }
 
 void add_experiment_options(CLI::App& command, CommonOptions& options) {
+  const std::string folder_help =
+      fmt::format("output folder; default runs/NAME{}", command.get_name() == "run" ? "" : "-" + command.get_name());
   command.add_option("experiment", options.file, "experiment file")->required()->type_name("EXPERIMENT.yaml");
-  command.add_option("-o,--output", options.output, "output folder; default runs/NAME")->type_name("DIR");
+  command.add_option("-o,--output", options.output, folder_help)->type_name("DIR");
   command
       .add_option("--at", options.at,
                   "values of the parameters: initial (default), target, or NAME=VALUE[,NAME=VALUE...] with "
@@ -38,7 +40,7 @@ void add_experiment_options(CLI::App& command, CommonOptions& options) {
   command
       .add_option("--set", options.set,
                   "replace a value of the experiment file, such as optimizer.iterations=10 or "
-                  "parameters[0].initial=0.2; may be repeated")
+                  "parameters[0].initial=0.2; KEY.PATH= with nothing behind it removes the key; may be repeated")
       ->type_name("KEY.PATH=VALUE")
       ->expected(1)
       ->take_all()

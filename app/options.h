@@ -17,7 +17,7 @@ using Action = std::function<int()>;
 
 struct CommonOptions {
   std::string file;            ///< experiment, or for resume the folder
-  std::string output;          ///< empty: runs/NAME
+  std::string output;          ///< empty: runs/NAME of run, runs/NAME-COMMAND of others
   std::string at;              ///< empty: initial
   std::optional<int> samples;  ///< per pixel, for every term that is not left out
   int threads = 0;             ///< 0: all cores

@@ -6,6 +6,7 @@
 #include "app/plots.h"
 #include "app/progress.h"
 #include "core/image/image.h"
+#include "optim/darkness.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/memory.h"
@@ -18,12 +19,14 @@ int render(const CommonOptions& options) {
   const Problem problem(read_experiment(options), warn);
   const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
   require_memory(problem, image_memory(problem));
-  const std::string folder = output_folder(options, problem.experiment());
+  const std::string folder = output_folder(options, problem.experiment(), "-render");
   make_output_folder(folder);
   catch_interrupts();
   ProgressDisplay display(options.quiet);
   const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
   display.end();
+  require_finite(estimate.image, "the image");
+  if (const std::string dark = darkness_warning(problem, theta, estimate.image, "the image"); !dark.empty()) warn(dark);
   write_exr(folder + "/render.exr", estimate.image, exr_notes(problem.experiment().gates));
   std::string table = "gate,mean,standard_error\n";
   for (int g = 0; g < problem.gates().size(); ++g)

@@ -55,7 +55,8 @@ std::vector<std::pair<const char*, std::vector<double>*>> lists_of(DescentState&
 
 Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters) {
   const std::size_t tail = text.rfind(kChecksumKey);
-  if (tail == std::string::npos || text.substr(tail) != kChecksumKey + checksum(std::string_view(text).substr(0, tail)) + "\n")
+  if (tail == std::string::npos ||
+      text.substr(tail) != kChecksumKey + checksum(std::string_view(text).substr(0, tail)) + "\n")
     throw Damaged("checksum does not match");
   const YAML::Node root = YAML::Load(text);
   const std::string version = root["version"].as<std::string>();

@@ -10,14 +10,12 @@
 
 #include "core/math/error.h"
 #include "core/scene/scene_loader.h"
-#include "optim/number_file.h"
+#include "optim/experiment_reader.h"
 
 namespace isochron {
 namespace {
 
-constexpr double kSpeedOfLight = 299792458;  // m/s
 constexpr int kMostSamples = 1 << 30;
-constexpr int kMostGates = 100000;
 constexpr int kMostBounces = 10000;
 
 /// Names become file names and columns.
@@ -30,29 +28,8 @@ std::string file_name(const YamlValue& value) {
   return name;
 }
 
-/// Where paths start from, and the files of numbers that were read.
-struct Folder {
-  std::filesystem::path path;
-  std::vector<std::string> number_files;
-};
-
-std::string existing_file(const YamlValue& value, const Folder& folder) {
-  const std::string text = value.text();
-  std::error_code none;  // such as of names that are too long
-  const std::filesystem::path path = std::filesystem::weakly_canonical(folder.path / text, none);
-  if (none || !std::filesystem::is_regular_file(path, none))
-    value.fail("there is no file " + quote(text), "a path relative to the experiment file");
-  return path.string();
-}
-
-/// Rows of a file of numbers.
-std::vector<std::vector<double>> read_numbers(const YamlValue& value, Folder& folder, int columns = 0) {
-  folder.number_files.push_back(existing_file(value, folder));
-  return read_number_file(folder.number_files.back(), columns);
-}
-
 /// A number, a list of numbers or the name of a text file of numbers.
-std::vector<double> read_values(const YamlValue& value, Folder& folder) {
+std::vector<double> read_values(const YamlValue& value, InputFolder& folder) {
   if (value.is_number()) return {value.number()};
   if (value.is_map()) value.fail("is a map", "a number, a list of numbers or a text file");
   std::vector<double> values;
@@ -63,72 +40,6 @@ std::vector<double> read_values(const YamlValue& value, Folder& folder) {
   }
   if (values.empty()) value.fail("holds no number", "at least one");
   return values;
-}
-
-std::vector<double> read_centers(const YamlValue& value) {
-  std::vector<double> centers;
-  if (value.is_map()) {
-    YamlMap map = value.map();
-    const double start = map.require("start").number(NumberRange::non_negative());
-    const YamlValue stop_value = map.require("stop");
-    const double stop = stop_value.number(NumberRange::non_negative());
-    const int count = static_cast<int>(map.require("count").integer(1, kMostGates));
-    map.reject_unknown();
-    if (stop < start) stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
-    for (int i = 0; i < count; ++i) centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
-    return centers;
-  }
-  if (!value.is_list()) value.fail("is neither", "a list of numbers, or {start, stop, count}");
-  centers = value.numbers(NumberRange::non_negative());
-  if (centers.empty()) value.fail("holds no gate", "at least one number");
-  return centers;
-}
-
-GateSpec read_gates(const YamlValue& value, Folder& folder) {
-  YamlMap map = value.map();
-  GateSpec gates;
-  constexpr GateKind kKinds[] = {GateKind::steady, GateKind::gaussian, GateKind::boxcar, GateKind::truncated_gaussian,
-                                 GateKind::tabulated};
-  gates.kind = kKinds[map.require("kind").choice({"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"})];
-  if (const auto unit = map.find("unit")) gates.unit = static_cast<LengthUnit>(unit->choice({"scene", "ns", "ps"}));
-  if (gates.unit != LengthUnit::scene)
-    gates.scene_unit_m = map.require("scene_unit_m").number(NumberRange::positive());
-  else if (const auto metres = map.find("scene_unit_m"))
-    gates.scene_unit_m = metres->number(NumberRange::positive());
-  if (gates.kind != GateKind::steady) gates.centers = read_centers(map.require("centers"));
-  const auto positive = [&](const char* key) { return map.require(key).number(NumberRange::positive()); };
-  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian) gates.sigma = positive("sigma");
-  if (gates.kind == GateKind::boxcar) gates.width = positive("width");
-  if (gates.kind == GateKind::truncated_gaussian) gates.half_width = positive("half_width");
-  if (gates.kind == GateKind::tabulated) {
-    if (const auto file = map.find("file")) {
-      for (const auto& row : read_numbers(*file, folder, 2)) {
-        gates.offsets.push_back(row[0]);
-        gates.values.push_back(row[1]);
-      }
-    } else {
-      gates.offsets = map.require("offsets").numbers();
-      const YamlValue values = map.require("values");
-      gates.values = values.numbers();
-      if (gates.values.size() != gates.offsets.size())
-        values.fail(fmt::format("{} values are given", gates.values.size()),
-                    fmt::format("one for each of the {} offsets", gates.offsets.size()));
-    }
-    const bool sorted = std::is_sorted(gates.offsets.begin(), gates.offsets.end());
-    const bool positive_values =
-        std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
-        std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
-    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive_values)
-      value.fail("the table is no gate",
-                 "two rows or more, offsets in rising order, values at least 0 and one of them above");
-  }
-  map.reject_unknown();
-  try {
-    make_gates(gates);
-  } catch (const std::exception& error) {
-    value.fail(error.what());
-  }
-  return gates;
 }
 
 Selection read_selection(const YamlValue& value) {
@@ -165,7 +76,21 @@ void read_pivot(const YamlValue& value, ParameterSpec& spec) {
   }
 }
 
-ParameterSpec read_parameter(const YamlValue& value, Folder& folder, bool target_required) {
+/// A misplaced key gets its types named.
+void explain_keys_of_other_types(ParameterType type, YamlMap& map) {
+  const auto explain = [&](const char* key, const char* types) {
+    map.explain(key, fmt::format("belongs to {}, not to {}", types, name(type)));
+  };
+  explain("shape", "translation, rotation, vertices and emission");
+  explain("material", "albedo, roughness and ior");
+  explain("selection", "translation, rotation and vertices");
+  explain("direction", "translation and vertices");
+  explain("axis", "rotation");
+  explain("pivot", "rotation");
+  explain("smoothing", "vertices");
+}
+
+ParameterSpec read_parameter(const YamlValue& value, InputFolder& folder, bool target_required) {
   YamlMap map = value.map();
   ParameterSpec spec;
   spec.where.emplace("", value);
@@ -214,6 +139,7 @@ ParameterSpec read_parameter(const YamlValue& value, Folder& folder, bool target
       smoothing.reject_unknown();
     }
   }
+  explain_keys_of_other_types(spec.type, map);
   spec.initial = read_values(require("initial"), folder);
   if (target_required)
     spec.target = read_values(require("target"), folder);
@@ -226,7 +152,7 @@ ParameterSpec read_parameter(const YamlValue& value, Folder& folder, bool target
   return spec;
 }
 
-void read_target(const YamlValue& value, const Folder& folder, TargetSpec& target) {
+void read_target(const YamlValue& value, const InputFolder& folder, TargetSpec& target) {
   YamlMap map = value.map();
   if (const auto images = map.find("images")) {
     target.images = existing_file(*images, folder);
@@ -252,6 +178,7 @@ LossSpec read_loss(const YamlValue& value) {
   loss.kind = static_cast<LossKind>(map.require("kind").choice({"squared", "huber", "cauchy"}));
   if (loss.kind != LossKind::squared)
     if (const auto scale = map.find("scale")) loss.scale = scale->number(NumberRange::positive());
+  map.explain("scale", "belongs to huber and cauchy, not to squared");
   map.reject_unknown();
   return loss;
 }
@@ -285,6 +212,8 @@ OptimizerSpec read_optimizer(const YamlValue& value) {
   if (optimizer.method == OptimizerMethod::lbfgs)
     if (const auto inner = map.find("inner_iterations"))
       optimizer.inner_iterations = static_cast<int>(inner->integer(1, 1000));
+  map.explain("decay", fmt::format("belongs to adam, not to {}", name(optimizer.method)));
+  map.explain("inner_iterations", fmt::format("belongs to lbfgs, not to {}", name(optimizer.method)));
   map.reject_unknown();
   return optimizer;
 }
@@ -344,30 +273,6 @@ void read_settings(YamlMap& map, Experiment& experiment) {
 
 }  // namespace
 
-GateSet make_gates(const GateSpec& spec) {
-  if (spec.kind == GateKind::steady) return GateSet(GateShape::steady(), {0.0});
-  double scale = 1;
-  if (spec.unit != LengthUnit::scene)
-    scale = kSpeedOfLight * (spec.unit == LengthUnit::ns ? 1e-9 : 1e-12) / spec.scene_unit_m;
-  const auto scaled = [&](std::vector<double> lengths) {
-    for (double& length : lengths) length *= scale;
-    return lengths;
-  };
-  const GateShape shape = [&] {
-    switch (spec.kind) {
-      case GateKind::gaussian:
-        return GateShape::gaussian(scale * spec.sigma);
-      case GateKind::boxcar:
-        return GateShape::boxcar(scale * spec.width);
-      case GateKind::truncated_gaussian:
-        return GateShape::truncated_gaussian(scale * spec.sigma, scale * spec.half_width);
-      default:
-        return GateShape::tabulated(scaled(spec.offsets), spec.values);
-    }
-  }();
-  return GateSet(shape, scaled(spec.centers));
-}
-
 ExrNotes exr_notes(const GateSpec& spec) {
   constexpr const char* kUnits[] = {"scene units", "ns", "ps"};
   const bool steady = spec.kind == GateKind::steady;
@@ -394,7 +299,7 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
   YamlMap map = root.map();
   Experiment experiment;
   experiment.file = std::filesystem::absolute(file).string();
-  Folder folder{std::filesystem::absolute(file).parent_path(), {}};
+  InputFolder folder{std::filesystem::absolute(file).parent_path(), {}};
   experiment.name = file_name(map.require("name"));
   experiment.scene = existing_file(map.require("scene"), folder);
   if (const auto resolution = map.find("resolution")) experiment.resolution = read_resolution(*resolution);

@@ -43,6 +43,9 @@ struct GateSpec {
       values;  ///< tabulated: relative to the centre; read from `file` or given inline
 };
 
+/// Scene units per unit of the gates' lengths.
+double length_unit(const GateSpec& spec);
+
 /// Gates in scene units. Throws std::invalid_argument when the shape cannot be made (for example a table of
 /// zeros).
 GateSet make_gates(const GateSpec& spec);
@@ -167,7 +170,7 @@ struct OutputSpec {
 struct Experiment {
   std::string file;  ///< absolute path, for messages
   std::string name;
-  std::string scene;  ///< absolute path
+  std::string scene;                      ///< absolute path
   std::vector<std::string> number_files;  ///< absolute paths of the files that gates and parameters were read from
   /// Pixels, {width, height}, in place of the scene's; {0, 0}: as the scene says. The field of view stays across the
   /// width.

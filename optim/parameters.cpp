@@ -25,6 +25,11 @@ std::string names_of(const std::vector<Item>& items) {
   return list.empty() ? "none" : list;
 }
 
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t");
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
+}
+
 /// Area-weighted sums of face normals at the vertices of a shape; zero where no face of positive area meets.
 std::vector<Vec3> vertex_normals(const Scene& scene, const Shape& shape) {
   std::vector<Vec3> sum(shape.vertex_count);
@@ -298,10 +303,11 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
 
 std::vector<double> Parameters::parse_point(const std::string& text) const {
   std::vector<double> theta = initial_;
+  std::vector<std::string> given;
   std::size_t begin = 0;
   for (bool first = true; begin <= text.size(); first = false) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
-    const std::string item = text.substr(begin, end - begin);
+    const std::string item = trimmed(text.substr(begin, end - begin));
     begin = end + 1;
     if (first && item == "initial") continue;
     if (first && item == "target") {
@@ -310,10 +316,10 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
       continue;
     }
     const std::size_t equals = item.find('=');
-    const std::string key = item.substr(0, equals);
+    const std::string key = trimmed(item.substr(0, equals));
     if (equals == std::string::npos)
       throw InputError(fmt::format("--at {}: allowed: initial, target or NAME=VALUE[,NAME=VALUE...]", item));
-    const std::string number = item.substr(equals + 1);
+    const std::string number = trimmed(item.substr(equals + 1));
     char* stop = nullptr;
     const double value = std::strtod(number.c_str(), &stop);
     if (number.empty() || *stop != '\0' || !std::isfinite(value))
@@ -323,6 +329,9 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
       if (block.name == key) from = block.begin, count = block.count;
     const auto component = std::find(component_names_.begin(), component_names_.end(), key);
     if (component != component_names_.end()) from = static_cast<int>(component - component_names_.begin());
+    if (std::find(given.begin(), given.end(), key) != given.end())
+      throw InputError(fmt::format("--at {}: is given twice", key));
+    given.push_back(key);
     if (from < 0) throw InputError(fmt::format("--at {}: no such parameter; allowed: {}", key, names_of(blocks_)));
     for (int i = from; i < from + count; ++i) {
       if (value < lower_[i] || value > upper_[i])
@@ -331,6 +340,9 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
       theta[i] = value;
     }
   }
+  if (!coordinates_fit(apply(theta)))
+    throw InputError(fmt::format("--at {}: puts a vertex too far away; allowed: coordinates of at most {}", text,
+                                 kLargestCoordinate));
   return theta;
 }
 

@@ -78,7 +78,8 @@ class Parameters {
   TangentBasis tangent(const std::vector<double>& theta) const;
 
   /// `text` is `initial`, `target`, or a list of NAME=VALUE (NAME[i] allowed) separated by commas, optionally
-  /// after one of those words; what is not named keeps its initial value. Throws InputError.
+  /// after one of those words; what is not named keeps its initial value. Blanks around names and
+  /// values do not matter. Throws InputError, also where a name stands twice or a vertex would be too far away.
   std::vector<double> parse_point(const std::string& text) const;
 
  private:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/math/error.h"
 #include "core/scene/coincidence.h"
@@ -74,6 +75,11 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
     if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
   }
+  if (!can_render(parameters_->initial()) || (parameters_->target_known() && !can_render(parameters_->target())))
+    throw InputError(
+        fmt::format("{}: parameters: initial or target values put a vertex too far away (allowed: "
+                    "coordinates of at most {})",
+                    experiment_.file, kLargestCoordinate));
   if (!warning) return;
   std::string coincidences = coincidence_warning(parameters_->apply(parameters_->initial()));
   if (coincidences.empty() && parameters_->target_known())
@@ -99,7 +105,24 @@ void Problem::require_parameters() const {
     throw InputError(experiment_.file + ": parameters: there is none (at least one is needed here)");
 }
 
+bool Problem::can_render(const std::vector<double>& theta) const {
+  return coordinates_fit(parameters_->apply(theta));
+}
+
+Evaluation Problem::no_evaluation(const GatedImage& target) const {
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  Evaluation result;
+  result.image = target;
+  std::fill(result.image.data.begin(), result.image.data.end(), kNothing);
+  result.loss = result.mean_squared_error = std::numeric_limits<double>::infinity();
+  result.gradient.assign(static_cast<std::size_t>(parameters_->size()), kNothing);
+  return result;
+}
+
 GatedImage Problem::render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const {
+  if (!can_render(theta))
+    throw InputError(fmt::format("{}: a vertex would be rendered too far away (allowed: coordinates of at most {})",
+                                 experiment_.file, kLargestCoordinate));
   const Scene scene = parameters_->apply(theta);
   return Renderer(scene, gates_, estimator()).render(stream, range);
 }
@@ -164,6 +187,7 @@ EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) con
 
 Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                              const Poll& poll, Share share) const {
+  if (!can_render(theta)) return no_evaluation(target);
   const SampleSpec& samples = experiment_.samples;
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);

@@ -73,7 +73,12 @@ class Problem {
     return {experiment_.seed, iteration, pass_number(pass)};
   }
 
-  /// Gated images at theta.
+  /// Whether theta leaves all coordinates at sizes that can be rendered (kLargestCoordinate).
+  bool can_render(const std::vector<double>& theta) const;
+  /// What `evaluate` gives where it does not: infinite loss, an image and a gradient of NaN.
+  Evaluation no_evaluation(const GatedImage& target) const;
+
+  /// Gated images at theta. Throws InputError where it cannot be rendered.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
   /// The images that the optimisation aims at: rendered at the target values, with photon noise where it is

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/math/error.h"
 #include "optim/gauss_newton.h"
@@ -86,6 +87,7 @@ SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint
 }
 
 double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {
+  if (!problem_.can_render(theta)) return std::numeric_limits<double>::infinity();
   return problem_.loss(render(theta, iteration), target_, theta).value;
 }
 
@@ -94,6 +96,7 @@ Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::ui
 }
 
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
+  if (!problem_.can_render(theta)) return problem_.no_evaluation(target_);
   const RobustLoss robust = problem_.robust_loss(target_);
   SplitImage image = render(theta, iteration);
   Evaluation result;

@@ -27,6 +27,9 @@ struct GatedImage {
   }
 };
 
+/// Throws std::runtime_error where a value is not finite, or would not be as a 32-bit float; `what` says of which image.
+void require_finite(const GatedImage& image, const std::string& what);
+
 /// Texts by name for the header of an EXR file.
 using ExrNotes = std::vector<std::pair<std::string, std::string>>;
 

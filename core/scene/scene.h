@@ -54,6 +54,13 @@ struct Scene {
   int find_material(const std::string& name) const;  ///< -1 when there is none
 };
 
+/// Largest coordinate of a vertex or the camera that can be rendered: Embree multiplies three of them in single precision,
+/// which overflows from 7e12 on, and ends the program where one exceeds 1.8e18.
+inline constexpr double kLargestCoordinate = 1e12;
+/// Whether they are at most that, and none is NaN.
+bool coordinates_fit(const Vec3& p);
+bool coordinates_fit(const Scene& scene);
+
 /// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then five
 /// per material (albedo r g b, roughness, ior), then three per shape (emission r g b).
 struct DofLayout {

@@ -16,6 +16,8 @@ namespace {
 
 constexpr int kLargestResolution = 32768;  // so that the number of pixels fits an int
 
+const std::string kCoordinates = fmt::format("coordinates of at most {}", kLargestCoordinate);
+
 /// As `normalize`, for a vector so long or short that its length squared is no double.
 Vec3 unit(const Vec3& v) {
   return normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
@@ -24,7 +26,8 @@ Vec3 unit(const Vec3& v) {
 Camera read_camera(const YamlValue& value) {
   YamlMap map = value.map();
   Camera camera;
-  camera.position = map.require("position").vec3();
+  const YamlValue position = map.require("position");
+  camera.position = position.vec3();
   const YamlValue look_at = map.require("look_at");
   camera.look_at = look_at.vec3();
   const std::optional<YamlValue> up = map.find("up");
@@ -35,6 +38,7 @@ Camera read_camera(const YamlValue& value) {
   camera.height = height;
   map.reject_unknown();
 
+  if (!coordinates_fit(camera.position)) position.fail("lies too far away", kCoordinates);
   if (camera.look_at == camera.position) look_at.fail("is the camera's position", "a point away from it");
   if (!std::isnormal(length_squared(camera.look_at - camera.position)))
     look_at.fail("lies too near the camera's position or too far away", "a distance whose square a double can hold");
@@ -148,7 +152,10 @@ Mesh read_shape_mesh(const YamlValue& file, const std::string& path, const std::
     file.fail(error.what());
   }
   if (transform) transform_mesh(*transform, mesh);
-  check_areas(transform ? *transform : file, mesh);
+  const YamlValue& cause = transform ? *transform : file;
+  check_areas(cause, mesh);
+  for (const Vec3& p : mesh.positions)
+    if (!coordinates_fit(p)) cause.fail("puts a vertex too far away", kCoordinates);
   return mesh;
 }
 

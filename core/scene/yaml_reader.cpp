@@ -151,6 +151,13 @@ std::vector<Step> split_path(const std::string& path, const std::string& text) {
   return steps;
 }
 
+void remove_entry(YAML::Node& list, std::size_t index) {
+  YAML::Node shorter(YAML::NodeType::Sequence);
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (i != index) shorter.push_back(list[i]);
+  list = shorter;
+}
+
 /// Puts an override's value into the tree and adds its path to `overridden`. Sections on the way that the
 /// file leaves out are made, and added too.
 void apply_override(YAML::Node node, const std::string& text, std::vector<std::string>& overridden) {
@@ -158,7 +165,9 @@ void apply_override(YAML::Node node, const std::string& text, std::vector<std::s
   if (equals == std::string::npos) throw InputError("--set " + text + ": must be KEY.PATH=VALUE");
   const std::string path = text.substr(0, equals), source = "--set " + path;
   const std::vector<Step> steps = split_path(path, text);
-  const YAML::Node value = parse_document(source, text.substr(equals + 1));
+  const std::string value_text = text.substr(equals + 1);
+  const bool removes = value_text.find_first_not_of(" \t") == std::string::npos;
+  const YAML::Node value = removes ? YAML::Node() : parse_document(source, value_text);
   std::string here;
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
@@ -169,11 +178,20 @@ void apply_override(YAML::Node node, const std::string& text, std::vector<std::s
       if (!node.IsSequence() || *step.index >= node.size())
         throw InputError(fmt::format("{}: there is no entry {} (the list has {})", source, *step.index,
                                      node.IsSequence() ? node.size() : 0));
+      if (last && removes) {
+        remove_entry(node, *step.index);
+        return;
+      }
       if (last) node[*step.index] = value;
       next.reset(node[*step.index]);
     } else {
       if (!node.IsMap())
         throw InputError(fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
+      if (last && removes) {
+        if (!node.remove(step.key))
+          throw InputError(fmt::format("{}: there is no key '{}' to remove", source, step.key));
+        return;
+      }
       if (last) {
         node[step.key] = value;
       } else if (!std::as_const(node)[step.key].IsDefined() && !steps[i + 1].index) {
@@ -362,6 +380,8 @@ std::vector<std::pair<std::string, YamlValue>> YamlMap::entries() {
 void YamlMap::reject_unknown() const {
   for (const Entry& entry : entries_) {
     if (entry.asked) continue;
+    for (const auto& [key, why] : explained_)
+      if (key == entry.name) entry.key.fail(why, "allowed: " + join(asked_));
     const std::string near = nearest_word(entry.name, asked_);
     entry.key.fail("is not a known key" + (near.empty() ? "" : ", did you mean '" + near + "'?"),
                    "allowed: " + join(asked_));

@@ -79,6 +79,8 @@ class YamlMap {
  public:
   YamlValue require(const std::string& key);              ///< throws when the key is missing
   std::optional<YamlValue> find(const std::string& key);  ///< empty when the key is missing
+  /// What reject_unknown says of this key where it was not asked for, such as "belongs to gaussian, not to boxcar".
+  void explain(const std::string& key, const std::string& why) { explained_.emplace_back(key, why); }
   /// Throws at the first key that was never asked for. To be called when all keys have been read.
   void reject_unknown() const;
   /// Keys and values in the order of the file; they count as asked for.
@@ -97,10 +99,12 @@ class YamlMap {
   YamlValue value_;
   std::vector<Entry> entries_;
   std::vector<std::string> asked_;
+  std::vector<std::pair<std::string, std::string>> explained_;
 };
 
 /// Reads a file of one YAML document. Each override is `KEY.PATH=VALUE` (list entries as `KEY[INDEX]`), with
-/// VALUE in YAML; it replaces the file's value or adds a key to a map. Errors in overridden values name
+/// VALUE in YAML; it replaces the file's value or adds a key to a map. An empty VALUE removes the key, or the entry of a list.
+/// Errors in overridden values name
 /// `--set KEY.PATH` in place of the file. Throws InputError when the file cannot be read or is not YAML.
 YamlValue open_yaml(const std::string& file, const std::vector<std::string>& overrides = {});
 

@@ -71,6 +71,72 @@ TEST_F(Program, APipeIsNoExperiment) {
   EXPECT_NE(result.errors.find("is a pipe or a device"), std::string::npos) << result.errors;
 }
 
+TEST_F(Program, GatesInTheWrongUnitAreNamed) {
+  // Nanoseconds taken for scene units; the second gate of three happens to be right.
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  const Result result = run({"render", file, "-o", out, "--no-plots", "--quiet", "--set", "gates.centers=[20, 5, 30]"});
+  EXPECT_EQ(result.status, 0);
+  EXPECT_NE(result.errors.find("no light reaches gates 0, 2 of 3 of the image; paths with light are about 4."),
+            std::string::npos)
+      << result.errors;
+  EXPECT_NE(result.errors.find("centres of these gates are at 20 to 30 scene units\n"), std::string::npos);
+  const Result in_ps = run({"render", file, "-o", out, "--no-plots", "--quiet", "--set", "gates.unit=ps", "--set",
+                            "gates.scene_unit_m=0.299792458", "--set", "gates.sigma=10"});
+  EXPECT_NE(in_ps.errors.find("paths with light are about 4."), std::string::npos) << in_ps.errors;
+  EXPECT_NE(in_ps.errors.find("e+03 ps long"), std::string::npos) << in_ps.errors;
+}
+
+TEST_F(Program, ValuesThatOverflowAreNoResult) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  for (const char* command : {"render", "derive", "gradient", "check"}) {
+    const Result result =
+        run({command, file, "-o", out, "--no-plots", "--at", "power=1e308", "--set", "target.samples=2"});
+    EXPECT_EQ(result.status, 1) << command << result.errors;
+    EXPECT_EQ(result.errors.find("nan"), std::string::npos) << result.errors;
+  }
+  EXPECT_FALSE(folder_.has("out/render.exr"));
+  EXPECT_FALSE(folder_.has("out/render.csv"));
+  const Result narrow = run({"render", file, "-o", out, "--no-plots", "--set", "gates.sigma=1e-300"});
+  EXPECT_EQ(narrow.status, 2);
+  EXPECT_NE(narrow.errors.find("cannot be told from rounding"), std::string::npos) << narrow.errors;
+}
+
+TEST_F(Program, OutputThatCannotBeWrittenIsAFailure) {
+  const auto shell = [&](const std::string& command) {
+    const int status = std::system(("cd " + folder_.path() + " && " + command + " 2>stderr").c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  const std::string program = ISOCHRON_PROGRAM;
+  for (const std::string& command :
+       {std::string("check tiny.yaml -o out --samples 8"), std::string("inspect tiny.yaml -o out --seconds 0.2"),
+        std::string("--help"), std::string("run --help"), std::string("--version")}) {
+    EXPECT_EQ(shell(program + " " + command + " >/dev/full"), 1) << command;
+    EXPECT_NE(folder_.read("stderr").find("isochron: error: "), std::string::npos) << folder_.read("stderr");
+    EXPECT_EQ(shell("{ " + program + " " + command + "; echo $? >status; } | true"), 0) << command;
+    EXPECT_EQ(folder_.read("status"), "1\n") << command;
+  }
+  EXPECT_TRUE(folder_.has("out/check.csv"));
+}
+
+TEST_F(Program, MistypedCommandsAreCorrected) {
+  const Result result = run({"rendr", folder_.file("tiny.yaml")});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_EQ(result.errors, "isochron: error: 'rendr' is not a command, did you mean 'render'? (see isochron --help)\n");
+}
+
+TEST_F(Program, EveryCommandHasAFolderOfItsOwn) {
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  for (const std::string command : {"render", "derive", "gradient", "check"}) {
+    EXPECT_EQ(run({command, "tiny.yaml", "--no-plots", "--quiet", "--samples", "16"}).status, 0);
+    EXPECT_TRUE(folder_.has("runs/tiny-" + command + "/" + command + ".csv"));
+    run({command, "--help"});
+    EXPECT_NE(folder_.read("stdout").find("runs/NAME-" + command), std::string::npos);
+  }
+  EXPECT_FALSE(folder_.has("runs/tiny"));
+  std::filesystem::current_path(before);
+}
+
 TEST_F(Program, HelpShowsExamples) {
   for (const char* command :
        {"run", "resume", "render", "derive", "gradient", "check", "inspect", "chart", "stability"}) {
@@ -195,6 +261,11 @@ TEST_F(Program, StabilityMapsWidthsAndMethods) {
 TEST_F(Program, GatesThatNoPathReaches) {
   // Zeros everywhere, and a run that has nothing to go by stays where it is and ends as it should.
   const std::string file = folder_.file("tiny.yaml");
+  const auto expect_dark = [](const Result& result) {
+    EXPECT_NE(result.errors.find("no light reaches the gates of the "), std::string::npos) << result.errors;
+    EXPECT_NE(result.errors.find("; paths with light are about 4."), std::string::npos) << result.errors;
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+  };
   for (const char* sampling : {"standard", "ellipsoidal", "auto"}) {
     const std::vector<std::string> change = {"--set", "gates.centers=[90, 0.1]", "--set",
                                              std::string("estimator.sampling=") + sampling};
@@ -203,16 +274,24 @@ TEST_F(Program, GatesThatNoPathReaches) {
       return arguments;
     };
     const std::string out = folder_.file(sampling);
-    EXPECT_EQ(run(with({"render", file, "-o", out, "--no-plots"})).status, 0);
+    const Result render = run(with({"render", file, "-o", out, "--no-plots", "--quiet"}));
+    EXPECT_EQ(render.status, 0);
+    expect_dark(render);
     EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")), "gate,mean,standard_error\n0,0,0\n1,0,0\n");
     const Result derive = run(with({"derive", file, "-o", out, "--no-plots", "--quiet"}));
     EXPECT_EQ(derive.status, 0);
-    EXPECT_EQ(derive.errors, "");
+    expect_dark(derive);
     std::istringstream rows(folder_.read(sampling + std::string("/derive.csv")));
     std::string row;
     std::getline(rows, row);
     while (std::getline(rows, row)) EXPECT_NE(row.find(",0,0,0"), std::string::npos) << row;
-    EXPECT_EQ(run(with({"gradient", file, "-o", out})).status, 0);
+    const Result gradient = run(with({"gradient", file, "-o", out, "--quiet"}));
+    EXPECT_EQ(gradient.status, 0);
+    expect_dark(gradient);
+    const Result check = run(with({"check", file, "-o", out, "--quiet"}));
+    EXPECT_EQ(check.status, 1);
+    EXPECT_NE(check.errors.find("no light reaches the gates of the image"), std::string::npos) << check.errors;
+    EXPECT_NE(check.errors.find("nothing was checked"), std::string::npos) << check.errors;
     EXPECT_EQ(folder_.read(sampling + std::string("/gradient.csv")),
               "parameter,value,gradient,standard_error,kurtosis\nheight,0.2,0,0,0\npower,8,0,0,0\n");
     const Result inspection = run(with({"inspect", file, "-o", out, "--seconds", "0.5"}));
@@ -221,7 +300,7 @@ TEST_F(Program, GatesThatNoPathReaches) {
     const std::string folder = std::string("run_") + sampling;
     const Result fitted = run(with(run_command(folder)));
     EXPECT_EQ(fitted.status, 0);
-    EXPECT_NE(fitted.errors.find("no light reaches the gates"), std::string::npos) << fitted.errors;
+    expect_dark(fitted);
     const std::string summary = folder_.read(folder + "/summary.yaml");
     for (const char* line : {"status: iterations_reached\n", "loss_final: 0\n", "height: 0.2\n", "power: 8\n"})
       EXPECT_NE(summary.find(line), std::string::npos) << line << summary;

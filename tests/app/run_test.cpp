@@ -110,6 +110,35 @@ TEST_F(Program, NonFiniteLossNeverReachesAParameter) {
   EXPECT_NE(summary.find("  height: 0.2\n  power: 1e+300\n"), std::string::npos);
 }
 
+TEST_F(Program, AnOptimiserThatLeavesTheWorldIsSentBack) {
+  for (const std::string method : {"adam", "lbfgs", "levenberg_marquardt"}) {
+    SCOPED_TRACE(method);
+    const Result result =
+        run(run_command(method, {"--at", "height=0.3", "--set",
+                                 "optimizer={method: " + method + ", learning_rate: 1e25, iterations: 3}"}));
+    EXPECT_TRUE(result.status == 0 || result.status == 1) << result.status << result.errors;
+    const std::string summary = folder_.read(method + "/summary.yaml");
+    if (method == "adam") {
+      EXPECT_NE(summary.find("rejected_steps: 2\n"), std::string::npos) << summary;
+      EXPECT_NE(result.errors.find("loss or gradient is not finite"), std::string::npos) << result.errors;
+    }
+    EXPECT_NE(summary.find("  height: 0."), std::string::npos) << summary;
+  }
+}
+
+TEST_F(Program, CoordinatesThatCannotBeRenderedAreRefused) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
+  for (const std::vector<std::string>& change : std::vector<std::vector<std::string>>{
+           {"--at", "height=1e25"}, {"--set", "parameters[0].initial=1e25"}, {"--set", "parameters[0].target=-1e25"}}) {
+    std::vector<std::string> command = {"derive", file, "-o", out, "--no-plots"};
+    command.insert(command.end(), change.begin(), change.end());
+    const Result result = run(command);
+    EXPECT_EQ(result.status, 2);
+    EXPECT_NE(result.errors.find("too far away"), std::string::npos) << result.errors;
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1);
+  }
+}
+
 TEST_F(Program, AnExplodedLossIsADivergence) {
   // From an emission far below the target one step of 500 leads far above it.
   const Result result =

@@ -32,6 +32,18 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"max_bounces: 2", "max_bounces: 2.5", "3:14: max_bounces: '2.5' is not an integer that fits (an integer from 0"},
       {"max_bounces", "max_bounce",
        "3:1: max_bounce: is not a known key, did you mean 'max_bounces'? (allowed: name, "},
+      {"kind: gaussian", "kind: boxcar, width: 1",
+       "4:54: gates.sigma: belongs to gaussian and truncated_gaussian, not to boxcar (allowed: kind, "},
+      {gates, "{kind: steady, centers: [4]}", "4:23: gates.centers: belongs to every kind but steady (allowed: kind"},
+      {"sigma: 0.3", "sigma: 1e-300",
+       "4:8: gates: gates of a standard deviation of 1e-300 scene units cannot be told "
+       "from rounding (at least 5.5e-12, 1e-12 of the longest centre)"},
+      {"sigma: 0.3", "sigma: 1e-11, unit: scene, file: table.txt",
+       "4:73: gates.file: belongs to tabulated, not to gau"},
+      {"direction: [0, 1, 0],", "direction: [0, 1, 0], axis: [0, 1, 0],",
+       "6:75: parameters[0].axis: belongs to rotation, not to translation (allowed: name"},
+      {"method: adam", "method: lbfgs, decay: {half_life: 3}",
+       "10:28: optimizer.decay: belongs to adam, not to lbfgs (allowed: method"},
       {"kind: gaussian", "kind: gauss", "4:15: gates.kind: 'gauss' is not known"},
       {"centers: [4.5, 5.5]", "centers: []", "4:34: gates.centers: holds no gate (at least one number)"},
       {"centers: [4.5, 5.5]", "centers: [4.5, -1]", "4:40: gates.centers[1]: -1 is out of range (a number at least 0)"},
@@ -41,9 +53,9 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"centers: [4.5, 5.5]", "centers: 5",
        "4:34: gates.centers: is neither (a list of numbers, or {start, stop, count})"},
       {"sigma: 0.3", "sigma: 0", "4:53: gates.sigma: 0 is out of range (a number above 0)"},
-      {"sigma: 0.3", "sigma: 0.3, width: 1", "4:58: gates.width: is not a known key"},
+      {"sigma: 0.3", "sigma: 0.3, width: 1", "4:58: gates.width: belongs to boxcar, not to gaussian"},
       {"sigma: 0.3", "sigma: 0.3, unit: ns", "4:8: gates.scene_unit_m: is missing"},
-      {gates, "{kind: steady, centers: [1]}", "4:23: gates.centers: is not a known key"},
+      {gates, "{kind: steady, centers: [1]}", "4:23: gates.centers: belongs to every kind but steady"},
       {gates, "{kind: boxcar, centers: [1], width: .inf}", "4:44: gates.width: '.inf' is not a finite number"},
       {gates, "{kind: truncated_gaussian, centers: [1], sigma: 1}", "4:8: gates.half_width: is missing"},
       {gates, "{kind: tabulated, centers: [1], offsets: [0, 1], values: [1]}",
@@ -76,14 +88,15 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"primal: 16", "primal: 0", "9:19: samples.primal: 0 is out of range"},
       {"interior: 16", "interior: -2", "9:33: samples.interior: -2 is out of range"},
       {"path_length", "pathlength", "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},
-      {"iterations: 6", "iterations: 6, inner_iterations: 3", "10:63: optimizer.inner_iterations: is not a known key"},
+      {"iterations: 6", "iterations: 6, inner_iterations: 3",
+       "10:63: optimizer.inner_iterations: belongs to lbfgs, not to adam"},
       {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, inner_iterations: 0",
        "10:46: optimizer.inner_iterations: 0 is out of range"},
       {"iterations: 6", "decay: {start: 5}", "10:55: optimizer.decay.half_life: is missing"},
       {"iterations: 6", "decay: {half_life: 0}",
        "10:67: optimizer.decay.half_life: 0 is out of range (a number above 0)"},
       {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, decay: {half_life: 5}",
-       "10:28: optimizer.decay: is not a known key"},
+       "10:28: optimizer.decay: belongs to adam, not to l"},
       {"iterations: 6", "stop: {window: 1}", "10:63: optimizer.stop.window: 1 is out of range"},
       {"seed: 7}", "seed: 7, noise: {photons: -1}}", "8:49: target.noise.photons: -1 is out of range"},
       {"seed: 3", "loss: {kind: absolute}",
@@ -147,8 +160,10 @@ TEST(Experiment, OverridesAreCheckedLikeTheFile) {
   EXPECT_FALSE(changed.guiding);
   EXPECT_EQ(changed.estimator.follow, 0.5);
   EXPECT_EQ(changed.estimator.follow_radius, 0);
-  for (const char* wrong : {"optimizer.iterations=-9", "parameters[7].initial=1", "nothing=1",
-                            "gates.sigma=", "gates.sigma", "optimizer.method=newton"}) {
+  EXPECT_EQ(load_experiment(file, {"optimizer.iterations="}).optimizer.iterations, OptimizerSpec().iterations);
+  EXPECT_EQ(load_experiment(file, {"parameters[0]="}).parameters.size(), 1u);
+  for (const char* wrong : {"optimizer.iterations=-9", "parameters[7].initial=1", "nothing=1", "gates.sigma=x",
+                            "gates.sigma", "optimizer.method=newton"}) {
     try {
       load_experiment(file, {wrong});
       ADD_FAILURE() << "accepted: " << wrong;

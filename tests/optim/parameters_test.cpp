@@ -281,6 +281,20 @@ TEST(Parameters, ComponentsAndPoints) {
   EXPECT_THROW(parameters.parse_point(""), InputError);
 }
 
+TEST(Parameters, PointsAreReadWithBlanksAndWithoutRepetition) {
+  const Scene scene = two_shapes(true);
+  const Parameters parameters(scene, every_kind());
+  EXPECT_EQ(parameters.parse_point(" move = 0.7 , dent[1]\t= 0.5"), parameters.parse_point("move=0.7,dent[1]=0.5"));
+  EXPECT_EQ(parameters.parse_point("target , move = 0.7"), parameters.parse_point("target,move=0.7"));
+  EXPECT_THROW(parameters.parse_point("move = "), InputError);
+  EXPECT_THROW(parameters.parse_point("move=0.1 0.2"), InputError);
+  EXPECT_THROW(parameters.parse_point("move=0.1,dent=0.2,move=0.1"), InputError);
+  EXPECT_EQ(parameters.parse_point("dent=0.25,dent[1]=0.5")[2], 0.5);
+  // Coordinates that Embree does not survive.
+  EXPECT_NO_THROW(parameters.parse_point("move=1e11"));
+  EXPECT_THROW(parameters.parse_point("move=1e25"), InputError);
+}
+
 TEST(Parameters, SelectedColumnsAreThoseOfTheWhole) {
   const Scene scene = two_shapes(true);
   const Parameters parameters(scene, every_kind());

@@ -237,6 +237,10 @@ TEST_F(SceneLoader, CameraErrors) {
     EXPECT_EQ(error("position: [0, 0, 5]\n  look_at: [0, 0, 0]", "position: [0, 0, 0]\n  look_at: [0, 0, " + far + "]"),
               "scene.yaml:3:12: camera.look_at: lies too near the camera's position or too far away (a distance "
               "whose square a double can hold)");
+  EXPECT_EQ(error("position: [0, 0, 5]", "position: [0, 0, 2e12]"),
+            "scene.yaml:2:13: camera.position: lies too far away (coordinates of at most 1000000000000)");
+  EXPECT_EQ(error("emission: 10", "emission: 10, transform: {scale: 1e13}"),
+            "scene.yaml:12:87: shapes[1].transform: puts a vertex too far away (coordinates of at most 1000000000000)");
   EXPECT_EQ(error("up: [0, 1, 0]", "up: [0, 0, -3]"),
             "scene.yaml:4:7: camera.up: up is parallel to the line of sight (any other direction)");
   EXPECT_EQ(error("up: [0, 1, 0]", "up: [0, 0, 0]"),

@@ -189,7 +189,6 @@ TEST_F(YamlReader, Overrides) {
   EXPECT_EQ(error([&] { open(text, {"c.d=7"}).map().require("c").number(); }).substr(0, 8), "--set c:");
   EXPECT_EQ(error([&] { open(text, {"nobody[0]=1"}); }), "--set nobody[0]: there is no key 'nobody'");
   EXPECT_EQ(error([&] { open(text, {"a.b.c=1"}); }), "--set a.b.c: 'c' is looked for in '1', not in a map");
-  EXPECT_EQ(error([&] { open(text, {"a.b="}); }), "--set a.b:1:1: syntax: is empty");
 }
 
 TEST(NearestWord, FindsMisspellingsOnly) {
@@ -199,6 +198,17 @@ TEST(NearestWord, FindsMisspellingsOnly) {
   EXPECT_EQ(nearest_word("roughnes", words), "roughness");
   EXPECT_EQ(nearest_word("colour", words), "");
   EXPECT_EQ(nearest_word("", words), "");
+}
+
+TEST_F(YamlReader, EmptyOverridesRemove) {
+  const std::string text = "a: {b: 1, c: 2}\nlist: [1, {x: 2}, 3]\n";
+  EXPECT_FALSE(open(text, {"a.b="}).map().require("a").map().find("b"));
+  EXPECT_TRUE(open(text, {"a.b= "}).map().require("a").map().find("c"));
+  EXPECT_FALSE(open(text, {"a="}).map().find("a"));
+  EXPECT_EQ(open(text, {"list[1]="}).map().require("list").numbers(), (std::vector<double>{1, 3}));
+  EXPECT_FALSE(open(text, {"list[1].x="}).map().require("list").list()[1].map().find("x"));
+  EXPECT_EQ(error([&] { open(text, {"a.z="}); }), "--set a.z: there is no key 'z' to remove");
+  EXPECT_EQ(error([&] { open(text, {"list[3]="}); }), "--set list[3]: there is no entry 3 (the list has 3)");
 }
 
 }  // namespace

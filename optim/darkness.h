@@ -1,0 +1,22 @@
+// Gates that see no light: nearly always centres in another unit than the scene's, or lamps that face away.
+#pragma once
+#include <string>
+
+#include "core/image/image.h"
+#include "optim/problem.h"
+
+namespace isochron {
+
+/// One line that names the gates whose image is black everywhere, what they let through, and how long the scene's paths at
+/// theta are, in the experiment's unit; empty where every gate sees light. `what`: such as "the target".
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
+                             const std::string& what);
+
+/// The target values where all are known, else `theta`: where to look for the target's light.
+std::vector<double> point_of_target(const Problem& problem, const std::vector<double>& theta);
+
+/// Shortest and longest path length in scene units among 16 paths per pixel of an image of 32 pixels at most across, with 16
+/// bounces at most, to about a hundredth of their distance. Empty where no path brings light.
+std::optional<std::pair<double, double>> path_length_range(const Problem& problem, const std::vector<double>& theta);
+
+}  // namespace isochron
