@@ -109,7 +109,7 @@ struct TargetSpec {
   double photons = 0;   ///< of add_photon_noise; 0: no noise
 };
 
-/// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1.
+/// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1, for runs 2.
 struct SampleSpec {
   int primal = 64, interior = 64, visibility = 64, path_length = 64;
   int term(Term t) const { return t == Term::interior ? interior : t == Term::visibility ? visibility : path_length; }

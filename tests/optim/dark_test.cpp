@@ -71,7 +71,7 @@ TEST_F(Dark, EveryMethodFindsTheTruth) {
   const Case cases[] = {
       {kAlbedo, "{method: levenberg_marquardt, iterations: 30}", 0.02},
       {kAlbedo, "{method: lbfgs, learning_rate: 0.02, iterations: 20, inner_iterations: 3}", 0.02},
-      {kAlbedo, "{method: adam, learning_rate: 0.01, iterations: 100, stop: {window: 20}}", 0.03},
+      {kAlbedo, "{method: adam, iterations: 120, stop: {window: 30}}", 0.03},
       {kEmission, "{method: levenberg_marquardt, iterations: 30}", 0.02},
   };
   const GatedImage target = Problem(load(kAlbedo)).make_target(kGoOn);  // the same for both
