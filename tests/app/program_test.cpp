@@ -79,7 +79,7 @@ TEST_F(Program, GatesInTheWrongUnitAreNamed) {
   EXPECT_NE(result.errors.find("no light reaches gates 0, 2 of 3 of the image; paths with light are about 4."),
             std::string::npos)
       << result.errors;
-  EXPECT_NE(result.errors.find("centres of these gates are at 20 to 30 scene units\n"), std::string::npos);
+  EXPECT_NE(result.errors.find(" scene units long; their centres are 20 to 30\n"), std::string::npos);
   const Result in_ps = run({"render", file, "-o", out, "--no-plots", "--quiet", "--set", "gates.unit=ps", "--set",
                             "gates.scene_unit_m=0.299792458", "--set", "gates.sigma=10"});
   EXPECT_NE(in_ps.errors.find("paths with light are about 4."), std::string::npos) << in_ps.errors;
