@@ -30,9 +30,9 @@ int gradient(const CommonOptions& options) {
   gradient_repeats(problem);  // too few samples must show before the target is rendered
   ProgressDisplay display(options.quiet);
   const GatedImage target = problem.make_target(poll_interrupt);
-  if (const std::string dark = darkness_warning(problem, point_of_target(problem, theta), target, "the target");
-      !dark.empty())
-    warn(dark);
+  const GatedImage image =
+      problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
+  if (const std::string dark = darkness_warning(problem, theta, image, target); !dark.empty()) warn(dark);
   const auto start = std::chrono::steady_clock::now();
   const GradientEstimate estimate = estimate_gradient(problem, theta, target, poll_interrupt);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "optim/loss.h"
+
 namespace isochron {
 namespace {
 
@@ -30,6 +32,13 @@ std::optional<std::pair<double, double>> narrowed(const Problem& problem, const 
   }
   if (last < 0) return std::nullopt;
   return std::pair{low + first * width, low + (last + 1) * width};
+}
+
+bool is_black(const GatedImage& image, int gate) {
+  for (int p = 0; p < image.pixels(); ++p)
+    for (int c = 0; c < image.channels; ++c)
+      if (image.at(p, gate, c) != 0) return false;
+  return true;
 }
 
 /// Such as "0, 3 to 5".
@@ -73,19 +82,18 @@ std::vector<double> point_of_target(const Problem& problem, const std::vector<do
   return problem.parameters().target_known() ? problem.parameters().target() : theta;
 }
 
-std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
-                             const std::string& what) {
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta,
+                             const std::vector<const GatedImage*>& images, const std::string& what) {
+  const int gates = problem.gates().size();
   std::vector<int> dark;
-  for (int g = 0; g < image.gates; ++g) {
-    bool black = true;
-    for (int p = 0; p < image.pixels() && black; ++p)
-      for (int c = 0; c < image.channels; ++c) black = black && image.at(p, g, c) == 0;
-    if (black) dark.push_back(g);
-  }
+  for (int g = 0; g < gates; ++g)
+    if (std::all_of(images.begin(), images.end(), [&](const GatedImage* image) { return is_black(*image, g); }))
+      dark.push_back(g);
   if (dark.empty()) return {};
-  const bool all = static_cast<int>(dark.size()) == image.gates;
-  std::string text = fmt::format("no light reaches {} of {}",
-                                 all ? "the gates" : fmt::format("gates {} of {}", ranges(dark), image.gates), what);
+  std::string text = "no light reaches the gates of " + what;
+  if (static_cast<int>(dark.size()) < gates)
+    text = fmt::format("no light reaches {} {} of {} of {}", dark.size() == 1 ? "gate" : "gates", ranges(dark), gates,
+                       what);
   constexpr const char* kUnits[] = {"scene units", "ns", "ps"};
   const GateSpec& spec = problem.experiment().gates;
   const double unit = length_unit(spec);
@@ -98,10 +106,20 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
   if (range && spec.kind != GateKind::steady) {
     const auto by_center = [&](int a, int b) { return problem.gates().center(a) < problem.gates().center(b); };
     const auto [first, last] = std::minmax_element(dark.begin(), dark.end(), by_center);
-    text += fmt::format(", centres of these gates are at {}",
-                        shown(problem.gates().center(*first), problem.gates().center(*last)));
+    const double low = problem.gates().center(*first), high = problem.gates().center(*last);
+    text += low == high ? fmt::format("; its centre is {:.4g}", low / unit)
+                        : fmt::format("; their centres are {:.4g} to {:.4g}", low / unit, high / unit);
   }
   return text;
+}
+
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
+                             const GatedImage& target) {
+  const bool black_image = mean_square(image) == 0, black_target = mean_square(target) == 0;
+  if (black_target && !black_image)
+    return darkness_warning(problem, point_of_target(problem, theta), {&target}, "the target");
+  if (black_image && !black_target) return darkness_warning(problem, theta, {&image}, "the image");
+  return darkness_warning(problem, theta, {&image, &target}, "the image and the target");
 }
 
 }  // namespace isochron

@@ -97,7 +97,9 @@ class Run {
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image, notes_);
         geometry.write("initial", theta);
-        warn_of_darkness(theta, now.image);
+        if (const std::string dark = darkness_warning(problem_, theta, now.image, target_);
+            options_.warning && !dark.empty())
+          options_.warning(dark);
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
@@ -127,16 +129,6 @@ class Run {
     const std::vector<double> scales = parameters_.scales();
     for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] *= scales[i];
     return norm(gradient);
-  }
-
-  /// One line at most: the target's gates, which the optimiser can do nothing about, before those of the first image.
-  void warn_of_darkness(const std::vector<double>& initial, const GatedImage& image) const {
-    if (!options_.warning) return;
-    const bool both = mean_square(target_) == 0 && mean_square(image) == 0;
-    std::string text = darkness_warning(problem_, point_of_target(problem_, initial), target_,
-                                        both ? "the target, nor those of the first image" : "the target");
-    if (text.empty()) text = darkness_warning(problem_, initial, image, "the first image");
-    if (!text.empty()) options_.warning(text);
   }
 
   void report(int first, double seconds) const {
