@@ -1,8 +1,6 @@
-// Work shared out to threads. Results must not depend on who does what: strands of work have accumulators of their own,
-// merged in a fixed order.
+// Work shared out to threads. Results must not depend on who does what: see partition_sum.h.
 #pragma once
 #include <functional>
-#include <vector>
 
 namespace isochron {
 
@@ -15,8 +13,5 @@ void keep_freed_memory();
 
 /// f(0) ... f(count - 1), in any order, on as many threads as set.
 void parallel(int count, const std::function<void(int)>& f);
-
-/// sum[i] += parts[0][i] + parts[1][i] + ... in that order.
-void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum);
 
 }  // namespace isochron
