@@ -9,6 +9,7 @@
 #include "core/image/image.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
+#include "optim/gate_columns.h"
 #include "optim/heavy_tail.h"
 
 namespace isochron {
@@ -24,7 +25,8 @@ constexpr double kMostBytes = 1e9;
 
 int derive(const DeriveCommand& command) {
   begin_session(command.common);
-  const Problem problem(read_experiment(command.common), warn);
+  Problem problem(read_experiment(command.common), warn);
+  problem.set_evaluations(1);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
@@ -35,9 +37,10 @@ int derive(const DeriveCommand& command) {
 
   const Camera& camera = problem.scene().camera;
   const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
-  const double images_per_unknown = 6;  // total, three terms, a batch and its sum
+  const double images_per_unknown = 4 + kMostReplicates;  // total, three terms and a term's replicates
   const int group = std::max(1, static_cast<int>(std::min(kMostBytes / (bytes * images_per_unknown), 1e6)));
-  std::string table = "parameter,gate,component,mean,standard_error,kurtosis\n";
+  std::string table = "parameter,gate,component,mean,standard_error,replicates,degrees_of_freedom,effective_count" +
+                      gate_column_names(problem.experiment().gates) + "\n";
   HeavyTails tails;
   for (int first = block.begin; first < block.begin + block.count; first += group) {
     const int count = std::min(group, block.begin + block.count - first);
@@ -54,9 +57,10 @@ int derive(const DeriveCommand& command) {
       for (int g = 0; g < problem.gates().size(); ++g)
         for (const DerivativeEstimate& component : components) {
           const Statistics& s = component.gates[i];
-          table += fmt::format("{},{},{},{},{},{}\n", name, g, component.component, s.mean[g], s.standard_error[g],
-                               s.kurtosis[g]);
-          tails.add(name, g, s.kurtosis[g]);
+          table +=
+              fmt::format("{},{},{},{},{},{},{},{}{}\n", name, g, component.component, s.mean[g], s.standard_error[g],
+                          s.replicates, s.degrees[g], s.effective_count[g], gate_column_values(problem, g));
+          tails.add(name, g, s.effective_count[g]);
         }
     }
   }
