@@ -13,6 +13,7 @@
 #include "app/progress.h"
 #include "optim/darkness.h"
 #include "optim/files.h"
+#include "optim/gate_columns.h"
 #include "optim/heavy_tail.h"
 #include "optim/memory.h"
 
@@ -45,20 +46,29 @@ bool is_empty(const Comparison& row) {
   return row.total == 0 && row.standard_error == 0 && row.finite_difference == 0 && row.finite_difference_error == 0;
 }
 
-void print_table(const std::vector<Comparison>& table, double limit) {
-  std::size_t width = std::string_view("parameter").size();
-  for (const Comparison& row : table) width = std::max(width, row.parameter.size());
-  fmt::print("{:<{}} {:>4} {:>11} {:>11} {:>11} {:>23} {:>23} {:>7}  verdict\n", "parameter", width, "gate", "interior",
-             "visibility", "path_length", "total +- se", "finite diff. +- se", "z");
+std::string verdict(const Comparison& row, int comparisons) {
+  const bool rare = row.effective_count < kFewestDeviations;
+  if (is_empty(row)) return "nothing";
+  return std::string(disagrees(row, comparisons) ? "DIFFERS" : "ok") + (rare ? " (rare hits)" : "");
+}
+
+void print_table(const Problem& problem, const std::vector<Comparison>& table) {
+  std::size_t width = std::string_view("parameter").size(), label = std::string_view("center").size();
+  for (const Comparison& row : table) {
+    width = std::max(width, row.parameter.size());
+    label = std::max(label, gate_label(problem, row.gate).size());
+  }
+  fmt::print("{:<{}} {:>4} {:>{}} {:>11} {:>11} {:>11} {:>23} {:>23} {:>7} {:>6}  verdict\n", "parameter", width,
+             "gate", "center", label, "interior", "visibility", "path_length", "total +- se", "finite diff. +- se", "z",
+             "limit");
+  const int comparisons = static_cast<int>(table.size());
   for (const Comparison& row : table)
     fmt::print(
-        "{:<{}} {:>4} {:>11.4g} {:>11.4g} {:>11.4g} {:>11.4g} +- {:>8.2g} {:>11.4g} +- {:>8.2g} "
-        "{:>7.2f}  {}\n",
-        row.parameter, width, row.gate, row.terms[0], row.terms[1], row.terms[2], row.total, row.standard_error,
-        row.finite_difference, row.finite_difference_error, row.z,
-        is_empty(row)                         ? "nothing"
-        : disagreements({row}, limit).empty() ? "ok"
-                                              : "DIFFERS");
+        "{:<{}} {:>4} {:>{}} {:>11.4g} {:>11.4g} {:>11.4g} {:>11.4g} +- {:>8.2g} {:>11.4g} +- {:>8.2g} "
+        "{:>7.2f} {:>6.2f}  {}\n",
+        row.parameter, width, row.gate, gate_label(problem, row.gate), label, row.terms[0], row.terms[1], row.terms[2],
+        row.total, row.standard_error, row.finite_difference, row.finite_difference_error, row.z,
+        false_alarm_limit(comparisons, row.degrees), verdict(row, comparisons));
 }
 
 int check(const CheckCommand& command) {
@@ -89,15 +99,15 @@ int check(const CheckCommand& command) {
   }
   display.end();
   const int comparisons = static_cast<int>(table.size());
-  const double limit = false_alarm_limit(comparisons, check_batches(problem) - 1);
   for (const Comparison& row : table)
     if (!std::isfinite(row.total) || !std::isfinite(row.finite_difference))
       throw std::runtime_error(fmt::format("the derivative by {} is not finite: values overflow", row.parameter));
-  write_file_atomically(folder + "/check.csv", check_csv(table));
-  print_table(table, limit);
-  const std::size_t wrong = disagreements(table, limit).size();
-  fmt::print("{} of {} differ; limit |z| = {:.2f} (1 % chance of a false alarm in the whole table)\n", wrong,
-             comparisons, limit);
+  write_file_atomically(folder + "/check.csv", check_csv(problem, table));
+  print_table(problem, table);
+  const auto wrong =
+      std::count_if(table.begin(), table.end(), [&](const Comparison& row) { return disagrees(row, comparisons); });
+  fmt::print("{} of {} differ: |z| above the limit of Student's law (1 % chance of a false alarm in the whole table)\n",
+             wrong, comparisons);
   if (wrong > 0)
     fmt::print("Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
   const auto empty = static_cast<int>(std::count_if(table.begin(), table.end(), is_empty));
@@ -110,7 +120,7 @@ int check(const CheckCommand& command) {
     if (empty == comparisons) spdlog::error("nothing was checked: every derivative is zero, as is every difference");
   }
   HeavyTails tails;
-  for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.kurtosis);
+  for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.effective_count);
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {}/check.csv", folder);
   return wrong == 0 && empty < comparisons ? 0 : 1;

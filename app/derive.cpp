@@ -11,6 +11,7 @@
 #include "optim/darkness.h"
 #include "optim/estimates.h"
 #include "optim/files.h"
+#include "optim/gate_columns.h"
 #include "optim/heavy_tail.h"
 #include "optim/loss.h"
 #include "optim/memory.h"
@@ -28,7 +29,8 @@ constexpr double kMostBytes = 1e9;
 
 int derive(const DeriveCommand& command) {
   begin_session(command.common);
-  const Problem problem(read_experiment(command.common), warn);
+  Problem problem(read_experiment(command.common), warn);
+  problem.set_evaluations(1);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
@@ -37,7 +39,7 @@ int derive(const DeriveCommand& command) {
 
   const Camera& camera = problem.scene().camera;
   const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
-  const double images_per_unknown = 6;  // total, three terms, a batch and its sum
+  const double images_per_unknown = 4 + kMostReplicates;  // total, three terms and a term's replicates
   const int group = std::max(1, static_cast<int>(std::min(kMostBytes / (bytes * images_per_unknown), 1e6)));
   require_memory(problem,
                  derivative_memory(problem, std::min(group, block.count), static_cast<int>(images_per_unknown)));
@@ -45,7 +47,8 @@ int derive(const DeriveCommand& command) {
   catch_interrupts();
   ProgressDisplay display(command.common.quiet);
   ProgressStage stage("rendering the derivatives", (block.count + group - 1) / group);
-  std::string table = "parameter,gate,component,mean,standard_error,kurtosis\n";
+  std::string table = "parameter,gate,component,mean,standard_error,replicates,degrees_of_freedom,effective_count" +
+                      gate_column_names(problem.experiment().gates) + "\n";
   HeavyTails tails;
   bool dark = true;  // every derivative is exactly zero
   for (int first = block.begin; first < block.begin + block.count; first += group) {
@@ -65,9 +68,10 @@ int derive(const DeriveCommand& command) {
       for (int g = 0; g < problem.gates().size(); ++g)
         for (const DerivativeEstimate& component : components) {
           const Statistics& s = component.gates[i];
-          table += fmt::format("{},{},{},{},{},{}\n", name, g, component.component, s.mean[g], s.standard_error[g],
-                               s.kurtosis[g]);
-          tails.add(name, g, s.kurtosis[g]);
+          table +=
+              fmt::format("{},{},{},{},{},{},{},{}{}\n", name, g, component.component, s.mean[g], s.standard_error[g],
+                          s.replicates, s.degrees[g], s.effective_count[g], gate_column_values(problem, g));
+          tails.add(name, g, s.effective_count[g]);
         }
     }
     stage.advance();

@@ -19,7 +19,8 @@ namespace {
 
 int gradient(const CommonOptions& options) {
   begin_session(options);
-  const Problem problem(read_experiment(options), warn);
+  Problem problem(read_experiment(options), warn);
+  problem.set_evaluations(1);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(options.at.empty() ? "initial" : options.at);
@@ -38,19 +39,20 @@ int gradient(const CommonOptions& options) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   display.end();
-  std::string table = "parameter,value,gradient,standard_error,kurtosis\n";
+  std::string table = "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count\n";
   HeavyTails tails;
   for (int i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.component_names()[i];
     if (!std::isfinite(estimate.gradient.mean[i]) || !std::isfinite(estimate.gradient.standard_error[i]))
       throw std::runtime_error(fmt::format("the gradient of {} is not finite: values overflow", name));
-    table += fmt::format("{},{},{},{},{}\n", name, theta[i], estimate.gradient.mean[i],
-                         estimate.gradient.standard_error[i], estimate.gradient.kurtosis[i]);
-    tails.add(name, -1, estimate.gradient.kurtosis[i]);
+    const Statistics& s = estimate.gradient;
+    table += fmt::format("{},{},{},{},{},{}\n", name, theta[i], s.mean[i], s.standard_error[i], s.degrees[i],
+                         s.effective_count[i]);
+    tails.add(name, -1, s.effective_count[i]);
   }
   write_file_atomically(folder + "/gradient.csv", table);
   write_file_atomically(folder + "/gradient.yaml", fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds,
-                                                               thread_count(options), estimate.repeats));
+                                                               thread_count(options), estimate.gradient.replicates));
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {}/gradient.csv", folder);
   return 0;

@@ -12,6 +12,7 @@
 #include "optim/advice.h"
 #include "optim/experiment_edit.h"
 #include "optim/files.h"
+#include "optim/gate_columns.h"
 #include "optim/heavy_tail.h"
 #include "optim/memory.h"
 
@@ -76,8 +77,9 @@ void print_point(const Problem& problem, const PointInspection& p) {
   print_rows(p, "bounces", names, sum(most + 1, gates, [&](int b, int g) { return b * gates + g; }),
              p.shares.by_bounces, bias);
   names.clear();
-  for (int g = 0; g < gates; ++g) names.push_back(std::to_string(g));
-  print_rows(p, "gate", names, sum(gates, most + 1, [&](int g, int b) { return b * gates + g; }), p.shares.by_gate);
+  for (int g = 0; g < gates; ++g) names.push_back(fmt::format("{} ({})", g, gate_label(problem, g)));
+  print_rows(p, "gate (center)", names, sum(gates, most + 1, [&](int g, int b) { return b * gates + g; }),
+             p.shares.by_gate);
   names.clear();
   for (const Shape& s : problem.scene().shapes) names.push_back(s.name);
   print_rows(p, "shape", names, p.shares.light_by_shape, p.shares.by_shape);
@@ -139,7 +141,7 @@ void print_advice(const Problem& problem, const Inspection& inspection) {
     fmt::print(
         "  {:<30} {:<28} {:>9.4f}{}\n", fmt::format("advised, {} sampling", name(trial.sampling)),
         numbers(trial.samples), trial.seconds,
-        trial.kurtosis > kHeavyTailKurtosis ? "  (a few rare samples make the variance: not to be trusted)" : "");
+        trial.effective_count < kFewestDeviations ? "  (a few rare samples make the variance: not to be trusted)" : "");
   fmt::print("\n{}", advice_yaml(problem.experiment(), advice.after));
 }
 

@@ -10,6 +10,8 @@
 #include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/memory.h"
+#include "optim/gate_columns.h"
+#include "optim/heavy_tail.h"
 
 namespace isochron {
 namespace {
@@ -29,10 +31,17 @@ int render(const CommonOptions& options) {
   if (const std::string dark = darkness_warning(problem, theta, {&estimate.image}, "the image"); !dark.empty())
     warn(dark);
   write_exr(folder + "/render.exr", estimate.image, exr_notes(problem.experiment().gates));
-  std::string table = "gate,mean,standard_error\n";
-  for (int g = 0; g < problem.gates().size(); ++g)
-    table += fmt::format("{},{},{}\n", g, estimate.gates.mean[g], estimate.gates.standard_error[g]);
+  std::string table = "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count" +
+                      gate_column_names(problem.experiment().gates) + "\n";
+  const Statistics& s = estimate.gates;
+  HeavyTails tails;
+  for (int g = 0; g < problem.gates().size(); ++g) {
+    table += fmt::format("{},{},{},{},{},{}{}\n", g, s.mean[g], s.standard_error[g], s.replicates, s.degrees[g],
+                         s.effective_count[g], gate_column_values(problem, g));
+    tails.add("the image", g, s.effective_count[g]);
+  }
   write_file_atomically(folder + "/render.csv", table);
+  if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   spdlog::info("wrote {0}/render.exr and {0}/render.csv", folder);
   return options.no_plots || draw_plots(folder) ? 0 : 1;
 }

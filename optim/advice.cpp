@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "core/math/error.h"
+#include "optim/gate_columns.h"
 #include "optim/heavy_tail.h"
 #include "optim/vector_math.h"
 
@@ -78,9 +80,10 @@ void choose_samples(Advice& advice, double pixels) {
   advice.seconds_before = seconds_of(advice.costs_before, advice.before.samples, pixels);
   for (SamplingTrial& trial : advice.trials) {
     GradientVariance variance;
+    trial.effective_count = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < trial.costs.size(); ++i) {
       variance.add(trial.costs[i].variance, weights[i]);
-      trial.kurtosis = std::max(trial.kurtosis, trial.costs[i].kurtosis);
+      trial.effective_count = std::min(trial.effective_count, trial.costs[i].effective_count);
     }
     // What the present setting has of the kept terms; what it lacks starts with one sample.
     std::array<int, kPasses> present = advice.before.samples;
@@ -94,14 +97,14 @@ void choose_samples(Advice& advice, double pixels) {
     trial.seconds = seconds_of(trial.costs, trial.samples, pixels);
     const double unchanged = seconds_of(trial.costs, present, pixels);
     const bool good_enough = variance(real(present)) <= kSameVariance * wanted;
-    if (trial.kurtosis > kHeavyTailKurtosis || (trial.seconds > kWorthNewSamples * unchanged && good_enough)) {
+    if (trial.effective_count < kFewestDeviations || (trial.seconds > kWorthNewSamples * unchanged && good_enough)) {
       trial.samples = present;
       trial.seconds = unchanged;
     }
   }
   const SamplingTrial* best = &advice.trials.front();
   for (const SamplingTrial& trial : advice.trials)
-    if (trial.seconds < kWorthNewSampling * best->seconds && trial.kurtosis <= kHeavyTailKurtosis) best = &trial;
+    if (trial.seconds < kWorthNewSampling * best->seconds && trial.effective_count >= kFewestDeviations) best = &trial;
   advice.after = {advice.reduction.kept.max_bounces, best->sampling, best->samples};
   advice.seconds_after = best->seconds;
 }
@@ -180,14 +183,19 @@ std::string advice_yaml(const Experiment& experiment, const Setting& setting) {
 }
 
 std::string inspection_csv(const Problem& problem, const Inspection& inspection) {
-  std::string text = "point,quantity,term,bounces,gate,shape,share,standard_error\n";
+  const std::string gate_names = gate_column_names(problem.experiment().gates);
+  std::string text = "point,quantity,term,bounces,gate,shape,share,standard_error" + gate_names + "\n";
   const int gates = problem.gates().size(), most = full_bounces(problem.experiment());
   const auto& shapes = problem.scene().shapes;
   for (const PointInspection& p : inspection.points) {
     const auto row = [&](const char* quantity, const char* term, const std::string& bounces, const std::string& gate,
                          const std::string& shape, double share, double error) {
-      text +=
-          fmt::format("{},{},{},{},{},{},{},{}\n", p.point.name, quantity, term, bounces, gate, shape, share, error);
+      text += fmt::format("{},{},{},{},{},{},{},{}", p.point.name, quantity, term, bounces, gate, shape, share, error);
+      if (!gate.empty())
+        text += gate_column_values(problem, std::stoi(gate));
+      else
+        text += std::string(std::count(gate_names.begin(), gate_names.end(), ','), ',');
+      text += '\n';
     };
     const auto entry = [](const Statistics& s, std::size_t i) { return std::pair(s.mean[i], s.standard_error[i]); };
     for (int b = 0; b <= most; ++b)

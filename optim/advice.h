@@ -22,7 +22,7 @@ struct SamplingTrial {
   Sampling sampling = Sampling::automatic;
   std::array<int, kPasses> samples{};
   double seconds = 0;               ///< CPU seconds per evaluation, predicted
-  double kurtosis = 0;              ///< above heavy_tail.h's limit the variance is not to be trusted
+  double effective_count = 0;       ///< below heavy_tail.h's limit the variance is not to be trusted
   std::vector<GradientCost> costs;  ///< per point
 };
 
@@ -48,7 +48,7 @@ inline constexpr double kBiasTolerance = 0.01;
 Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds, const Poll& poll);
 
 /// From the costs of the present setting and of trials with their costs: fills in the trials' samples,
-/// seconds and kurtosis, and the advised samples and sampling. Numbers of samples stay unless new ones save a
+/// seconds and effective counts, and the advised samples and sampling. Numbers of samples stay unless new ones save a
 /// tenth; so does the sampling unless another saves a fifth and its variance can be trusted.
 void choose_samples(Advice& advice, double pixels);
 

@@ -9,6 +9,7 @@
 
 #include "core/math/error.h"
 #include "optim/estimates.h"
+#include "optim/gate_columns.h"
 
 namespace isochron {
 namespace {
@@ -80,8 +81,8 @@ struct DifferenceEstimate {
 DifferenceEstimate estimate_difference(const Problem& problem, const std::vector<double>& theta, int component,
                                        const Poll& poll) {
   const double step = check_step(problem, theta, component);
-  const int samples = problem.experiment().samples.primal, batches = check_batches(problem);
-  const EstimatorOptions& options = problem.estimator();
+  const int samples = problem.experiment().samples.primal;
+  const EstimatorOptions& options = problem.image_estimator();
   constexpr std::array<double, 3> kSteps = {1, 0.5, 0.25};
   std::vector<Scene> scenes;  // above and below, step by step
   std::array<double, 3> distances;
@@ -98,30 +99,35 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
 
   const int gates = problem.gates().size();
   const Stream stream = problem.stream(Pass::finite_difference);
-  BatchStatistics statistics;
+  const Camera& camera = problem.scene().camera;
+  const bool independent = renderers[0]->pixels_are_independent();
+  const int replicates = replicate_count(samples, camera.width * camera.height, independent, kMostCheckReplicates);
+  ImageStatistics statistics(independent);
   DifferenceEstimate result;
   result.rounding.assign(gates, 0.0);
-  ProgressStage stage("rendering finite differences", batches);
-  for (int b = 0; b < batches; ++b) {
-    const SampleRange range = Share{b, batches}.of(samples);
-    std::array<std::vector<double>, 3> differences;
+  ProgressStage stage("rendering finite differences", replicates);
+  for (int r = 0; r < replicates; ++r) {
+    const SampleRange range = Share{r, replicates}.of(samples);
+    std::array<GatedImage, 3> differences;
     for (std::size_t s = 0; s < kSteps.size(); ++s) {
-      const GatedImage above = renderers[2 * s]->render(stream, range);
+      GatedImage above = renderers[2 * s]->render(stream, range);
       const GatedImage below = renderers[2 * s + 1]->render(stream, range);
       for (int g = 0; g < gates; ++g) {
-        differences[s].push_back((above.mean(g) - below.mean(g)) / distances[s]);
         const double rounding = std::numeric_limits<double>::epsilon() * std::abs(above.mean(g)) / distances[s];
         result.rounding[g] = std::max(result.rounding[g], rounding);
       }
+      for (std::size_t i = 0; i < above.data.size(); ++i)
+        above.data[i] = (above.data[i] - below.data[i]) / distances[s];
+      differences[s] = std::move(above);
       poll();
     }
-    std::vector<double> extrapolated;
-    for (int g = 0; g < gates; ++g)
-      extrapolated.push_back(extrapolate(differences[0][g], differences[1][g], differences[2][g]));
-    statistics.add(extrapolated, range.count());
+    GatedImage& image = differences[0];
+    for (std::size_t i = 0; i < image.data.size(); ++i)
+      image.data[i] = extrapolate(image.data[i], differences[1].data[i], differences[2].data[i]);
+    statistics.add(std::move(image), range.count());
     stage.advance();
   }
-  result.gates = statistics.result();
+  result.gates = statistics.gates();
   return result;
 }
 
@@ -131,22 +137,21 @@ double z_score(double a, double error_a, double b, double error_b) {
   return a == b ? 0 : (a - b) / std::hypot(error_a, error_b);
 }
 
-double false_alarm_limit(int comparisons, int degrees, double rate) {
+double false_alarm_limit(int comparisons, double degrees, double rate) {
+  constexpr double kNormal = 1000;  // the limit is then within a hundredth of that of the normal law
+  const int whole = static_cast<int>(std::clamp(degrees, 1.0, kNormal));
   const double tail = rate / std::max(comparisons, 1);
   double low = 0, high = 1;
-  while (two_sided_tail(high, degrees) > tail) low = high, high *= 2;
+  while (two_sided_tail(high, whole) > tail) low = high, high *= 2;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
-    (two_sided_tail(middle, degrees) > tail ? low : high) = middle;
+    (two_sided_tail(middle, whole) > tail ? low : high) = middle;
   }
   return high;
 }
 
-std::vector<const Comparison*> disagreements(const std::vector<Comparison>& table, double limit) {
-  std::vector<const Comparison*> wrong;
-  for (const Comparison& row : table)
-    if (!(std::abs(row.z) <= limit)) wrong.push_back(&row);
-  return wrong;
+bool disagrees(const Comparison& row, int comparisons) {
+  return !(std::abs(row.z) <= false_alarm_limit(comparisons, row.degrees));
 }
 
 double extrapolate(double whole, double half, double quarter) {
@@ -172,10 +177,6 @@ Experiment check_experiment(Experiment experiment, std::vector<std::string>& not
   set(spec.path_length, "path_length", motion && jumps);
   experiment.gradient.method = GradientMethod::analytic;
   return experiment;
-}
-
-int check_batches(const Problem& problem) {
-  return std::min(kMostBatches, problem.experiment().samples.primal);
 }
 
 double check_step(const Problem& problem, const std::vector<double>& theta, int component) {
@@ -204,7 +205,7 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
 std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component,
                                          const Poll& poll) {
   ProgressStage stage("comparing derivatives", 2);
-  const auto analytic = estimate_derivatives(problem, theta, component, 1, poll);
+  const auto analytic = estimate_derivatives(problem, theta, component, 1, poll, kMostCheckReplicates);
   stage.advance();
   const DifferenceEstimate difference = estimate_difference(problem, theta, component, poll);
   std::vector<Comparison> rows;
@@ -220,20 +221,28 @@ std::vector<Comparison> check_derivative(const Problem& problem, const std::vect
     row.finite_difference = difference.gates.mean[g];
     row.finite_difference_error = std::hypot(difference.gates.standard_error[g], difference.rounding[g]);
     row.z = z_score(row.total, row.standard_error, row.finite_difference, row.finite_difference_error);
-    row.kurtosis = std::max(analytic.front().gates[0].kurtosis[g], difference.gates.kurtosis[g]);
+    const Statistics& ours = analytic.front().gates[0];
+    const double all = std::hypot(row.standard_error, row.finite_difference_error);
+    if (all > 0)
+      row.degrees = 1 / (std::pow(row.standard_error / all, 4) / ours.degrees[g] +
+                         std::pow(difference.gates.standard_error[g] / all, 4) / difference.gates.degrees[g]);
+    row.effective_count = std::min(ours.effective_count[g], difference.gates.effective_count[g]);
     rows.push_back(row);
   }
   return rows;
 }
 
-std::string check_csv(const std::vector<Comparison>& table) {
+std::string check_csv(const Problem& problem, const std::vector<Comparison>& table) {
   std::string text =
       "parameter,gate,interior,visibility,path_length,total,standard_error,finite_difference,"
-      "finite_difference_error,z,kurtosis\n";
+      "finite_difference_error,z,limit,degrees_of_freedom,effective_count" +
+      gate_column_names(problem.experiment().gates) + "\n";
   for (const Comparison& row : table)
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", row.parameter, row.gate, row.terms[0], row.terms[1],
-                        row.terms[2], row.total, row.standard_error, row.finite_difference, row.finite_difference_error,
-                        row.z, row.kurtosis);
+    text +=
+        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}{}\n", row.parameter, row.gate, row.terms[0], row.terms[1],
+                    row.terms[2], row.total, row.standard_error, row.finite_difference, row.finite_difference_error,
+                    row.z, false_alarm_limit(static_cast<int>(table.size()), row.degrees), row.degrees,
+                    row.effective_count, gate_column_values(problem, row.gate));
   return text;
 }
 

@@ -10,126 +10,87 @@
 namespace isochron {
 namespace {
 
-int batches_for(const char* term, int samples) {
+/// Throws InputError where they are too few for a standard error.
+void require_replicates(const char* term, int samples) {
   if (samples < 2)
     throw InputError(fmt::format("samples.{}: {} is too few for a standard error (allowed: at least 2{})", term,
                                  samples, std::string_view(term) == "primal" ? "" : ", or 0 to leave the term out"));
-  return std::min(kMostBatches, samples);
 }
 
-std::vector<double> gate_means(const GatedImage& image) {
-  std::vector<double> means;
-  for (int g = 0; g < image.gates; ++g) means.push_back(image.mean(g));
-  return means;
-}
-
-/// Means and batch statistics of the images that `estimate(range)` gives, `count` at a time.
+/// Means and statistics of `count` images, which `estimate(range)` gives for parts of the samples.
 template <class Estimate>
-DerivativeEstimate collect(const std::string& component, int samples, int batches, int count, const Poll& poll,
-                           Estimate&& estimate) {
-  std::vector<ImageMean> means(count);
-  std::vector<BatchStatistics> statistics(count);
-  ProgressStage stage("rendering the " + component, batches);
-  for (int b = 0; b < batches; ++b) {
-    const SampleRange range = Share{b, batches}.of(samples);
-    const std::vector<GatedImage> images = estimate(range);
-    for (int i = 0; i < count; ++i) {
-      means[i].add(images[i], range.count());
-      statistics[i].add(gate_means(images[i]), range.count());
-    }
+DerivativeEstimate collect(const std::string& component, int samples, int replicates, bool pixels_are_independent,
+                           int count, const Poll& poll, Estimate&& estimate) {
+  std::vector<ImageStatistics> statistics(count, ImageStatistics(pixels_are_independent));
+  ProgressStage stage("rendering the " + component, replicates);
+  for (int r = 0; r < replicates; ++r) {
+    const SampleRange range = Share{r, replicates}.of(samples);
+    std::vector<GatedImage> images = estimate(range);
+    for (int i = 0; i < count; ++i) statistics[i].add(std::move(images[i]), range.count());
     stage.advance();
     poll();
   }
   DerivativeEstimate result{component, {}, {}};
-  for (int i = 0; i < count; ++i) {
-    result.images.push_back(means[i].mean());
-    result.gates.push_back(statistics[i].result());
+  for (ImageStatistics& of_image : statistics) {
+    result.images.push_back(of_image.mean());
+    result.gates.push_back(of_image.gates());
+    of_image = ImageStatistics(pixels_are_independent);  // its images are no longer needed
   }
   return result;
 }
 
-/// Sum of the terms, whose random numbers are independent: variances add.
-DerivativeEstimate sum_of(const std::vector<DerivativeEstimate>& terms) {
+/// Sum of the terms, whose random numbers are independent.
+DerivativeEstimate total_of(const std::vector<DerivativeEstimate>& terms) {
   DerivativeEstimate total = terms.front();
   total.component = "total";
   for (std::size_t i = 0; i < total.images.size(); ++i) {
-    for (std::size_t t = 1; t < terms.size(); ++t) {
-      const GatedImage& image = terms[t].images[i];
-      for (std::size_t k = 0; k < image.data.size(); ++k) total.images[i].data[k] += image.data[k];
-      for (std::size_t g = 0; g < total.gates[i].mean.size(); ++g) {
-        total.gates[i].mean[g] += terms[t].gates[i].mean[g];
-      }
-    }
-    for (std::size_t g = 0; g < total.gates[i].mean.size(); ++g) {
-      double error = 0, fourth = 0;
-      for (const DerivativeEstimate& term : terms) error = std::hypot(error, term.gates[i].standard_error[g]);
-      total.gates[i].standard_error[g] = error;
-      if (!(error > 0)) continue;
-      // So do fourth cumulants, (kurtosis - 3) variance^2.
-      for (const DerivativeEstimate& term : terms) {
-        const double share = term.gates[i].standard_error[g] / error;
-        fourth += (term.gates[i].kurtosis[g] - 3) * std::pow(share, 4);
-      }
-      total.gates[i].kurtosis[g] = 3 + fourth;
-    }
+    std::vector<const Statistics*> of_terms;
+    for (const DerivativeEstimate& term : terms) of_terms.push_back(&term.gates[i]);
+    total.gates[i] = sum_of(of_terms);
+    for (std::size_t t = 1; t < terms.size(); ++t)
+      for (std::size_t k = 0; k < total.images[i].data.size(); ++k)
+        total.images[i].data[k] += terms[t].images[i].data[k];
   }
   return total;
 }
 
+int pixels_of(const Problem& problem) {
+  return problem.scene().camera.width * problem.scene().camera.height;
+}
+
 }  // namespace
-
-void BatchStatistics::add(const std::vector<double>& batch, int samples) {
-  batches_.push_back(batch);
-  samples_.push_back(samples);
-}
-
-Statistics BatchStatistics::result() const {
-  const std::size_t count = batches_.size(), size = batches_.front().size();
-  double samples = 0;
-  for (double n : samples_) samples += n;
-  const auto n = static_cast<double>(count);
-  const std::vector<double> zeros(size, 0.0);
-  Statistics result{zeros, zeros, zeros};
-  for (std::size_t i = 0; i < size; ++i) {
-    for (std::size_t b = 0; b < count; ++b) result.mean[i] += samples_[b] / samples * batches_[b][i];
-    const auto deviation = [&](std::size_t b) { return samples_[b] / samples * (batches_[b][i] - result.mean[i]); };
-    double sum = 0;
-    for (std::size_t b = 0; b < count; ++b) sum += deviation(b) * deviation(b);
-    result.standard_error[i] = std::sqrt(sum * n / (n - 1));
-    if (!(sum > 0)) continue;
-    for (std::size_t b = 0; b < count; ++b) {
-      const double share = deviation(b) * deviation(b) / sum;
-      result.kurtosis[i] += n * share * share;
-    }
-  }
-  return result;
-}
 
 ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll) {
   const int samples = problem.experiment().samples.primal;
-  const int batches = batches_for("primal", samples);
+  require_replicates("primal", samples);
   const Scene scene = problem.parameters().apply(theta);
-  const Renderer renderer(scene, problem.gates(), problem.estimator());
+  const Renderer renderer(scene, problem.gates(), problem.image_estimator());
   const Stream stream = problem.stream(Pass::primal);
-  DerivativeEstimate result = collect("image", samples, batches, 1, poll, [&](SampleRange range) {
+  const bool independent = renderer.pixels_are_independent();
+  const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
+  DerivativeEstimate result = collect("image", samples, replicates, independent, 1, poll, [&](SampleRange range) {
     return std::vector<GatedImage>{renderer.render(stream, range)};
   });
   return {std::move(result.images[0]), std::move(result.gates[0])};
 }
 
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
-                                                     int first, int count, const Poll& poll) {
+                                                     int first, int count, const Poll& poll, int most_replicates) {
   const SampleSpec& spec = problem.experiment().samples;
+  const int pixels = pixels_of(problem);
   if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
+    require_replicates("primal", spec.primal);
     const Stream stream = problem.stream(Pass::finite_difference);
-    return {collect("total", spec.primal, batches_for("primal", spec.primal), count, poll, [&](SampleRange range) {
+    const bool independent = sampling_mix(problem.estimator(), problem.gates()).image == 0;
+    const int replicates = replicate_count(spec.primal, pixels, independent, most_replicates);
+    return {collect("total", spec.primal, replicates, independent, count, poll, [&](SampleRange range) {
       std::vector<GatedImage> images;
       for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
       return images;
     })};
   }
   for (Term term : kTerms)
-    if (spec.term(term) > 0) batches_for(name(term), spec.term(term));  // before anything is rendered
+    if (spec.term(term) > 0) require_replicates(name(term), spec.term(term));  // before anything is rendered
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
   const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility, Purpose::images), &basis);
@@ -140,36 +101,43 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
     const int samples = spec.term(term);
     if (samples == 0) continue;
     const Stream stream = problem.stream(pass_of(term));
-    components.push_back(collect(name(term), samples, batches_for(name(term), samples), count, poll,
+    const bool independent = renderer.pixels_are_independent(term);
+    const int replicates = replicate_count(samples, pixels, independent, most_replicates);
+    components.push_back(collect(name(term), samples, replicates, independent, count, poll,
                                  [&](SampleRange range) { return renderer.derive(term, stream, range); }));
     stage.advance();
   }
   if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
-  components.insert(components.begin(), sum_of(components));
+  components.insert(components.begin(), total_of(components));
   return components;
 }
 
 int gradient_repeats(const Problem& problem) {
   const SampleSpec& spec = problem.experiment().samples;
-  int repeats = batches_for("primal", spec.primal);
+  const int pixels = pixels_of(problem);
+  require_replicates("primal", spec.primal);
+  int repeats = replicate_count(spec.primal, pixels, false, kMostReplicates);
   if (problem.experiment().gradient.method == GradientMethod::finite_difference) return repeats;
-  for (Term term : kTerms)
-    if (spec.term(term) > 0) repeats = std::min(repeats, batches_for(name(term), spec.term(term)));
+  for (Term term : kTerms) {
+    if (spec.term(term) == 0) continue;
+    require_replicates(name(term), spec.term(term));
+    repeats = std::min(repeats, replicate_count(spec.term(term), pixels, false, kMostReplicates));
+  }
   return repeats;
 }
 
 GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
                                    const Poll& poll) {
-  GradientEstimate result;
-  result.repeats = gradient_repeats(problem);
-  BatchStatistics statistics;
-  ProgressStage stage("estimating the gradient", result.repeats);
-  for (int r = 0; r < result.repeats; ++r) {
-    statistics.add(problem.evaluate(theta, target, 0, poll, {r, result.repeats}).gradient, 1);
+  const int repeats = gradient_repeats(problem);
+  ReplicateStatistics statistics;
+  ProgressStage stage("estimating the gradient", repeats);
+  for (int r = 0; r < repeats; ++r) {
+    std::vector<std::vector<double>> parts;
+    const Evaluation evaluation = problem.evaluate(theta, target, 0, poll, {r, repeats}, &parts);
+    statistics.add(evaluation.gradient, std::move(parts), 1);
     stage.advance();
   }
-  result.gradient = statistics.result();
-  return result;
+  return {statistics.result()};
 }
 
 }  // namespace isochron

@@ -1,36 +1,17 @@
-// Images, derivatives and gradients with standard errors from independent batches of samples.
+// Images, derivatives and gradients with standard errors from replicates: independent estimates that share the samples.
 #pragma once
 #include <string>
 #include <vector>
 
 #include "core/image/image.h"
 #include "optim/problem.h"
+#include "optim/statistics.h"
 
 namespace isochron {
 
-/// At most so many batches; fewer where there are fewer samples per pixel.
-inline constexpr int kMostBatches = 32;
-
-/// Mean and standard error of the mean of some quantities.
-struct Statistics {
-  std::vector<double> mean, standard_error;
-  /// Fourth central moment of the batches over the square of the second: about 3 where they are normal and the
-  /// standard error means what it says, up to their number where a single one stands out (see heavy_tail.h); 0 where
-  /// all are equal.
-  std::vector<double> kurtosis;
-};
-
-/// Collects independent batches, weighted by their samples.
-class BatchStatistics {
- public:
-  void add(const std::vector<double>& batch, int samples);
-  /// At least two batches.
-  Statistics result() const;
-
- private:
-  std::vector<std::vector<double>> batches_;
-  std::vector<double> samples_;
-};
+/// Replicates at most (see replicate_count) of derivatives and gradients, and of those that are checked: enough degrees of
+/// freedom for a sharp test.
+inline constexpr int kMostReplicates = 8, kMostCheckReplicates = 16;
 
 struct ImageEstimate {
   GatedImage image;
@@ -51,17 +32,17 @@ struct DerivativeEstimate {
 /// samples. The finite-difference method gives `total` alone, from samples.primal. Throws InputError when a
 /// term has one sample.
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
-                                                     int first, int count, const Poll& poll);
+                                                     int first, int count, const Poll& poll,
+                                                     int most_replicates = kMostReplicates);
 
 struct GradientEstimate {
-  Statistics gradient;  ///< one entry per unknown
-  int repeats = 0;      ///< independent estimates of residual and derivative that the samples were split into
+  Statistics gradient;  ///< one entry per unknown; replicates of residual and derivative
 };
 
-/// Number of repeats that estimate_gradient makes. Throws InputError when a term has one sample.
+/// Number of replicates that estimate_gradient makes. Throws InputError when a term has one sample.
 int gradient_repeats(const Problem& problem);
 
-/// The gradient of the loss at theta. All repeats together use the experiment's samples once. Throws as
+/// The gradient of the loss at theta. All replicates together use the experiment's samples once. Throws as
 /// above.
 GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
                                    const Poll& poll);

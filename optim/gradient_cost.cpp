@@ -11,7 +11,7 @@
 namespace isochron {
 namespace {
 
-constexpr int kImages = 16, kBatches = kMostBatches, kTimings = 3;
+constexpr int kImages = 16, kBatches = 32, kTimings = 3;
 /// Time of a pass that serves all images at once, over that of a plain one; about.
 constexpr double kLedgerTime = 2;
 constexpr int kFirstIndex = 1 << 20;  ///< of random streams
@@ -84,7 +84,7 @@ class VarianceCollector {
     return result;
   }
   /// As if the batches' squared distances from their mean were those of one number.
-  double kurtosis() const {
+  double effective_count() const {
     std::vector<double> center(by_image_.size(), 0.0), squares(kBatches, 0.0);
     for (const auto& batch : by_batch_)
       for (std::size_t c = 0; c < center.size(); ++c) center[c] += batch[c] / kBatches;
@@ -93,8 +93,8 @@ class VarianceCollector {
         squares[b] += (by_batch_[b][c] - center[c]) * (by_batch_[b][c] - center[c]);
     const double all = mean(squares) * kBatches;
     double sum = 0;
-    for (double s : squares) sum += all > 0 ? kBatches * (s / all) * (s / all) : 0;
-    return sum;
+    for (double s : squares) sum += all > 0 ? (s / all) * (s / all) : 0;
+    return (1 - 1.0 / kBatches) / sum;
   }
 
  private:
@@ -175,7 +175,7 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
     collector.add_term(t, tables);
   }
   result.variance = collector.variance();
-  result.kurtosis = collector.kurtosis();
+  result.effective_count = collector.effective_count();
   return result;
 }
 

@@ -1,6 +1,7 @@
 // What the noise of an experiment's loss gradient costs, measured.
 #pragma once
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "optim/problem.h"
@@ -14,8 +15,8 @@ struct GradientCost {
   PerPass seconds{};          ///< CPU seconds per sample per pixel; 0 of a pass that is not run
   double overhead = 0;        ///< CPU seconds per evaluation, whatever the samples
   /// Of the gradient's batches, by their squared distances from the mean over all unknowns; for one unknown
-  /// that of Statistics. Above kHeavyTailKurtosis the variance is not to be trusted.
-  double kurtosis = 0;
+  /// that of Statistics. Below kFewestDeviations the variance is not to be trusted.
+  double effective_count = std::numeric_limits<double>::infinity();
 };
 
 /// The experiment's numbers of samples, or fewer (at least one), with which measure_cost takes about so many

@@ -25,11 +25,11 @@ std::string show_gates(std::vector<int> gates) {
 
 }  // namespace
 
-void HeavyTails::add(const std::string& parameter, int gate, double kurtosis) {
-  if (!(kurtosis > kHeavyTailKurtosis)) return;
+void HeavyTails::add(const std::string& parameter, int gate, double effective_count) {
+  if (!(effective_count < kFewestDeviations)) return;
+  smallest_ = entries_.empty() ? effective_count : std::min(smallest_, effective_count);
   if (entries_.empty() || entries_.back().parameter != parameter) entries_.push_back({parameter, {}});
   if (gate >= 0) entries_.back().gates.push_back(gate);
-  largest_ = std::max(largest_, kurtosis);
 }
 
 std::string HeavyTails::warning() const {
@@ -41,11 +41,10 @@ std::string HeavyTails::warning() const {
   }
   if (entries_.size() > kMostNamed) names += fmt::format(" and {} more", entries_.size() - kMostNamed);
   return fmt::format(
-      "heavy tail in {}: a few rare samples make most of the variance (kurtosis of the batches up to {:.1f}, "
-      "3 is "
-      "normal), so do not trust the standard error, nor a small one elsewhere; take many more samples or "
-      "wider gates",
-      names, largest_);
+      "heavy tail in {}: a few rare samples make most of the variance (as many as {:.1f} of one size), so do not trust "
+      "the "
+      "standard error, nor a small one elsewhere; take many more samples or wider gates",
+      names, smallest_);
 }
 
 }  // namespace isochron

@@ -1,21 +1,20 @@
-// Standard errors that a few rare samples make: found by the kurtosis of the batches behind them.
+// Standard errors that a few rare samples make: found by how few deviations make up the variance.
 #pragma once
 #include <string>
 #include <vector>
 
 namespace isochron {
 
-/// A standard error is not to be trusted where the kurtosis of its batches (Statistics::kurtosis) exceeds
-/// this: of 32 batches one then carries more than three eighths of all squared deviations. 32 normal batches
-/// exceed it with a probability of 4e-6, fewer batches less often (by simulation). Fewer than 14 batches
-/// never do, so with that few samples there is no warning.
-inline constexpr double kHeavyTailKurtosis = 12;
+/// A standard error is not to be trusted where so few deviations make it up (Statistics::effective_count). 31 normal ones of
+/// one size come below with a probability of 5e-4, more of them less often (by simulation); so do many of very different
+/// sizes, where all but a few count for nothing: then few samples are rare hits, and what was missed is anyone's guess.
+inline constexpr double kFewestDeviations = 4;
 
 /// Collects what is heavy-tailed among many estimates, for one line of warning.
 class HeavyTails {
  public:
   /// `gate`: -1 for an estimate of all gates together. Estimates of one parameter follow each other.
-  void add(const std::string& parameter, int gate, double kurtosis);
+  void add(const std::string& parameter, int gate, double effective_count);
   /// Names parameters and gates and says what to do; empty when nothing is heavy-tailed.
   std::string warning() const;
 
@@ -25,7 +24,7 @@ class HeavyTails {
     std::vector<int> gates;
   };
   std::vector<Entry> entries_;
-  double largest_ = 0;
+  double smallest_ = 0;
 };
 
 }  // namespace isochron

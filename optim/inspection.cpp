@@ -86,7 +86,7 @@ class ShareCollector {
  private:
   /// Over the whole; zeros where there is nothing at all.
   static Statistics statistics(std::vector<std::vector<double>> rows, double whole) {
-    BatchStatistics batches;
+    ReplicateStatistics batches;
     for (auto& row : rows) {
       for (double& value : row) value = whole != 0 ? value / whole : 0;
       batches.add(row, 1);

@@ -68,7 +68,8 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     : experiment_(std::move(experiment)),
       scene_(load_scene_at(experiment_)),
       gates_(make_gates(experiment_.gates)),
-      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)) {
+      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)),
+      evaluations_(std::max(1, experiment_.optimizer.iterations)) {
   for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
     const ParameterSpec& spec = experiment_.parameters[i];
     const Parameters::Block& block = parameters_->blocks()[i];
@@ -94,10 +95,28 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
     const std::vector<double> theta = parameters_->initial();
     const Scene scene = parameters_->apply(theta);
     const TangentBasis basis = parameters_->tangent(theta);
-    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose);
+    const SampleSpec& samples = experiment_.samples;
+    Job job{0, double{1} * samples.interior, double{1} * samples.path_length};
+    if (purpose == Purpose::gradients) {
+      const double images =
+          experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;
+      job = {evaluations_ * images * samples.primal, evaluations_ * job.interior, evaluations_ * job.path_length};
+      if (experiment_.target.images.empty()) job.image += experiment_.target.samples;
+    }
+    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose, job);
     known = options;
   }
   return *known;
+}
+
+const EstimatorOptions& Problem::image_estimator() const {
+  if (!image_estimator_) {
+    EstimatorOptions options = experiment_.estimator;
+    options.mix = measure_mix(parameters_->apply(parameters_->initial()), gates_, options, nullptr, stream(Pass::mix),
+                              Purpose::images, {double{1} * experiment_.samples.primal, 0, 0});
+    image_estimator_ = options;
+  }
+  return *image_estimator_;
 }
 
 void Problem::require_parameters() const {
@@ -186,7 +205,7 @@ EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) con
 }
 
 Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                             const Poll& poll, Share share) const {
+                             const Poll& poll, Share share, std::vector<std::vector<double>>* parts) const {
   if (!can_render(theta)) return no_evaluation(target);
   const SampleSpec& samples = experiment_.samples;
   const Scene scene = parameters_->apply(theta);
@@ -203,11 +222,15 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   result.image = std::move(image.image);
   poll();
   if (differences) {
+    if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
     for (int i = 0; i < parameters_->size(); ++i) {
       const GatedImage derivative =
           finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(samples.primal));
       result.gradient.push_back(inner_product(adjoint, derivative));
       stage.advance();
+      const std::size_t values = derivative.data.size() / derivative.pixels();
+      for (std::size_t k = 0; parts && k < derivative.data.size(); ++k)
+        (*parts)[k / values % kGradientParts][i] += adjoint.data[k] * derivative.data[k];
       poll();
     }
     penalty_.add_gradient(theta, mean_square(target), result.gradient);
@@ -217,7 +240,10 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   for (Term term : kTerms) {
     const SampleRange range = share.of(samples.term(term));
     if (range.count() == 0) continue;
-    renderer.add_gradient(term, adjoint, stream(pass_of(term), iteration), range, dof_gradient);
+    std::vector<std::vector<double>> of_term;
+    renderer.add_gradient(term, adjoint, stream(pass_of(term), iteration), range, dof_gradient,
+                          parts ? &of_term : nullptr);
+    if (parts) parts->insert(parts->end(), of_term.begin(), of_term.end());
     stage.advance();
     poll();
   }

@@ -60,8 +60,14 @@ class Problem {
   const PairPenalty& penalty() const { return penalty_; }
 
   /// The experiment's, with the mix of techniques that automatic sampling settles on, once for all values of the
-  /// parameters: by a trial at their initial values.
+  /// parameters: by a trial at their initial values, in proportion to the work that it decides about. For gradients that is
+  /// an optimisation of the experiment's iterations with its target, so that it is the same for a resumed one; for
+  /// derivative images (Purpose::images) the experiment's samples once.
   const EstimatorOptions& estimator(Purpose purpose = Purpose::gradients) const;
+  /// The same to render the experiment's images once, and nothing else.
+  const EstimatorOptions& image_estimator() const;
+  /// Gradients at so many points are all that is asked for, not an optimisation. Before any of them.
+  void set_evaluations(int evaluations) { evaluations_ = evaluations; }
 
   /// Takes the place of the experiment's numbers of samples; what automatic sampling has settled on stays.
   void set_samples(const SampleSpec& samples) { experiment_.samples = samples; }
@@ -101,8 +107,10 @@ class Problem {
 
   /// Image, loss and gradient at theta from the random numbers of one iteration, unbiased (robust losses: as loss.h
   /// says). The loss is NaN where the share has a single sample of the image.
+  /// `parts`, where asked for, becomes what terms and sets of pixels contribute to the gradient, the penalty aside:
+  /// [part][unknown], the same terms and pixels whatever the share.
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                      const Poll& poll, Share share = {}) const;
+                      const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
 
   /// Central difference of the images along one unknown with common random numbers. Where theta +- step
   /// leaves the bounds, the difference is taken between the bound and the other side.
@@ -118,7 +126,9 @@ class Problem {
   std::unique_ptr<Parameters> parameters_;
   Preconditioner preconditioner_;
   PairPenalty penalty_;
+  int evaluations_;                                                   ///< of the loss gradient
   mutable std::array<std::optional<EstimatorOptions>, 2> estimator_;  ///< per purpose
+  mutable std::optional<EstimatorOptions> image_estimator_;
 };
 
 Pass pass_of(Term term);

@@ -146,8 +146,8 @@ CoupledPair GateShape::sample_pair(PairPart part, double u) const {
   pair.minus = quantile(segment.minus, rest);
   pair.plus_is_jump = segment.plus.form == Side::Form::atom;
   pair.minus_is_jump = segment.minus.form == Side::Form::atom;
-  pair.has_plus = pair.plus_is_jump || part != PairPart::atoms;
-  pair.has_minus = pair.minus_is_jump || part != PairPart::atoms;
+  pair.has_plus = pair.plus_is_jump == (part == PairPart::atoms);
+  pair.has_minus = pair.minus_is_jump == (part == PairPart::atoms);
   return pair;
 }
 
@@ -161,7 +161,7 @@ void GateShape::finish_parts() {
   for (int i = 0; i < static_cast<int>(segments_.size()); ++i) {
     const bool plus = segments_[i].plus.form == Side::Form::atom;
     const bool minus = segments_[i].minus.form == Side::Form::atom;
-    add(plus && minus ? PairPart::jumps : PairPart::smooth, i);
+    if (!plus || !minus) add(PairPart::smooth, i);
     if (plus || minus) add(PairPart::atoms, i);
   }
   for (Part& part : parts_) {

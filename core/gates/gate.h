@@ -20,11 +20,12 @@ struct CoupledPair {
 
 enum class GateKind { steady, gaussian, boxcar, truncated_gaussian, tabulated };
 
-/// Which part of dW a pair is drawn from.
+/// Which part of dW a pair is drawn from. A side of the other part is absent from the pair, so that each part is the same
+/// for every way of sampling and can be left out by itself; where an atom and a slope balance each other, as at the jump of a
+/// sawtooth, either comes alone.
 enum class PairPart {
-  smooth,  ///< segments with at least one continuous side (the `interior` pass of ellipsoidal sampling)
-  jumps,   ///< segments whose both sides are atoms (the `path_length` pass of ellipsoidal sampling)
-  atoms    ///< every atom; continuous partners are dropped (the `path_length` pass of standard sampling)
+  smooth,  ///< the continuous part: W', reported under `interior`
+  atoms    ///< the jumps of the gate, reported under `path_length`
 };
 
 /// One gate shape centred at zero, with the four operations of theory section 3. Lengths in scene units,
@@ -73,7 +74,8 @@ class GateShape {
   }
   /// Offset with density value / mass; u in (0, 1). Not for the steady gate, which is no density.
   double sample(double u) const;
-  /// Mass of dW+ (and of dW-) in the given part; zero for the steady gate.
+  /// Mass of dW+ and of dW- that a pair of the given part stands for; zero for the steady gate. Where a side is absent from
+  /// some pairs, its part of dW has less.
   double pair_mass(PairPart part) const { return parts_[static_cast<int>(part)].mass; }
   /// Draws from a part of positive mass; u in (0, 1).
   CoupledPair sample_pair(PairPart part, double u) const;
@@ -133,7 +135,7 @@ class GateShape {
   double bucket_scale_ = 0;
   int last_interval_ = 0;
   std::vector<Segment> segments_;
-  std::array<Part, 3> parts_;
+  std::array<Part, 2> parts_;
 };
 
 /// All gates of an experiment: one shape at sorted or unsorted centres, scene units.

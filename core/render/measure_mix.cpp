@@ -1,6 +1,8 @@
 #include "core/render/measure_mix.h"
 
 #include <cmath>
+#include <optional>
+#include <vector>
 
 namespace isochron {
 namespace {
@@ -15,10 +17,17 @@ constexpr Doubtful kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr double kShares[] = {0, 0.3, 1};
 constexpr int kSamples[] = {16, 8, 4};  ///< per pixel and batch at most, of each share: for about the same work
-constexpr int kMostBatches = 12, kFewestBatches = 4;
-constexpr int kPixels = 4096;      ///< at most: where pixels are larger, connections from the camera look better
+constexpr int kMostBatches = 12, kFewestBatches = 3;
+/// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
+constexpr int kPixels = 4096, kFewestPixels = 576;
 constexpr int kBlocks = 4;         ///< across the image
-constexpr double kPaths = 300000;  ///< of standard sampling, about
+constexpr double kPaths = 300000;  ///< of standard sampling, about, and of as much work of each other share
+/// A trial's work is this part of that of the job at most.
+constexpr double kTrialPart = 0.1;
+/// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
+constexpr double kSamplesPerTriangle = 0.3;
+/// Trials of fewer paths than this must contradict the width of the gates by this factor to be believed.
+constexpr double kSureOfPaths = 100000, kSure = 1.5;
 /// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
 /// can lose where it is not the best is more than what it can win.
 constexpr double kClearlyBetter[] = {0.75, 0.5};
@@ -30,16 +39,22 @@ constexpr double kClearlyFaster = 0.9;
 /// Per pixel and batch: a batch's points cover the whole image, so that its blocks vary together, and only more batches say
 /// more about the variance.
 constexpr int kRateSamples = 1, kRateBatches = 16;
+/// Samples of standard sampling that take about as long as one by ellipsoidal connections.
+constexpr double kConnectionsWork = 4;
 /// By how much standard sampling must look better than ellipsoidal, per purpose. For gradients, noise counts most where
 /// narrow gates cut, and there standard sampling, whose rare hits a trial may miss, is worse than on average. For
 /// images it may look slightly worse: low-discrepancy numbers, which trials do without, gain more for its pixels (cube,
 /// width 2 %: 1.7 times; box, 0.5 and 1 %: nothing).
 constexpr double kClearlyHits[] = {1.1, 0.5};
 
-/// The camera's image in fewer pixels.
-Scene reduced(const Scene& scene) {
+double pixels_of(const Scene& scene) {
+  return double{1} * scene.camera.width * scene.camera.height;
+}
+
+/// The camera's image in at most so many pixels.
+Scene reduced(const Scene& scene, double pixels) {
   Scene small = scene;
-  const double factor = std::sqrt(kPixels / (double{1} * scene.camera.width * scene.camera.height));
+  const double factor = std::sqrt(pixels / pixels_of(scene));
   if (factor < 1) {
     // Whole pixels, so that the fields of view still agree across the width; the height may lose part of a
     // pixel.
@@ -78,84 +93,159 @@ GatedImage blocks_of(const GatedImage& image, int size) {
   return sums;
 }
 
-/// Sum over blocks of pixels and gates of the variance between batches of images, times the work behind them.
-template <class Estimate>
-double variance_and_work(const Renderer& renderer, int block, int batches, int samples, Estimate&& estimate) {
-  std::vector<double> mean, squares;
-  for (int b = 0; b < batches; ++b) {
-    const GatedImage image = blocks_of(estimate(SampleRange{b * samples, (b + 1) * samples}), block);
-    mean.resize(image.data.size());
-    squares.resize(image.data.size());
-    for (std::size_t i = 0; i < image.data.size(); ++i) {
-      const double d = image.data[i] - mean[i];
-      mean[i] += d / (b + 1);
-      squares[i] += d * (image.data[i] - mean[i]);
-    }
-  }
-  double sum = 0;
-  for (double s : squares) sum += s;
-  return sum * renderer.work();
+/// Width of the blocks whose sums are looked at.
+int block_size(const Scene& small, Purpose purpose) {
+  return purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
 }
 
-/// The better rates of connections for a term's derivative along one column, in sums over blocks.
-ConnectionRates measure_rates(const Scene& small, const GateSet& gates, EstimatorOptions options,
-                              const TangentBasis& column, Term term, const Stream& stream, int block) {
+/// Variance between images in sums over square blocks of pixels.
+class BlockVariance {
+ public:
+  explicit BlockVariance(int block) : block_(block) {}
+  void add(const GatedImage& whole) {
+    const GatedImage image = blocks_of(whole, block_);
+    mean_.resize(image.data.size());
+    squares_.resize(image.data.size());
+    ++count_;
+    for (std::size_t i = 0; i < image.data.size(); ++i) {
+      const double d = image.data[i] - mean_[i];
+      mean_[i] += d / count_;
+      squares_[i] += d * (image.data[i] - mean_[i]);
+    }
+  }
+  /// Of one image, summed over blocks and gates.
+  double sum() const {
+    double sum = 0;
+    for (double s : squares_) sum += s;
+    return sum / (count_ - 1);
+  }
+
+ private:
+  const int block_;
+  int count_ = 0;
+  std::vector<double> mean_, squares_;
+};
+
+/// The better rates of connections for a term's derivative along one column, in sums over a quarter of the width. `budget`:
+/// samples of standard sampling whose work it may take.
+ConnectionRates measure_rates(const Scene& scene, const GateSet& gates, EstimatorOptions options,
+                              const TangentBasis& column, Term term, const Stream& stream, Purpose purpose,
+                              double budget, double& work) {
+  const double samples = 2 * kRateBatches * kRateSamples * kConnectionsWork;
+  const double affordable = (budget - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size())) / samples;
+  if (affordable < std::min<double>(kFewestPixels, pixels_of(scene))) return kAlike;
+  const Scene small = reduced(scene, std::min<double>(kPixels, affordable));
   const auto cost = [&](const ConnectionRates& rates) {
     options.mix = SamplingMix{1, 1, rates, rates};
     const Renderer renderer(small, gates, options, &column);
     if (!renderer.has(term)) return 0.0;
-    return variance_and_work(renderer, block, kRateBatches, kRateSamples,
-                             [&](SampleRange range) { return renderer.derive(term, stream, range)[0]; });
+    BlockVariance variance(block_size(small, purpose));
+    for (int b = 0; b < kRateBatches; ++b)
+      variance.add(renderer.derive(term, stream, {b * kRateSamples, (b + 1) * kRateSamples})[0]);
+    work += renderer.work();
+    return variance.sum() * renderer.work();
   };
   const double alike = cost(kAlike);
   return alike > 0 && cost(kMostlyCamera) < kClearlyFaster * alike ? kMostlyCamera : kAlike;
 }
 
-}  // namespace
+/// What one trial has to say.
+struct Trial {
+  const Scene& scene;
+  const GateSet& gates;
+  EstimatorOptions options;
+  Purpose purpose;
+  double job;  ///< samples per pixel that it decides about
 
-SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
-                        const TangentBasis* basis, const Stream& stream, Purpose purpose) {
-  const double width = gates.relative_width(), coverage = gates.relative_coverage();
-  if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
-  if (options.sampling == Sampling::ellipsoidal) return {1, 1};
-  const Scene small = reduced(scene);
-  const double samples = kPaths / (small.camera.width * small.camera.height);
-  const int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
-  const auto choose = [&](const Doubtful& widths, int block, const TangentBasis* moving, auto&& estimate) -> double {
-    if (coverage < widths.from) return 1;
-    if (width > widths.to) return 0;
-    double cost[3];
+  /// The best of kShares, or `by_width` where it cannot tell. `term`: of the derivative along one column; null: of images.
+  double choose(double by_width, const TangentBasis* column, const Term* term, const Stream& stream,
+                double& work) const {
+    const double triangles = static_cast<double>(scene.triangles.size());
+    const double budget = kTrialPart * pixels_of(scene) * job - 3 * kSamplesPerTriangle * triangles;
+    const double paths = std::min(kPaths, budget / 3);
+    const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
+    // At least what lets the smallest batches have a sample by connections alone.
+    const double per_pixel = kFewestBatches * kSamples[0] / kSamples[2];
+    if (!(paths >= fewest * per_pixel)) return by_width;
+    const Scene small = reduced(scene, std::clamp<double>(paths / per_pixel, fewest, kPixels));
+    const double samples = paths / pixels_of(small);
+    int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
+    int per_batch[3];
+    std::optional<Renderer> renderers[3];
+    std::vector<BlockVariance> variances;
     for (int i = 0; i < 3; ++i) {
+      per_batch[i] = std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]);
       EstimatorOptions trial = options;
       trial.mix = SamplingMix{kShares[i], kShares[i]};
       // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
       trial.numbers = Numbers::independent;
-      const Renderer renderer(small, gates, trial, moving);
-      cost[i] =
-          variance_and_work(renderer, block, batches,
-                            std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]),
-                            [&](SampleRange range) { return estimate(renderer, range); });
+      renderers[i].emplace(small, gates, trial, column);
+      variances.emplace_back(block_size(small, term ? purpose : Purpose::images));
+    }
+    for (int b = 0; b < batches; ++b) {
+      double spent = 0, cheapest = INFINITY;  // per sample and pixel
+      for (int i = 0; i < 3; ++i) {
+        const SampleRange range{b * per_batch[i], (b + 1) * per_batch[i]};
+        variances[i].add(term ? renderers[i]->derive(*term, stream, range)[0] : renderers[i]->render(stream, range));
+        spent += renderers[i]->work();
+        cheapest = std::min(cheapest, renderers[i]->work() / (range.end * pixels_of(small)));
+      }
+      // Where samples take other work than assumed, fewer batches have to do.
+      const double allowed = kTrialPart * pixels_of(scene) * job * cheapest;
+      if (spent * (b + 2) / (b + 1) > allowed) batches = b + 1;
+      if (b + 1 == batches) work += spent;
+    }
+    if (batches < 2) return by_width;
+    double cost[3];
+    for (int i = 0; i < 3; ++i) {
+      const double work_per_image = renderers[i]->work() / batches;
+      cost[i] = variances[i].sum() * work_per_image;
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
     const bool gradients = purpose == Purpose::gradients;
+    const double sure = paths < kSureOfPaths ? kSure : 1;
+    cost[by_width == 1 ? 2 : 0] /= sure;
     const int alone = cost[0] <= kClearlyHits[gradients] * cost[2] ? 0 : 2;
     return kShares[cost[1] < kClearlyBetter[gradients] * cost[alone] ? 1 : alone];
-  };
+  }
+};
+
+}  // namespace
+
+SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
+                        const TangentBasis* basis, const Stream& stream, Purpose purpose, const Job& job,
+                        double* trial_work) {
+  double own_work = 0;
+  double& work = trial_work ? *trial_work : own_work;
+  work = 0;
+  if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
+  if (options.sampling == Sampling::ellipsoidal) return {1, 1};
+  const double width = gates.relative_width(), coverage = gates.relative_coverage();
+  EstimatorOptions plain = options;
+  plain.mix.reset();
+  const SamplingMix by_width = sampling_mix(plain, gates);
   SamplingMix best;
-  best.image =
-      choose(kImage, 1, nullptr, [&](const Renderer& r, SampleRange range) { return r.render(stream, range); });
+  const auto choose = [&](const Doubtful& widths, double otherwise, double samples, const TangentBasis* column,
+                          const Term* term) {
+    if (coverage < widths.from) return 1.0;
+    if (width > widths.to) return 0.0;
+    return Trial{scene, gates, options, purpose, samples}.choose(otherwise, column, term, stream, work);
+  };
+  best.image = choose(kImage, by_width.image, job.image, nullptr, nullptr);
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
-  const int block = purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
-  best.interior = choose(kInterior, block, &one, [&](const Renderer& r, SampleRange range) {
-    return r.derive(Term::interior, stream, range)[0];
-  });
   // Paths of more bounces are found by walks alone, and what rare ones carry a trial cannot tell.
-  if (options.max_bounces != 1) return best;
-  if (best.interior == 1)
-    best.interior_rates = measure_rates(small, gates, options, one, Term::interior, stream, block);
-  best.path_length_rates = measure_rates(small, gates, options, one, Term::path_length, stream, block);
+  const bool has_rates = options.max_bounces == 1;
+  const Term interior = Term::interior;
+  best.interior = choose(kInterior, by_width.interior, has_rates ? job.interior / 2 : job.interior, &one, &interior);
+  if (!has_rates) return best;
+  const auto rates = [&](Term term, double samples) {
+    return measure_rates(scene, gates, options, one, term, stream, purpose, kTrialPart * pixels_of(scene) * samples,
+                         work);
+  };
+  if (best.interior == 1) best.interior_rates = rates(Term::interior, job.interior / 2);
+  best.path_length_rates = rates(Term::path_length, job.path_length);
   return best;
 }
 

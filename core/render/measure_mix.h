@@ -1,5 +1,7 @@
 // How `sampling: auto` decides: a trial of standard sampling, ellipsoidal connections and both combined.
 #pragma once
+#include <limits>
+
 #include "core/render/renderer.h"
 
 namespace isochron {
@@ -9,13 +11,25 @@ namespace isochron {
 /// pixel.
 enum class Purpose { images, gradients };
 
+/// What is decided about: samples per pixel, all in all, of images and of two terms of their derivative. Infinite: so many
+/// that a trial's work does not count; zero: the width of the gates decides.
+struct Job {
+  double image = std::numeric_limits<double>::infinity();
+  double interior = std::numeric_limits<double>::infinity();
+  double path_length = std::numeric_limits<double>::infinity();
+};
+
 /// The mix of techniques with the least variance x work, found by rendering small images (at most 4096
 /// pixels, some hundred thousand paths each), and, where `basis` has columns, the interior term of the derivative
 /// along a random combination of them. Depends on the arguments alone. For gradients, variance is that of
 /// sums over blocks of a quarter of the image's width. Gates much wider or narrower than where the techniques
 /// cross need no trial; other sampling than automatic none either. Where connections find all of a term and paths
 /// bounce once, so that each technique could find them all, rates are chosen by a trial of that term's derivative.
+/// Each trial takes about a tenth of the work of what it decides about at most; where that is too little to tell
+/// techniques apart there is none, and the width of the gates decides. `trial_work`, where given, gets the work of all
+/// trials (see Renderer::work).
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
-                        const TangentBasis* basis, const Stream& stream, Purpose purpose);
+                        const TangentBasis* basis, const Stream& stream, Purpose purpose, const Job& job = {},
+                        double* trial_work = nullptr);
 
 }  // namespace isochron

@@ -5,8 +5,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include <algorithm>
-
 #include "core/render/progress.h"
 
 namespace isochron {
@@ -44,16 +42,6 @@ void parallel(int count, const std::function<void(int)>& f) {
     throw_if_stopped();
     f(i);
     count_part();
-  });
-}
-
-void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum) {
-  constexpr int kChunk = 1 << 14;
-  const int size = static_cast<int>(sum.size());
-  run((size + kChunk - 1) / kChunk, [&](int chunk) {
-    const int end = std::min(size, (chunk + 1) * kChunk);
-    for (const auto& part : parts)
-      for (int i = chunk * kChunk; i < end; ++i) sum[i] += part[i];
   });
 }
 

@@ -1,8 +1,6 @@
-// Work shared out to threads. Results must not depend on who does what: strands of work have accumulators of their own,
-// merged in a fixed order.
+// Work shared out to threads. Results must not depend on who does what: see partition_sum.h.
 #pragma once
 #include <functional>
-#include <vector>
 
 namespace isochron {
 
@@ -16,8 +14,5 @@ void keep_freed_memory();
 /// f(0) ... f(count - 1), in any order, on as many threads as set. Counts as progress (progress.h). Throws Interrupted once
 /// a stop is requested, and what f throws, after all threads have left f.
 void parallel(int count, const std::function<void(int)>& f);
-
-/// sum[i] += parts[0][i] + parts[1][i] + ... in that order.
-void merge(const std::vector<std::vector<double>>& parts, std::vector<double>& sum);
 
 }  // namespace isochron

@@ -6,7 +6,7 @@
 
 #include "core/render/ellipsoidal.h"
 #include "core/render/ledger.h"
-#include "core/render/parallel.h"
+#include "core/render/partition_sum.h"
 #include "core/render/primary_boundary.h"
 #include "core/render/progress.h"
 #include "core/render/sample_points.h"
@@ -15,20 +15,17 @@
 namespace isochron {
 namespace {
 
-/// Work is cut into strands, each worked through in order with accumulators of its own, and merged in order: results
-/// do not depend on which thread takes which strand. Their number depends on the accumulators' size alone.
-constexpr int kMostStrands = 32, kFewestStrands = 8;
-constexpr int kSharedStrands = 256;                           // where strands need no accumulators of their own
-constexpr std::size_t kStrandBudget = std::size_t{64} << 20;  // bytes, all strands together
+/// Work is cut into strands (partitions), each worked through in order with sums of its own, see partition_sum.h. So many
+/// where strands need no sums of their own or learn.
+constexpr int kStrands = kMostPartitions;
 constexpr int kPixelsPerBlock = 8;
 
 /// The pass that guiding learns from: its own random numbers; with fewer searches by each technique it would teach noise.
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
 constexpr long long kFewestLearningRounds = 64;
 
-int strand_count(std::size_t accumulator_doubles) {
-  const std::size_t fitting = kStrandBudget / (sizeof(double) * std::max<std::size_t>(accumulator_doubles, 1));
-  return static_cast<int>(std::clamp<std::size_t>(fitting, kFewestStrands, kMostStrands));
+void add_to(std::vector<double>& sum, const std::vector<double>& other) {
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += other[i];
 }
 
 }  // namespace
@@ -46,13 +43,12 @@ const char* name(Term term) {
 }
 
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates) {
-  // Narrow gates: below this share of the path length, standard sampling throws too many paths away.
+  // Gates that together cover less than this part of the path length: standard sampling throws too many paths away.
   constexpr double kNarrow = 0.02;
-  const double width = gates.relative_width();
-  if (std::isinf(width) || options.sampling == Sampling::standard) return {0, 0};
+  if (gates.shape().is_steady() || options.sampling == Sampling::standard) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   if (options.mix) return *options.mix;
-  return width < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
+  return gates.relative_coverage() < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
 }
 
 struct Renderer::Impl {
@@ -81,6 +77,11 @@ struct Renderer::Impl {
     // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
     // (measured on the cube and the box, 0.1 % to 10 %).
     if (options.antithetic) pair_gain = 1 + 0.1 / width;
+  }
+
+  /// Strands for a pass over samples [range) of every pixel, where each has so many sums of its own.
+  int strands_for(SampleRange range, std::size_t values) const {
+    return partition_count(double{1} * scene.camera.pixels() * range.count(), values);
   }
 
   GatedImage blank() const {
@@ -140,11 +141,12 @@ struct Renderer::Impl {
     if (!scene.moving.any || scene.emitters.empty()) return false;
     if (term == Term::interior) return true;
     if (term == Term::visibility) return scene.moving.geometry;
-    return scene.moving.lengths && gates.shape().pair_mass(jump_part()) > 0;
+    return scene.moving.lengths && gates.shape().pair_mass(PairPart::atoms) > 0;
   }
-  /// Whether the interior term takes the smooth part of dW in pairs.
+  /// Whether every sample of the term adds to its own pixel alone, and has no numbers in common with those of others.
+  bool stays_in_pixels(Term term) const { return term == Term::interior && mix.interior == 0; }
+  /// Whether the interior term takes the continuous part of dW in pairs.
   bool interior_pairs() const { return mix.interior > 0 && options.antithetic && scene.moving.lengths; }
-  PairPart jump_part() const { return interior_pairs() ? PairPart::jumps : PairPart::atoms; }
 
   /// Before the visibility term is run. What is learned depends on scene, gates, basis and options alone.
   void learn() const {
@@ -161,9 +163,9 @@ struct Renderer::Impl {
       const long long rounds =
           std::llround(options.guiding_samples * scene.camera.pixels() / static_cast<double>(searches));
       if (rounds < kFewestLearningRounds) return;
-      std::vector<std::vector<GuideRecord>> records(kMostStrands);
-      std::vector<Guide::Each<double>> costs(kMostStrands);
-      parallel(kMostStrands, [&](int strand) {
+      std::vector<std::vector<GuideRecord>> records(kStrands);
+      std::vector<Guide::Each<double>> costs(kStrands);
+      parallel(kStrands, [&](int strand) {
         Worker worker(scene, gates, options, every_gate, GuideSink(gates, scene.layout, *basis));
         auto& cost = costs[strand];
         cost.fill(0);
@@ -176,7 +178,7 @@ struct Renderer::Impl {
         PrimaryBoundary primary(worker, *edges, unguided, mix.interior == 1);
         SecondaryBoundary secondary(worker, *edges, unguided, mix.interior == 1);
         const double splat_scale = 1.0 / scene.camera.pixels();
-        for (long long i = strand; i < rounds; i += kMostStrands) {
+        for (long long i = strand; i < rounds; i += kStrands) {
           throw_if_stopped();
           const int pixel = static_cast<int>(i * scene.camera.pixels() / rounds) % scene.camera.pixels();
           Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
@@ -190,7 +192,7 @@ struct Renderer::Impl {
       });
       std::vector<GuideRecord> all;
       Guide::Each<double> cost{};
-      for (int strand = 0; strand < kMostStrands; ++strand) {
+      for (int strand = 0; strand < kStrands; ++strand) {
         all.insert(all.end(), records[strand].begin(), records[strand].end());
         for (int t = 0; t < Guide::kTechniques; ++t) cost[t] += costs[strand][t];
       }
@@ -209,7 +211,7 @@ struct Renderer::Impl {
       run_paths(worker, mix.interior, mix.interior_rates, pass, strand, strands, stream, range);
     } else if (term == Term::path_length) {
       pass.pairs = true;
-      pass.part = jump_part();
+      pass.part = PairPart::atoms;
       pass.coupled = options.antithetic;
       run_paths(worker, 1, mix.path_length_rates, pass, strand, strands, stream, range);
     } else {
@@ -254,24 +256,33 @@ double Renderer::work() const {
   return isochron::work(impl_->rays, impl_->arcs);
 }
 
+bool Renderer::pixels_are_independent() const {
+  return impl_->mix.image == 0;
+}
+bool Renderer::pixels_are_independent(Term term) const {
+  return impl_->stays_in_pixels(term);
+}
+
 GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   GatedImage image = impl_->blank();
   if (impl_->scene.emitters.empty()) return image;  // no lamp, or one that the parameters have flattened
-  // Standard sampling adds to a path's own pixel alone, so that strands can share the image.
-  const bool shared = impl_->mix.image == 0;
-  const int strands = shared ? kSharedStrands : strand_count(image.data.size());
-  std::vector<std::vector<double>> films(shared ? 0 : strands);
-  parallel(strands, [&](int strand) {
-    GatedImage own;
-    if (!shared) own = impl_->blank();
-    Worker worker(impl_->scene, impl_->gates, impl_->options, impl_->every_gate,
-                  PrimalSink(impl_->gates, shared ? image : own));
-    GatePass pass;
-    pass.value = true;
+  GatePass pass;
+  pass.value = true;
+  const auto run = [&](const Film& film, int strand, int strands) {
+    Worker worker(impl_->scene, impl_->gates, impl_->options, impl_->every_gate, PrimalSink(impl_->gates, film));
     impl_->run_paths(worker, impl_->mix.image, {}, pass, strand, strands, stream, range);
-    if (!shared) films[strand] = std::move(own.data);
+  };
+  if (pixels_are_independent()) {  // strands have no pixel in common
+    parallel(kStrands, [&](int strand) { run(image, strand, kStrands); });
+    return image;
+  }
+  const int strands = impl_->strands_for(range, image.data.size());
+  const auto sum = sum_of_partitions<SparseSum>(strands, [&](int strand) {
+    SparseSum own(image.data.size());
+    run({image, own, 0}, strand, strands);
+    return own;
   });
-  if (!shared) merge(films, image.data);
+  sum.for_each(image.data.size(), [&](std::size_t i, double value) { image.data[i] += value; });
   return image;
 }
 
@@ -281,59 +292,79 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
   std::vector<GatedImage> images(columns, impl_->blank());
   if (!impl_->has(term) || columns == 0) return images;
   if (term == Term::visibility) impl_->learn();
-  const int strands = strand_count(images[0].data.size() * columns);
-  std::vector<std::vector<std::vector<double>>> films(columns, std::vector<std::vector<double>>(strands));
-  parallel(strands, [&](int strand) {
-    std::vector<GatedImage> own(columns, impl_->blank());
+  const auto run = [&](const std::vector<Film>& films, int strand, int strands) {
     Worker worker(impl_->scene, impl_->gates, impl_->options, impl_->every_gate,
-                  TangentSink(impl_->gates, impl_->scene.layout, *impl_->basis, own));
+                  TangentSink(impl_->gates, impl_->scene.layout, *impl_->basis, films));
     impl_->run_term(term, worker, strand, strands, stream, range);
-    for (int column = 0; column < columns; ++column) films[column][strand] = std::move(own[column].data);
+  };
+  if (pixels_are_independent(term)) {
+    const std::vector<Film> films(images.begin(), images.end());
+    parallel(kStrands, [&](int strand) { run(films, strand, kStrands); });
+    return images;
+  }
+  const std::size_t size = images[0].data.size(), values = size * columns;
+  const int strands = impl_->strands_for(range, values);
+  const auto sum = sum_of_partitions<SparseSum>(strands, [&](int strand) {
+    SparseSum own(values);
+    std::vector<Film> films;
+    for (int column = 0; column < columns; ++column) films.emplace_back(images[column], own, column * size);
+    run(films, strand, strands);
+    return own;
   });
-  for (int column = 0; column < columns; ++column) merge(films[column], images[column].data);
+  sum.for_each(values, [&](std::size_t i, double value) { images[i / size].data[i % size] += value; });
   return images;
 }
 
 void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
-                            std::vector<double>& dof_gradient) const {
+                            std::vector<double>& dof_gradient, std::vector<std::vector<double>>* parts) const {
   if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
+  const TangentBasis& basis = *impl_->basis;
+  if (parts) parts->assign(kGradientParts, std::vector<double>(basis.columns, 0.0));
   if (!impl_->has(term)) return;
   if (term == Term::visibility) impl_->learn();
   const GatePick pick(impl_->gates, adjoint);
-  const int strands = strand_count(impl_->basis->entries.size());  // at least as many as are touched
-  std::vector<SparseSum> gradients(strands);
-  parallel(strands, [&](int strand) {
+  const int strands = impl_->strands_for(range, basis.entries.size());  // at least as many as are touched
+  std::vector<std::vector<double>> by_strand(parts ? strands : 0, std::vector<double>(basis.columns, 0.0));
+  const auto sum = sum_of_partitions<SparseSum>(strands, [&](int strand) {
     SparseSum own(dof_gradient.size());
     Worker worker(impl_->scene, impl_->gates, impl_->options, pick,
-                  AdjointSink(impl_->gates, impl_->scene.layout, *impl_->basis, adjoint, own));
+                  AdjointSink(impl_->gates, impl_->scene.layout, basis, adjoint, own));
     impl_->run_term(term, worker, strand, strands, stream, range);
-    gradients[strand] = std::move(own);
+    if (parts)
+      own.for_each(dof_gradient.size(), [&](std::size_t dof, double value) {
+        for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
+          by_strand[strand][basis.entries[e].column] += basis.entries[e].coefficient * value;
+      });
+    return own;
   });
-  merge(gradients, dof_gradient);
+  sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
+  // Strands take turns at the blocks of pixels, so that of any number of them these come together from the same pixels.
+  for (std::size_t strand = 0; strand < by_strand.size(); ++strand)
+    add_to((*parts)[strand % kGradientParts], by_strand[strand]);
 }
 
 ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) const {
   const Impl& impl = *impl_;
-  ImageLedger sum;
+  struct Sum : ImageLedger {
+    void add(const Sum& other) {
+      add_to(image.data, other.image.data);
+      add_to(by_shape, other.by_shape);
+    }
+  };
+  Sum blank;
   const GatedImage shape = impl.blank();
-  sum.image = GatedImage(shape.width, shape.height, shape.gates * (impl.options.max_bounces + 1), shape.channels);
-  sum.by_shape.assign(impl.scene.scene.shapes.size(), 0.0);
-  if (impl.scene.emitters.empty()) return sum;
-  const ImageLedger blank = sum;
-  const int strands = strand_count(sum.image.data.size());
-  std::vector<std::vector<double>> films(strands), shapes(strands);
-  parallel(strands, [&](int strand) {
-    ImageLedger own = blank;
+  blank.image = GatedImage(shape.width, shape.height, shape.gates * (impl.options.max_bounces + 1), shape.channels);
+  blank.by_shape.assign(impl.scene.scene.shapes.size(), 0.0);
+  if (impl.scene.emitters.empty()) return blank;
+  const int strands = impl.strands_for(range, blank.image.data.size());
+  return sum_of_partitions<Sum>(strands, [&](int strand) {
+    Sum own = blank;
     Worker worker(impl.scene, impl.gates, impl.options, impl.every_gate, ImageLedgerSink(impl.scene, impl.gates, own));
     GatePass pass;
     pass.value = true;
     impl.run_paths(worker, impl.mix.image, {}, pass, strand, strands, stream, range);
-    films[strand] = std::move(own.image.data);
-    shapes[strand] = std::move(own.by_shape);
+    return own;
   });
-  merge(films, sum.image.data);
-  merge(shapes, sum.by_shape);
-  return sum;
 }
 
 GradientLedger Renderer::gradient_ledger(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
@@ -341,7 +372,14 @@ GradientLedger Renderer::gradient_ledger(Term term, std::span<const GatedImage> 
   const Impl& impl = *impl_;
   if (!impl.basis) throw std::logic_error("gradient_ledger: the renderer was made without a tangent basis");
   const std::size_t entries = adjoints[0].data.size(), count = adjoints.size();
-  GradientLedger sum;
+  struct Sum : GradientLedger {
+    void add(const Sum& other) {
+      add_to(by_bounces, other.by_bounces);
+      add_to(by_gate, other.by_gate);
+      add_to(by_shape, other.by_shape);
+    }
+  };
+  Sum sum;
   sum.adjoints = static_cast<int>(count);
   sum.columns = impl.basis->columns;
   const std::size_t columns = sum.columns;
@@ -362,22 +400,14 @@ GradientLedger Renderer::gradient_ledger(Term term, std::span<const GatedImage> 
     largest.data[i] = std::sqrt(squares);
   }
   const GatePick pick(impl.gates, largest);
-  const GradientLedger blank = sum;
-  const int strands = strand_count(blank.by_bounces.size() + blank.by_gate.size() + blank.by_shape.size());
-  std::vector<std::vector<double>> bounces(strands), gates(strands), shapes(strands);
-  parallel(strands, [&](int strand) {
-    GradientLedger own = blank;
+  const int strands = impl.strands_for(range, sum.by_bounces.size() + sum.by_gate.size() + sum.by_shape.size());
+  return sum_of_partitions<Sum>(strands, [&](int strand) {
+    Sum own = sum;
     Worker worker(impl.scene, impl.gates, impl.options, pick,
                   GradientLedgerSink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own));
     impl.run_term(term, worker, strand, strands, stream, range);
-    bounces[strand] = std::move(own.by_bounces);
-    gates[strand] = std::move(own.by_gate);
-    shapes[strand] = std::move(own.by_shape);
+    return own;
   });
-  merge(bounces, sum.by_bounces);
-  merge(gates, sum.by_gate);
-  merge(shapes, sum.by_shape);
-  return sum;
 }
 
 }  // namespace isochron

@@ -75,6 +75,9 @@ enum class Term { interior, visibility, path_length };
 inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_length};
 const char* name(Term term);
 
+/// Of a gradient, see Renderer::add_gradient.
+inline constexpr int kGradientParts = 32;
+
 /// Samples [begin, end) of each pixel. Ranges of one stream that begin at different numbers are independent, those that
 /// begin at the same are not. The samples of a range belong together: [0, 8) is not the mean of [0, 4) and [4, 8), and
 /// with low-discrepancy numbers varies less.
@@ -118,9 +121,10 @@ class Renderer {
   std::vector<GatedImage> derive(Term term, const Stream& stream, SampleRange range) const;
 
   /// Unbiased estimate of one term of sum(adjoint * dI), added to `dof_gradient` (size DofLayout::size()). Costs the
-  /// same for any number of columns.
+  /// same for any number of columns. `parts`, where asked for, becomes what disjoint sets of pixels' samples contribute,
+  /// per column of the basis: [part][column], kGradientParts of them, of the same pixels in every range.
   void add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
-                    std::vector<double>& dof_gradient) const;
+                    std::vector<double>& dof_gradient, std::vector<std::vector<double>>* parts = nullptr) const;
 
   /// Whether the term can be other than zero: something that it depends on moves, and gates have what it needs.
   bool has(Term term) const;
@@ -130,6 +134,11 @@ class Renderer {
   /// As `add_gradient` for every adjoint (at least one, images of one shape), over the columns of the basis, sorted.
   GradientLedger gradient_ledger(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
                                  SampleRange range) const;
+
+  /// Whether values of different pixels, in images and in a term of the derivative, are independent: every sample adds to
+  /// its own pixel alone and shares no random numbers with those of others.
+  bool pixels_are_independent() const;
+  bool pixels_are_independent(Term term) const;
 
   /// What the options resolved to.
   const SamplingMix& mix() const;

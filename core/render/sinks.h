@@ -20,21 +20,44 @@ struct GateWeights {
 };
 inline constexpr GateWeights kValueOnly{1, 0};
 
+/// Where the values of a gated image are added up: in the image itself, or in a stretch of a sparse sum. What it refers to
+/// must outlive it.
+class Film {
+ public:
+  Film(GatedImage& image) : channels_(image.channels), gates_(image.gates), values_(image.data.data()) {}
+  /// For an image of the shape of `shape`, whose values begin at `offset`.
+  Film(const GatedImage& shape, SparseSum& sum, std::size_t offset)
+      : channels_(shape.channels), gates_(shape.gates), sum_(&sum), offset_(offset) {}
+
+  int channels() const { return channels_; }
+  /// The channels' values.
+  double* at(int pixel, int gate) const {
+    const std::size_t index = (static_cast<std::size_t>(pixel) * gates_ + gate) * channels_;
+    return values_ ? values_ + index : sum_->at(offset_ + index, channels_);
+  }
+
+ private:
+  int channels_, gates_;
+  double* values_ = nullptr;
+  SparseSum* sum_ = nullptr;
+  std::size_t offset_ = 0;
+};
+
 class PrimalSink {
  public:
   static constexpr bool kDifferential = false;
-  PrimalSink(const GateSet& gates, GatedImage& film) : gates_(gates), film_(film) {}
+  PrimalSink(const GateSet& gates, const Film& film) : gates_(gates), film_(film) {}
 
   void add(int pixel, const Rgb& value, double length) {
     gates_.for_each_value(length, [&](int g, double w) {
-      double* out = &film_.data[film_.index(pixel, g)];
-      for (int c = 0; c < film_.channels; ++c) out[c] += w * value[c];
+      double* out = film_.at(pixel, g);
+      for (int c = 0; c < film_.channels(); ++c) out[c] += w * value[c];
     });
   }
 
  private:
   const GateSet& gates_;
-  GatedImage& film_;
+  const Film film_;
 };
 
 /// How fast ln F and the length change per unit of each column that a local differential touches.
@@ -92,7 +115,7 @@ class TangentSink {
  public:
   static constexpr bool kDifferential = true;
   /// One film per column.
-  TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<GatedImage> films)
+  TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<const Film> films)
       : gates_(gates), films_(films), rates_(layout, basis) {}
 
   /// The differential that the following contributions share.
@@ -112,13 +135,13 @@ class TangentSink {
 
  private:
   void splat(int column, int pixel, int g, const Rgb& value, double w, double length_part) {
-    GatedImage& film = films_[column];
-    double* out = &film.data[film.index(pixel, g)];
-    for (int c = 0; c < film.channels; ++c) out[c] += value[c] * (w * rates_[column].log_f[c] + length_part);
+    const Film& film = films_[column];
+    double* out = film.at(pixel, g);
+    for (int c = 0; c < film.channels(); ++c) out[c] += value[c] * (w * rates_[column].log_f[c] + length_part);
   }
 
   const GateSet& gates_;
-  std::span<GatedImage> films_;
+  std::span<const Film> films_;
   ColumnRates rates_;
 };
 

@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <vector>
-
-#include "core/render/parallel.h"
 
 namespace isochron {
 
@@ -19,37 +16,42 @@ class SparseSum {
         touched_((size + kBlock - 1) / kBlock, 0) {}
 
   void add(std::size_t i, double value) {
-    const std::size_t block = i / kBlock;
-    if (!touched_[block]) {
-      std::fill_n(&values_[block * kBlock], kBlock, 0.0);
-      touched_[block] = 1;
-    }
+    touch(i / kBlock);
     values_[i] += value;
   }
+  /// The sums i ... i + count - 1, to be added to; count is at most 64.
+  double* at(std::size_t i, int count) {
+    touch(i / kBlock);
+    touch((i + count - 1) / kBlock);
+    return &values_[i];
+  }
 
-  /// sum[i] += (parts[0][i] + parts[1][i] + ...), in that order, with parts of the size of `sum`.
-  friend void merge(const std::vector<SparseSum>& parts, std::span<double> sum) {
-    constexpr std::size_t kChunk = 256;  // blocks
-    const std::size_t blocks = (sum.size() + kBlock - 1) / kBlock;
-    parallel(static_cast<int>((blocks + kChunk - 1) / kChunk), [&](int chunk) {
-      const std::size_t first = chunk * kChunk, last = std::min(blocks, first + kChunk);
-      for (std::size_t block = first; block < last; ++block) {
-        double total[kBlock] = {};
-        bool touched = false;
-        for (const SparseSum& part : parts) {
-          if (!part.touched_[block]) continue;
-          touched = true;
-          for (std::size_t i = 0; i < kBlock; ++i) total[i] += part.values_[block * kBlock + i];
-        }
-        if (!touched) continue;
-        const std::size_t begin = block * kBlock, count = std::min(kBlock, sum.size() - begin);
-        for (std::size_t i = 0; i < count; ++i) sum[begin + i] += total[i];
-      }
-    });
+  /// Adds another vector of the same size.
+  void add(const SparseSum& other) {
+    for (std::size_t block = 0; block < touched_.size(); ++block) {
+      if (!other.touched_[block]) continue;
+      touch(block);
+      for (std::size_t i = block * kBlock; i < (block + 1) * kBlock; ++i) values_[i] += other.values_[i];
+    }
+  }
+
+  /// f(i, value) for the sums of all touched blocks below `size`, in order.
+  template <class F>
+  void for_each(std::size_t size, F&& f) const {
+    for (std::size_t block = 0; block < touched_.size(); ++block)
+      if (touched_[block])
+        for (std::size_t i = block * kBlock; i < std::min(size, (block + 1) * kBlock); ++i) f(i, values_[i]);
   }
 
  private:
   static constexpr std::size_t kBlock = 64;
+
+  void touch(std::size_t block) {
+    if (touched_[block]) return;
+    std::fill_n(&values_[block * kBlock], kBlock, 0.0);
+    touched_[block] = 1;
+  }
+
   std::unique_ptr<double[]> values_;
   std::vector<std::uint8_t> touched_;  ///< per block
 };

@@ -154,7 +154,9 @@ TEST_F(Program, HelpShowsExamples) {
 TEST_F(Program, CommandsWriteTheirFiles) {
   const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
   ASSERT_EQ(run({"render", file, "-o", out, "--no-plots"}).status, 0);
-  EXPECT_EQ(folder_.read("out/render.csv").rfind("gate,mean,standard_error\n0,", 0), 0u);
+  EXPECT_EQ(folder_.read("out/render.csv")
+                .rfind("gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,gate_center\n0,", 0),
+            0u);
   const GatedImage image = read_exr(out + "/render.exr");
   EXPECT_EQ(image.gates, 2);
   EXPECT_EQ(image.channels, 1);
@@ -163,16 +165,20 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   EXPECT_TRUE(folder_.has("out/height.exr"));
   EXPECT_FALSE(folder_.has("out/power.exr"));
   const std::string derive = folder_.read("out/derive.csv");
-  EXPECT_EQ(derive.rfind("parameter,gate,component,mean,standard_error,kurtosis\nheight,0,total,", 0), 0u);
+  EXPECT_EQ(derive.rfind("parameter,gate,component,mean,standard_error,replicates,degrees_of_freedom,effective_count,"
+                         "gate_center\nheight,0,total,",
+                         0),
+            0u);
   for (const char* row : {"height,1,total,", "height,1,interior,", "height,1,visibility,"})
     EXPECT_NE(derive.find(row), std::string::npos);
 
   ASSERT_EQ(run({"gradient", file, "-o", out, "--at", "target"}).status, 0);
   const std::string gradient = folder_.read("out/gradient.csv");
-  EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error,kurtosis\nheight,0,", 0), 0u);
+  EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error,degrees_of_freedom,effective_count\nheight,0,", 0),
+            0u);
   EXPECT_NE(gradient.find("\npower,10,"), std::string::npos);
   const std::string cost = folder_.read("out/gradient.yaml");
-  for (const char* key : {"seconds: ", "threads: ", "repeats: 16\n"}) EXPECT_NE(cost.find(key), std::string::npos);
+  for (const char* key : {"seconds: ", "threads: ", "repeats: 8\n"}) EXPECT_NE(cost.find(key), std::string::npos);
 }
 
 TEST_F(Program, CheckAgreesWithFiniteDifferences) {
@@ -182,11 +188,12 @@ TEST_F(Program, CheckAgreesWithFiniteDifferences) {
   EXPECT_EQ(result.status, 0) << result.errors << folder_.read("stdout");
   const std::string table = folder_.read("out/check.csv");
   EXPECT_EQ(table.rfind("parameter,gate,interior,visibility,path_length,total,standard_error,"
-                        "finite_difference,finite_difference_error,z,kurtosis\nheight,0,",
+                        "finite_difference,finite_difference_error,z,limit,degrees_of_freedom,effective_count,"
+                        "gate_center\nheight,0,",
                         0),
             0u);
   EXPECT_EQ(std::count(table.begin(), table.end(), '\n'), 5);
-  EXPECT_EQ(std::count(table.begin(), table.end(), ','), 5 * 10);
+  EXPECT_EQ(std::count(table.begin(), table.end(), ','), 5 * 13);
   EXPECT_NE(folder_.read("stdout").find("0 of 4 differ"), std::string::npos);
   ASSERT_EQ(run({"check", file, "-o", out, "--samples", "256", "--parameter", "power"}).status, 0);
   EXPECT_EQ(folder_.read("out/check.csv").find("height"), std::string::npos);
@@ -201,7 +208,9 @@ TEST_F(Program, InspectAppliesItsAdvice) {
   const std::string fragment = folder_.read("out/inspect.yaml"), table = folder_.read("out/inspect.csv");
   EXPECT_EQ(fragment.rfind("max_bounces: ", 0), 0u) << fragment;
   EXPECT_NE(folder_.read("stdout").find(fragment), std::string::npos);
-  EXPECT_EQ(table.rfind("point,quantity,term,bounces,gate,shape,share,standard_error\nstart,light,,0,0,,", 0), 0u);
+  EXPECT_EQ(
+      table.rfind("point,quantity,term,bounces,gate,shape,share,standard_error,gate_center\nstart,light,,0,0,,", 0),
+      0u);
   const std::string after = folder_.read("tiny.yaml");
   EXPECT_NE(after.find("   # far too many\n"), std::string::npos) << after;
   const int bounces = after[after.find("max_bounces: ") + 13] - '0';
@@ -282,14 +291,17 @@ TEST_F(Program, GatesThatNoPathReaches) {
     const Result render = run(with({"render", file, "-o", out, "--no-plots", "--quiet"}));
     EXPECT_EQ(render.status, 0);
     expect_dark(render);
-    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")), "gate,mean,standard_error\n0,0,0\n1,0,0\n");
+    const std::string replicates = sampling == std::string("standard") ? "2" : "8";
+    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")),
+              "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,gate_center\n0,0,0," +
+                  replicates + ",inf,inf,90\n1,0,0," + replicates + ",inf,inf,0.1\n");
     const Result derive = run(with({"derive", file, "-o", out, "--no-plots", "--quiet"}));
     EXPECT_EQ(derive.status, 0);
     expect_dark(derive);
     std::istringstream rows(folder_.read(sampling + std::string("/derive.csv")));
     std::string row;
     std::getline(rows, row);
-    while (std::getline(rows, row)) EXPECT_NE(row.find(",0,0,0"), std::string::npos) << row;
+    while (std::getline(rows, row)) EXPECT_NE(row.find(",0,0,"), std::string::npos) << row;
     const Result gradient = run(with({"gradient", file, "-o", out, "--quiet"}));
     EXPECT_EQ(gradient.status, 0);
     expect_dark(gradient);
@@ -298,7 +310,8 @@ TEST_F(Program, GatesThatNoPathReaches) {
     EXPECT_NE(check.errors.find("no light reaches the gates of the image"), std::string::npos) << check.errors;
     EXPECT_NE(check.errors.find("nothing was checked"), std::string::npos) << check.errors;
     EXPECT_EQ(folder_.read(sampling + std::string("/gradient.csv")),
-              "parameter,value,gradient,standard_error,kurtosis\nheight,0.2,0,0,0\npower,8,0,0,0\n");
+              "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count\nheight,0.2,0,0,inf,"
+              "inf\npower,8,0,0,inf,inf\n");
     const Result inspection = run(with({"inspect", file, "-o", out, "--seconds", "0.5"}));
     EXPECT_EQ(inspection.status, 1);
     EXPECT_NE(inspection.errors.find("nothing to advise"), std::string::npos) << inspection.errors;

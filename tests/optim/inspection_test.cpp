@@ -152,7 +152,7 @@ TEST_F(InspectionTest, SamplesAndSamplingChangeWhereItPays) {
   EXPECT_EQ(advice.seconds_before, 140);
   EXPECT_LT(advice.seconds_after, 25);
   // A quick estimator whose variance a few rare samples make is not trusted.
-  advice.trials[1].costs[0].kurtosis = 20;
+  advice.trials[1].costs[0].effective_count = 1.5;
   choose_samples(advice, 1);
   EXPECT_EQ(advice.after.sampling, Sampling::standard);
   // Near the best split nothing changes.

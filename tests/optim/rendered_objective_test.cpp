@@ -73,7 +73,7 @@ TEST_F(Rendered, GradientsWithAndWithoutTheJacobianAgreeOnAverage) {
   const GatedImage target = problem.make_target(kGoOn);
   const RenderedObjective objective(problem, target, kGoOn);
   const std::vector<double> theta = problem.parameters().initial();
-  BatchStatistics differences;
+  ReplicateStatistics differences;
   for (int i = 0; i < 200; ++i) {
     const std::vector<double> with = objective.linearise(theta, i).gradient,
                               alone = objective.evaluate(theta, i).gradient;
@@ -92,7 +92,7 @@ TEST_F(Rendered, CurvatureIsUnbiased) {
   const GatedImage target = few.make_target(kGoOn);
   const std::vector<double> theta = few.parameters().initial();
   const Evaluation exact = RenderedObjective(many, target, kGoOn).linearise(theta, 0);
-  BatchStatistics statistics;
+  ReplicateStatistics statistics;
   const RenderedObjective objective(few, target, kGoOn);
   for (std::uint32_t i = 1; i <= 200; ++i) {
     const Evaluation at = objective.linearise(theta, i);
