@@ -55,9 +55,12 @@ def largest_z(rows):
     return max(abs(row["z"]) for row in rows)
 
 
+def errors(row):
+    return abs(row["total"]) / math.hypot(row["standard_error"], row["finite_difference_error"])
+
+
 def clearest(rows):
-    return max(abs(row["total"]) / math.hypot(row["standard_error"], row["finite_difference_error"])
-               for row in rows if row["total"] != 0)
+    return max(errors(row) for row in rows if row["total"] != 0)
 
 
 def main():

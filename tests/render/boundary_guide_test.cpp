@@ -154,25 +154,29 @@ TEST_P(Guided, MeansAgreeWithUnguidedOnes) {
   const TangentBasis basis =
       make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2}), translate(scene, "light", {0.4, 0, 0.3}),
                          translate(scene, "panel", {-1, 0.2, 0.1})});
-  std::vector<std::vector<Estimate>> means[2];
-  for (const bool guided : {false, true}) {
-    EstimatorOptions options{.max_bounces = 3, .sampling = GetParam()};
-    options.guiding_samples = guided ? 16 : 0;
-    const Renderer renderer(scene, gates, options, &basis);
-    means[guided] = term_means(renderer, Term::visibility, 3, 2, 96, 32, {guided ? 41u : 42u, 0, 0});
-  }
+  // Several times, as one time tells the variance of six heavy-tailed numbers to a factor of 1.5 alone.
+  constexpr int kSeeds = 4;
   double variance[2] = {0, 0};
-  for (int c = 0; c < 3; ++c)
-    for (int g = 0; g < 2; ++g) {
-      const Estimate &plain = means[0][c][g], &guided = means[1][c][g];
-      EXPECT_LT(std::abs(z_score(plain, guided)), 4.5)
-          << c << " " << g << ": " << plain.mean << " +- " << plain.standard_error << ", guided " << guided.mean
-          << " +- " << guided.standard_error;
-      for (int i = 0; i < 2; ++i) variance[i] += means[i][c][g].standard_error * means[i][c][g].standard_error;
+  for (unsigned seed = 41; seed < 41 + 2 * kSeeds; seed += 2) {
+    std::vector<std::vector<Estimate>> means[2];
+    for (const bool guided : {false, true}) {
+      EstimatorOptions options{.max_bounces = 3, .sampling = GetParam()};
+      options.guiding_samples = guided ? 16 : 0;
+      const Renderer renderer(scene, gates, options, &basis);
+      means[guided] = term_means(renderer, Term::visibility, 3, 2, 96, 32, {seed + !guided, 0, 0});
     }
-  // For the same work, of sums over the image. Seen with six seeds: 0.19 to 0.44 (standard), 0.65 to 1.5 (ellipsoidal, where
-  // evenly spread points leave guiding little to do in sums; in pixels it gains).
-  EXPECT_LT(variance[1], (narrow ? 3 : 0.9) * variance[0]);
+    for (int c = 0; c < 3; ++c)
+      for (int g = 0; g < 2; ++g) {
+        const Estimate &plain = means[0][c][g], &guided = means[1][c][g];
+        EXPECT_LT(std::abs(z_score(plain, guided)), 4.5)
+            << c << " " << g << ": " << plain.mean << " +- " << plain.standard_error << ", guided " << guided.mean
+            << " +- " << guided.standard_error;
+        for (int i = 0; i < 2; ++i) variance[i] += means[i][c][g].standard_error * means[i][c][g].standard_error;
+      }
+  }
+  // For the same work, of sums over the image. Seen with four sets of seeds: 0.46 to 0.47 (standard), 1.0 to 1.3 (ellipsoidal,
+  // where evenly spread points leave guiding little to do in sums).
+  EXPECT_LT(variance[1], (narrow ? 1.6 : 0.6) * variance[0]);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Guided, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
