@@ -3,6 +3,7 @@
 // the true emission.
 #include <gtest/gtest.h>
 
+#include "optim/statistics.h"
 #include "optim/estimates.h"
 #include "optim/loop.h"
 #include "optim/rendered_objective.h"
@@ -41,7 +42,7 @@ TEST_F(Dark, LossAtTheTruthIsZero) {
   const std::vector<double> truth = problem.parameters().target();
   const Scene scene = problem.parameters().apply(truth);
   const Renderer renderer(scene, problem.gates(), problem.estimator());
-  BatchStatistics statistics;
+  ReplicateStatistics statistics;
   double squared_noise = 0;
   constexpr int kRows = 60;
   for (std::uint32_t i = 0; i < kRows; ++i) {

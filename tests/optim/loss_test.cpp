@@ -1,4 +1,5 @@
 // The loss of noisy images: unbiased, and with a standard error that holds.
+#include "optim/statistics.h"
 #include "optim/loss.h"
 
 #include <gtest/gtest.h>
@@ -79,7 +80,7 @@ TEST(Loss, HasNoBiasFromNoise) {
   for (const auto& [first, second] : {std::pair{4, 4}, {2, 1}})
     for (double residual : {0.0, 0.8})
       for (const RobustLoss& rho : {RobustLoss{}, RobustLoss{LossKind::huber, 1}, RobustLoss{LossKind::cauchy, 2}}) {
-        BatchStatistics statistics;
+        ReplicateStatistics statistics;
         double squared_noise = 0, plain = 0;
         for (std::uint32_t i = 0; i < kImages; ++i) {
           const SplitImage image = noisy(kPixels, residual, kNoise, first, second, i);
