@@ -12,6 +12,7 @@
 #include "app/interrupt.h"
 #include "app/progress.h"
 #include "optim/darkness.h"
+#include "optim/estimates.h"
 #include "optim/files.h"
 #include "optim/gate_columns.h"
 #include "optim/heavy_tail.h"
@@ -79,7 +80,7 @@ int check(const CheckCommand& command) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
-  require_memory(problem, derivative_memory(problem, 1, 6));
+  require_memory(problem, derivative_memory(problem, 1, 4 + kMostCheckReplicates));
   const std::string folder = output_folder(command.common, problem.experiment(), "-check");
   make_output_folder(folder);
   catch_interrupts();

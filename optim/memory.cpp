@@ -10,15 +10,17 @@
 #include <limits>
 
 #include "core/math/error.h"
+#include "optim/estimates.h"
 
 namespace isochron {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Copies of an image's size that work partitions have together: renderer.cpp gives each of its partitions, 8 at least,
-/// an accumulator.
-constexpr double kLeastPartitions = 8;
+/// Copies of an image's size that sums of work partitions take at a time: one for every thread and those that wait for
+/// others to be added (core/render/partition_sum.h). With more than a few threads they may be more, with few samples, which
+/// touch a part of the image alone, less.
+constexpr double kPartialSums = 8;
 
 /// The number that follows `key` in a file of `KEY: NUMBER kB` lines, in bytes; none: infinite.
 double kilobytes(const char* file, const std::string& key) {
@@ -63,8 +65,22 @@ double image_bytes(const Problem& problem) {
   return 8.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
 }
 
+/// Standard sampling shares one image; what automatic sampling settles on is not known before its trial.
+bool shares_one_image(const Problem& problem) {
+  const Experiment& experiment = problem.experiment();
+  return experiment.estimator.sampling == Sampling::standard || experiment.gates.kind == GateKind::steady;
+}
+
 std::string amount(double bytes) {
   return bytes >= 1e9 ? fmt::format("{:.3g} GB", bytes / 1e9) : fmt::format("{:.0f} MB", std::ceil(bytes / 1e6));
+}
+
+/// `copies` of the images, and what their rendering takes.
+std::vector<MemoryUse> rendering_memory(const Problem& problem, double copies) {
+  const double image = image_bytes(problem);
+  std::vector<MemoryUse> parts = {{"images, their mean and their file", copies * image}};
+  if (!shares_one_image(problem)) parts.push_back({"images of work partitions", kPartialSums * image});
+  return parts;
 }
 
 }  // namespace
@@ -75,24 +91,21 @@ double available_memory() {
 }
 
 std::vector<MemoryUse> image_memory(const Problem& problem) {
-  const double image = image_bytes(problem);
-  // Standard sampling shares one image; what automatic sampling settles on is not known before its trial.
-  const Experiment& experiment = problem.experiment();
-  const bool shared = experiment.estimator.sampling == Sampling::standard || experiment.gates.kind == GateKind::steady;
-  std::vector<MemoryUse> parts = {{"images, their mean and their file", 4.5 * image}};
-  if (!shared) parts.push_back({"images of work partitions", kLeastPartitions * image});
-  return parts;
+  const Camera& camera = problem.scene().camera;
+  return rendering_memory(problem,
+                          2.5 + replicate_count(problem.experiment().samples.primal, camera.width * camera.height,
+                                                shares_one_image(problem), kMostReplicates));
 }
 
 std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns, int images) {
   const double image = image_bytes(problem);
   return {
       {fmt::format("derivative images of {} unknown{}", columns, columns == 1 ? "" : "s"), image * columns * images},
-      {"derivative images of work partitions", kLeastPartitions * image * columns}};
+      {"derivative images of work partitions", kPartialSums * image * columns}};
 }
 
 std::vector<MemoryUse> run_memory(const Problem& problem) {
-  std::vector<MemoryUse> parts = image_memory(problem);
+  std::vector<MemoryUse> parts = rendering_memory(problem, 4.5);
   const double image = image_bytes(problem), unknowns = problem.parameters().size();
   parts.push_back({"target, residual and adjoint images", 3 * image});
   if (problem.experiment().optimizer.method != OptimizerMethod::levenberg_marquardt) return parts;

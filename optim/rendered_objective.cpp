@@ -13,7 +13,7 @@
 namespace isochron {
 namespace {
 
-/// Bytes of derivative images, and of the renderer's strands (8 at least), that are alive at a time.
+/// Bytes of derivative images, and of partial sums of the renderer's work partitions (about 8), that are alive at a time.
 constexpr double kGroupBytes = 1e9, kImagesPerUnknown = 8 + 2;
 
 /// Matrices of unknowns x unknowns that one step of Levenberg-Marquardt holds.
