@@ -1,4 +1,4 @@
-#include "optim/chart.h"
+#include "optim/analysis/chart.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -9,9 +9,9 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
-#include "optim/files.h"
-#include "optim/memory.h"
-#include "optim/solver_race.h"
+#include "optim/analysis/solver_race.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/memory.h"
 
 namespace isochron {
 namespace {

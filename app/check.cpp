@@ -1,4 +1,4 @@
-#include "optim/check.h"
+#include "optim/analysis/check.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -11,12 +11,12 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
-#include "optim/darkness.h"
-#include "optim/estimates.h"
-#include "optim/files.h"
-#include "optim/gate_columns.h"
-#include "optim/heavy_tail.h"
-#include "optim/memory.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/darkness.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/gate_columns.h"
+#include "optim/problem/heavy_tail.h"
+#include "optim/problem/memory.h"
 
 namespace isochron {
 namespace {

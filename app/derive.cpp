@@ -8,13 +8,13 @@
 #include "app/plots.h"
 #include "app/progress.h"
 #include "core/image/image.h"
-#include "optim/darkness.h"
-#include "optim/estimates.h"
-#include "optim/files.h"
-#include "optim/gate_columns.h"
-#include "optim/heavy_tail.h"
-#include "optim/loss.h"
-#include "optim/memory.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/darkness.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/gate_columns.h"
+#include "optim/problem/heavy_tail.h"
+#include "optim/problem/loss.h"
+#include "optim/problem/memory.h"
 
 namespace isochron {
 namespace {

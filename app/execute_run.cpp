@@ -6,7 +6,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
-#include "optim/report.h"
+#include "optim/run/report.h"
 
 namespace isochron {
 

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "app/options.h"
-#include "optim/run.h"
+#include "optim/run/run.h"
 
 namespace isochron {
 

@@ -8,11 +8,11 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
-#include "optim/darkness.h"
-#include "optim/estimates.h"
-#include "optim/files.h"
-#include "optim/heavy_tail.h"
-#include "optim/memory.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/darkness.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/heavy_tail.h"
+#include "optim/problem/memory.h"
 
 namespace isochron {
 namespace {

@@ -8,13 +8,13 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
-#include "core/math/error.h"
-#include "optim/advice.h"
-#include "optim/experiment_edit.h"
-#include "optim/files.h"
-#include "optim/gate_columns.h"
-#include "optim/heavy_tail.h"
-#include "optim/memory.h"
+#include "core/base/error.h"
+#include "optim/analysis/advice.h"
+#include "optim/experiment/experiment_edit.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/gate_columns.h"
+#include "optim/problem/heavy_tail.h"
+#include "optim/problem/memory.h"
 
 namespace isochron {
 namespace {

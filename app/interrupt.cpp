@@ -2,7 +2,7 @@
 
 #include <csignal>
 
-#include "core/render/progress.h"
+#include "core/base/progress.h"
 
 namespace isochron {
 namespace {

@@ -16,11 +16,11 @@
 
 #include "app/commands.h"
 #include "app/progress.h"
-#include "core/math/error.h"
-#include "core/render/parallel.h"
-#include "core/render/progress.h"
-#include "core/scene/yaml_reader.h"
-#include "optim/problem.h"
+#include "core/base/error.h"
+#include "core/base/parallel.h"
+#include "core/base/progress.h"
+#include "core/base/yaml_reader.h"
+#include "optim/problem/problem.h"
 
 namespace {
 

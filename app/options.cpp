@@ -7,8 +7,8 @@
 #include <limits>
 #include <thread>
 
-#include "core/math/error.h"
-#include "core/render/parallel.h"
+#include "core/base/error.h"
+#include "core/base/parallel.h"
 
 namespace isochron {
 

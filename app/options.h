@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "optim/experiment.h"
-#include "optim/problem.h"
+#include "optim/experiment/experiment.h"
+#include "optim/problem/problem.h"
 
 namespace isochron {
 

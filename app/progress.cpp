@@ -10,7 +10,7 @@
 #include <cstdio>
 #include <memory>
 
-#include "core/render/progress.h"
+#include "core/base/progress.h"
 
 namespace isochron {
 namespace {

@@ -4,11 +4,11 @@
 #include <string>
 #include <thread>
 
-#include "optim/run.h"
+#include "optim/run/run.h"
 
 namespace isochron {
 
-/// Shows on stderr how far the work under way has come (core/render/progress.h), from construction to end(): on a terminal
+/// Shows on stderr how far the work under way has come (core/base/progress.h), from construction to end(): on a terminal
 /// as a bar that is redrawn in place, elsewhere as a line every few seconds. One at a time. Messages of spdlog may come at
 /// any time; before other output, end() it.
 class ProgressDisplay {

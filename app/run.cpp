@@ -1,4 +1,4 @@
-#include "optim/run.h"
+#include "optim/run/run.h"
 
 #include <spdlog/spdlog.h>
 

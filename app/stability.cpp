@@ -1,4 +1,4 @@
-#include "optim/stability.h"
+#include "optim/analysis/stability.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -12,8 +12,8 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
-#include "optim/files.h"
-#include "optim/memory.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/memory.h"
 
 namespace isochron {
 namespace {

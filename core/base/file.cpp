@@ -15,7 +15,7 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 
 namespace isochron {
 namespace {

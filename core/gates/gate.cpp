@@ -6,8 +6,8 @@
 #include <numeric>
 #include <string>
 
-#include "core/math/constants.h"
-#include "core/math/error.h"
+#include "core/base/constants.h"
+#include "core/base/error.h"
 
 namespace isochron {
 namespace {

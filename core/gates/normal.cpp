@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 
 namespace isochron {
 namespace {

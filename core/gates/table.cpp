@@ -4,8 +4,8 @@
 #include <limits>
 #include <string>
 
+#include "core/base/error.h"
 #include "core/gates/gate.h"
-#include "core/math/error.h"
 
 namespace isochron {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "core/math/vec.h"
+#include "core/base/vec.h"
 
 namespace isochron {
 

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 
 namespace isochron {
 namespace {

@@ -1,7 +1,7 @@
 // Points with |q-a| + |q-b| = tau on triangles: the ellipsoidal change of variable (theory section 4, paper
 // Eqs. 6-8).
 #pragma once
-#include "core/math/vec.h"
+#include "core/base/vec.h"
 
 namespace isochron {
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/random.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh_impl.h"
-#include "core/math/random.h"
 
 namespace isochron {
 namespace {

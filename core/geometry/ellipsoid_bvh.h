@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/math/vec.h"
+#include "core/base/vec.h"
 
 namespace isochron {
 

@@ -1,8 +1,8 @@
 // What building and querying an EllipsoidBvh share.
 #pragma once
+#include "core/base/large_array.h"
 #include "core/geometry/bounds.h"
 #include "core/geometry/ellipsoid_bvh.h"
-#include "core/math/large_array.h"
 
 namespace isochron {
 

@@ -15,10 +15,10 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "core/base/error.h"
 #include "core/base/file.h"
 #include "core/image/exr_check.h"
 #include "core/image/image.h"
-#include "core/math/error.h"
 
 namespace isochron {
 namespace {

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <utility>
 
+#include "core/base/error.h"
 #include "core/base/file.h"
-#include "core/math/error.h"
 
 namespace isochron {
 namespace {

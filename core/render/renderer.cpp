@@ -4,13 +4,13 @@
 #include <mutex>
 #include <stdexcept>
 
-#include "core/render/ellipsoidal.h"
-#include "core/render/ledger.h"
-#include "core/render/partition_sum.h"
-#include "core/render/primary_boundary.h"
-#include "core/render/progress.h"
-#include "core/render/sample_points.h"
-#include "core/render/secondary_boundary.h"
+#include "core/base/partition_sum.h"
+#include "core/base/progress.h"
+#include "core/films/breakdown_sinks.h"
+#include "core/techniques/ellipsoidal.h"
+#include "core/techniques/primary_boundary.h"
+#include "core/techniques/sample_points.h"
+#include "core/techniques/secondary_boundary.h"
 
 namespace isochron {
 namespace {
@@ -29,27 +29,6 @@ void add_to(std::vector<double>& sum, const std::vector<double>& other) {
 }
 
 }  // namespace
-
-const char* name(Term term) {
-  switch (term) {
-    case Term::interior:
-      return "interior";
-    case Term::visibility:
-      return "visibility";
-    case Term::path_length:
-      return "path_length";
-  }
-  return "";
-}
-
-SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates) {
-  // Gates that together cover less than this part of the path length: standard sampling throws too many paths away.
-  constexpr double kNarrow = 0.02;
-  if (gates.shape().is_steady() || options.sampling == Sampling::standard) return {0, 0};
-  if (options.sampling == Sampling::ellipsoidal) return {1, 1};
-  if (options.mix) return *options.mix;
-  return gates.relative_coverage() < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
-}
 
 struct Renderer::Impl {
   using Guide = BoundaryGuide;
@@ -343,9 +322,9 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
     add_to((*parts)[strand % kGradientParts], by_strand[strand]);
 }
 
-ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) const {
+ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange range) const {
   const Impl& impl = *impl_;
-  struct Sum : ImageLedger {
+  struct Sum : ImageBreakdown {
     void add(const Sum& other) {
       add_to(image.data, other.image.data);
       add_to(by_shape, other.by_shape);
@@ -359,7 +338,8 @@ ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) con
   const int strands = impl.strands_for(range, blank.image.data.size());
   return sum_of_partitions<Sum>(strands, [&](int strand) {
     Sum own = blank;
-    Worker worker(impl.scene, impl.gates, impl.options, impl.every_gate, ImageLedgerSink(impl.scene, impl.gates, own));
+    Worker worker(impl.scene, impl.gates, impl.options, impl.every_gate,
+                  ImageBreakdownSink(impl.scene, impl.gates, own));
     GatePass pass;
     pass.value = true;
     impl.run_paths(worker, impl.mix.image, {}, pass, strand, strands, stream, range);
@@ -367,12 +347,12 @@ ImageLedger Renderer::render_ledger(const Stream& stream, SampleRange range) con
   });
 }
 
-GradientLedger Renderer::gradient_ledger(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
-                                         SampleRange range) const {
+GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
+                                               SampleRange range) const {
   const Impl& impl = *impl_;
-  if (!impl.basis) throw std::logic_error("gradient_ledger: the renderer was made without a tangent basis");
+  if (!impl.basis) throw std::logic_error("gradient_breakdown: the renderer was made without a tangent basis");
   const std::size_t entries = adjoints[0].data.size(), count = adjoints.size();
-  struct Sum : GradientLedger {
+  struct Sum : GradientBreakdown {
     void add(const Sum& other) {
       add_to(by_bounces, other.by_bounces);
       add_to(by_gate, other.by_gate);
@@ -404,7 +384,7 @@ GradientLedger Renderer::gradient_ledger(Term term, std::span<const GatedImage> 
   return sum_of_partitions<Sum>(strands, [&](int strand) {
     Sum own = sum;
     Worker worker(impl.scene, impl.gates, impl.options, pick,
-                  GradientLedgerSink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own));
+                  GradientBreakdownSink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own));
     impl.run_term(term, worker, strand, strands, stream, range);
     return own;
   });

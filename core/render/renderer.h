@@ -1,109 +1,20 @@
 // The renderer's public face: gated images, their derivatives term by term, and loss gradients.
 #pragma once
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/base/random.h"
+#include "core/films/breakdown.h"
 #include "core/gates/gate.h"
 #include "core/image/image.h"
-#include "core/math/random.h"
+#include "core/paths/options.h"
 #include "core/scene/scene.h"
 
 namespace isochron {
 
-enum class Sampling { automatic, standard, ellipsoidal };
-
-/// How ellipsoidal connections pick one of the arcs on an ellipsoid: in proportion to what each would carry if nothing
-/// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
-enum class ArcPick { contribution, uniform };
-
-/// The first numbers of each sample: together the samples of a technique cover evenly what they are taken from, in each
-/// pixel or, where they may land on any, over the whole image (see SamplePoints); or every number is independent of all
-/// others.
-enum class Numbers { low_discrepancy, independent };
-
-/// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
-struct BoundaryTechniques {
-  bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
-  bool aimed = true;        ///< directions from the edge towards emitters
-  bool from_camera = true;  ///< edge points seen from vertices of camera paths
-  bool at_length = true;    ///< the same at lengths drawn from the gates, where they are narrow
-  bool light_arcs = true;   ///< ellipsoidal connections beyond the segment, where gates are narrow
-  bool operator==(const BoundaryTechniques&) const = default;
-};
-
-/// How often each technique of ellipsoidal sampling is used per sample, on average; all positive.
-struct ConnectionRates {
-  double camera_lengths = 1;  ///< connections of the camera itself, lengths drawn from the gates
-  double camera_pairs = 1;    ///< the same, lengths in pairs from the gates' derivative
-  double walk = 1;            ///< camera paths with connections at their vertices
-  bool operator==(const ConnectionRates&) const = default;
-};
-
-/// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
-/// standard. Strictly between, multiple importance sampling combines the two. Rates hold where connections take all.
-struct SamplingMix {
-  double image = 0, interior = 0;
-  ConnectionRates interior_rates = {}, path_length_rates = {};
-  bool operator==(const SamplingMix&) const = default;
-};
-
-struct EstimatorOptions {
-  int max_bounces = 8;  ///< scattering vertices on a path, >= 0
-  Sampling sampling = Sampling::automatic;
-  bool antithetic = true;                ///< coupled pairs for the gate's derivative under ellipsoidal sampling
-  ArcPick pick = ArcPick::contribution;  ///< of ellipsoidal sampling
-  Numbers numbers = Numbers::low_discrepancy;
-  std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
-  BoundaryTechniques boundary = {};
-  /// How far path vertices follow what is close to them and moves otherwise, see VertexFlows; 0: not at all. Any values
-  /// give the same derivative, with other variances, divided otherwise between the interior and the visibility term.
-  double follow = 1;         ///< all but what the camera sees: in radii of the smaller body
-  double follow_radius = 4;  ///< what the camera sees: in widths of a pixel
-  /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.
-  double guiding_samples = 0;
-  bool operator==(const EstimatorOptions&) const = default;
-};
-
-/// What a renderer makes of `sampling` and `mix`.
-SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates);
-
-/// The terms of the derivative (paper Eq. 13). A sample of `interior` and `path_length` is a camera path with all its
-/// connections; one of `visibility` is one search for a boundary, by one of its four techniques (see BoundaryGuide).
-enum class Term { interior, visibility, path_length };
-inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_length};
-const char* name(Term term);
-
 /// Of a gradient, see Renderer::add_gradient.
 inline constexpr int kGradientParts = 32;
-
-/// Samples [begin, end) of each pixel. Ranges of one stream that begin at different numbers are independent, those that
-/// begin at the same are not. The samples of a range belong together: [0, 8) is not the mean of [0, 4) and [4, 8), and
-/// with low-discrepancy numbers varies less.
-struct SampleRange {
-  int begin = 0, end = 0;
-  int count() const { return end - begin; }
-};
-
-/// Gated images sorted by where their light comes from.
-struct ImageLedger {
-  GatedImage image;              ///< [pixel][bounces * gates + gate][channel], bounces from 0 to max_bounces
-  std::vector<double> by_shape;  ///< light on paths that meet a shape (emitters included), summed over the image
-};
-
-/// Sums of adjoint * dI sorted by where they come from, for several adjoints at once.
-struct GradientLedger {
-  int adjoints = 0, columns = 0;
-  std::vector<double> by_bounces;  ///< [bounces][column][adjoint], bounces from 0 to max_bounces
-  std::vector<double> by_gate;     ///< [gate][column], of the first adjoint
-  /// [shape][column], of the first adjoint: of paths that meet a shape (emitters included; one path may meet several);
-  /// of the visibility term: by the shape that the edge is part of.
-  std::vector<double> by_shape;
-  std::size_t index(int bounces, int column) const {
-    return (static_cast<std::size_t>(bounces) * columns + column) * adjoints;
-  }
-};
 
 /// A scene made ready for rendering at one value of the parameters. Immutable; safe to share between threads.
 class Renderer {
@@ -130,10 +41,10 @@ class Renderer {
   bool has(Term term) const;
 
   /// As `render`, sorted.
-  ImageLedger render_ledger(const Stream& stream, SampleRange range) const;
+  ImageBreakdown render_breakdown(const Stream& stream, SampleRange range) const;
   /// As `add_gradient` for every adjoint (at least one, images of one shape), over the columns of the basis, sorted.
-  GradientLedger gradient_ledger(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
-                                 SampleRange range) const;
+  GradientBreakdown gradient_breakdown(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
+                                       SampleRange range) const;
 
   /// Whether values of different pixels, in images and in a term of the derivative, are independent: every sample adds to
   /// its own pixel alone and shares no random numbers with those of others.
@@ -151,11 +62,5 @@ class Renderer {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Work of so many rays, and triangles looked at for arcs, in rays: an arc takes 1.3 times as long, measured on the cube
-/// and the box.
-inline double work(long long rays, long long arcs) {
-  return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs);
-}
 
 }  // namespace isochron

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <tuple>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 
 namespace isochron {
 namespace {

@@ -8,7 +8,7 @@
 #include <set>
 #include <string_view>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 #include "core/scene/mesh_file.h"
 #include "core/scene/mesh_text.h"
 

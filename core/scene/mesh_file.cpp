@@ -11,8 +11,8 @@
 #include <iostream>
 #include <sstream>
 
+#include "core/base/error.h"
 #include "core/base/file.h"
-#include "core/math/error.h"
 #include "core/scene/mesh.h"
 #include "core/scene/polygon.h"
 

@@ -10,7 +10,7 @@
 #include <limits>
 #include <string_view>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 #include "core/scene/mesh_file.h"
 
 namespace isochron {

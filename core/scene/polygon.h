@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/math/vec.h"
+#include "core/base/vec.h"
 
 namespace isochron {
 

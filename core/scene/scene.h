@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "core/materials/material.h"
-#include "core/math/vec.h"
+#include "core/base/vec.h"
+#include "core/scene/materials/material.h"
 
 namespace isochron {
 

@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "core/base/error.h"
 #include "core/base/file.h"
-#include "core/math/error.h"
 
 namespace isochron {
 namespace {

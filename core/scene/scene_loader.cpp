@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <limits>
 
-#include "core/math/constants.h"
-#include "core/math/error.h"
+#include "core/base/constants.h"
+#include "core/base/error.h"
 #include "core/scene/mesh.h"
 
 namespace isochron {

@@ -2,8 +2,8 @@
 #include <array>
 #include <string>
 
+#include "core/base/yaml_reader.h"
 #include "core/scene/scene.h"
-#include "core/scene/yaml_reader.h"
 
 namespace isochron {
 

@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
+#include "core/base/constants.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
-#include "core/math/constants.h"
 
 namespace isochron {
 namespace {

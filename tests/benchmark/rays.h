@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/render/standard_walk.h"
+#include "core/techniques/standard_walk.h"
 
 namespace isochron::benchmarks {
 

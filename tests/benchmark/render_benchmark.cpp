@@ -5,9 +5,9 @@
 #include <memory>
 #include <vector>
 
-#include "core/render/parallel.h"
+#include "core/base/parallel.h"
+#include "core/films/sinks.h"
 #include "core/render/renderer.h"
-#include "core/render/sinks.h"
 #include "tests/benchmark/rays.h"
 #include "tests/benchmark/scenes.h"
 

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "core/base/constants.h"
 #include "core/gates/gate.h"
-#include "core/math/constants.h"
 #include "core/scene/mesh.h"
 #include "core/scene/scene.h"
 #include "core/scene/scene_loader.h"

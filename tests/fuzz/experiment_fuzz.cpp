@@ -1,5 +1,5 @@
 // Experiment files, down to the point where rendering would begin.
-#include "optim/problem.h"
+#include "optim/problem/problem.h"
 #include "tests/fuzz/scenes.h"
 
 using namespace isochron;

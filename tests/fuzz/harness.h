@@ -14,8 +14,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/math/error.h"
-#include "core/math/vec.h"
+#include "core/base/error.h"
+#include "core/base/vec.h"
 
 namespace isochron::fuzz {
 

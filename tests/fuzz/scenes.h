@@ -1,6 +1,6 @@
 // The files that the fuzzed scenes and experiments may name.
 #pragma once
-#include "core/render/camera_model.h"
+#include "core/scene/camera_model.h"
 #include "core/scene/scene.h"
 #include "tests/fuzz/harness.h"
 

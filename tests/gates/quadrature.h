@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/constants.h"
 #include "core/gates/gate.h"
-#include "core/math/constants.h"
 
 namespace isochron {
 

@@ -7,8 +7,8 @@
 #include <map>
 #include <random>
 
+#include "core/base/error.h"
 #include "core/gates/gate.h"
-#include "core/math/error.h"
 #include "tests/gates/quadrature.h"
 
 namespace isochron {

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/constants.h"
 #include "core/geometry/ellipsoid.h"
-#include "core/math/constants.h"
 #include "tests/geometry/random_cases.h"
 
 namespace isochron {

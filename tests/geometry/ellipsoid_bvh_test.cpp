@@ -7,8 +7,8 @@
 #include <random>
 #include <set>
 
+#include "core/base/constants.h"
 #include "core/geometry/ellipsoid.h"
-#include "core/math/constants.h"
 
 namespace isochron {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 #include "tests/geometry/random_cases.h"
 #include "tests/geometry/reference_ellipse.h"
 

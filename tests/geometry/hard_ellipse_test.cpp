@@ -14,7 +14,7 @@
 #include <cstdlib>
 #include <limits>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 #include "tests/geometry/reference_ellipse.h"
 
 namespace isochron {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "core/base/constants.h"
 #include "core/geometry/ellipsoid_bvh.h"
-#include "core/math/constants.h"
 
 namespace isochron {
 namespace {

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <map>
 
+#include "core/base/constants.h"
+#include "core/base/random.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
-#include "core/math/constants.h"
-#include "core/math/random.h"
 
 namespace isochron {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 
 namespace isochron {
 

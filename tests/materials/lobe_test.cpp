@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/materials/material.h"
+#include "core/scene/materials/material.h"
 
 namespace isochron {
 namespace {

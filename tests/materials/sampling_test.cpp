@@ -5,8 +5,8 @@
 #include <limits>
 #include <vector>
 
-#include "core/materials/material.h"
-#include "core/math/random.h"
+#include "core/base/random.h"
+#include "core/scene/materials/material.h"
 #include "tests/materials/chi_square.h"
 
 namespace isochron {

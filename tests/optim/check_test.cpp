@@ -1,11 +1,11 @@
 // The comparison of derivatives with finite differences: its numbers, and that it sees a wrong derivative.
-#include "optim/check.h"
+#include "optim/analysis/check.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "optim/heavy_tail.h"
+#include "optim/problem/heavy_tail.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

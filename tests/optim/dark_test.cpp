@@ -3,10 +3,10 @@
 // the true emission.
 #include <gtest/gtest.h>
 
-#include "optim/statistics.h"
-#include "optim/estimates.h"
-#include "optim/loop.h"
-#include "optim/rendered_objective.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/rendered_objective.h"
+#include "optim/problem/statistics.h"
+#include "optim/run/loop.h"
 #include "tests/optim/temporary_folder.h"
 
 namespace isochron {

@@ -1,5 +1,5 @@
 // What the standard errors of losses say about a run.
-#include "optim/descent.h"
+#include "optim/solvers/descent.h"
 
 #include <gtest/gtest.h>
 

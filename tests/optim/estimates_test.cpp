@@ -1,13 +1,13 @@
 // What `render` and `derive` report: that few replicates keep the gain of low-discrepancy numbers, that the reported errors
 // are those that repeats with other seeds have, and that tables say where gates are. Seeds are fixed; statistical limits
 // are at 4.5 standard deviations.
-#include "optim/estimates.h"
+#include "optim/problem/estimates.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "optim/gate_columns.h"
+#include "optim/problem/gate_columns.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

@@ -1,9 +1,9 @@
 // Edits of experiment files: what changes, and that nothing else does.
-#include "optim/experiment_edit.h"
+#include "optim/experiment/experiment_edit.h"
 
 #include <gtest/gtest.h>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

@@ -1,10 +1,10 @@
-#include "optim/experiment.h"
+#include "optim/experiment/experiment.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

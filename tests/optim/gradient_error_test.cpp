@@ -1,13 +1,13 @@
 // Statistics of gradient estimates, on synthetic ones whose truth is known. Fixed seeds; z-tests at 4.5
 // standard errors (false alarms 7e-6 each).
-#include "optim/gradient_error.h"
+#include "optim/analysis/gradient_error.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "core/math/random.h"
+#include "core/base/random.h"
 
 namespace isochron {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "optim/estimates.h"
-#include "optim/loss.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/loss.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

@@ -1,5 +1,5 @@
 // Statistics from few replicates, and the warning where a few rare samples make the standard error. Seeds are fixed.
-#include "optim/heavy_tail.h"
+#include "optim/problem/heavy_tail.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "optim/estimates.h"
+#include "optim/problem/estimates.h"
 #include "tests/optim/temporary_folder.h"
 
 namespace isochron {

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "core/math/error.h"
-#include "optim/advice.h"
+#include "core/base/error.h"
+#include "optim/analysis/advice.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

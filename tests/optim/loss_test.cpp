@@ -1,13 +1,13 @@
 // The loss of noisy images: unbiased, and with a standard error that holds.
-#include "optim/statistics.h"
-#include "optim/loss.h"
+#include "optim/problem/loss.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-#include "optim/estimates.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/statistics.h"
 #include "tests/optim/synthetic_objective.h"
 
 namespace isochron {

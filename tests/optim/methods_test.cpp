@@ -1,11 +1,11 @@
 // Methods that are the same by another name.
-#include "optim/methods.h"
+#include "optim/analysis/methods.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "optim/experiment.h"
+#include "optim/experiment/experiment.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

@@ -1,4 +1,4 @@
-#include "optim/optimizer.h"
+#include "optim/solvers/optimizer.h"
 
 #include <gtest/gtest.h>
 
@@ -7,10 +7,10 @@
 #include <cstdint>
 #include <limits>
 
-#include "core/math/error.h"
-#include "optim/adam.h"
-#include "optim/checkpoint.h"
-#include "optim/log.h"
+#include "core/base/error.h"
+#include "optim/run/checkpoint.h"
+#include "optim/run/log.h"
+#include "optim/solvers/adam.h"
 #include "tests/optim/synthetic_objective.h"
 #include "tests/optim/temporary_folder.h"
 

@@ -1,4 +1,4 @@
-#include "optim/parameters.h"
+#include "optim/problem/parameters.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 
 namespace isochron {
 namespace {

@@ -1,5 +1,5 @@
 // The decisions about bounces and terms, on gradients with given means and errors.
-#include "optim/reduction.h"
+#include "optim/analysis/reduction.h"
 
 #include <gtest/gtest.h>
 

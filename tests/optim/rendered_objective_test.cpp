@@ -1,13 +1,13 @@
 // The objective that the optimisers see, rendered; and each of them on the tiny scene.
-#include "optim/rendered_objective.h"
+#include "optim/problem/rendered_objective.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/math/error.h"
-#include "optim/estimates.h"
-#include "optim/loop.h"
+#include "core/base/error.h"
+#include "optim/problem/estimates.h"
+#include "optim/run/loop.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

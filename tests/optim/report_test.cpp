@@ -1,10 +1,10 @@
-#include "optim/report.h"
+#include "optim/run/report.h"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "optim/summary.h"
+#include "optim/run/summary.h"
 
 namespace isochron {
 namespace {

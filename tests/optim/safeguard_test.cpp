@@ -1,12 +1,12 @@
 // Rising losses, settled losses and failing objectives, with noise of known law.
-#include "optim/safeguard.h"
+#include "optim/solvers/safeguard.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "optim/loop.h"
+#include "optim/run/loop.h"
 #include "tests/optim/synthetic_objective.h"
 
 namespace isochron {

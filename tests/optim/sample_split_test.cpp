@@ -1,5 +1,5 @@
 // The split of samples against brute force, and the variance components against a simulated table.
-#include "optim/sample_split.h"
+#include "optim/analysis/sample_split.h"
 
 #include <gtest/gtest.h>
 

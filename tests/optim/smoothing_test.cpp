@@ -1,11 +1,11 @@
 // Diffusion and slopes over a mesh against their definitions.
-#include "optim/smoothing.h"
+#include "optim/problem/smoothing.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "optim/adam.h"
+#include "optim/solvers/adam.h"
 #include "tests/optim/synthetic_objective.h"
 
 namespace isochron {

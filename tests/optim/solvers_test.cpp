@@ -4,8 +4,8 @@
 #include <cmath>
 #include <memory>
 
-#include "optim/loop.h"
-#include "optim/quadratic_model.h"
+#include "optim/run/loop.h"
+#include "optim/solvers/quadratic_model.h"
 #include "tests/optim/synthetic_objective.h"
 
 namespace isochron {

@@ -1,5 +1,5 @@
 // Labels of the stability map, on synthetic estimators that fail for a known reason. Fixed seeds.
-#include "optim/stability.h"
+#include "optim/analysis/stability.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <limits>
 #include <numbers>
 
-#include "core/math/error.h"
-#include "core/math/random.h"
+#include "core/base/error.h"
+#include "core/base/random.h"
 
 namespace isochron {
 namespace {

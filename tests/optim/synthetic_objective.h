@@ -4,8 +4,8 @@
 #include <limits>
 #include <numbers>
 
-#include "core/math/random.h"
-#include "optim/objective.h"
+#include "core/base/random.h"
+#include "optim/problem/objective.h"
 
 namespace isochron {
 

@@ -3,9 +3,9 @@
 
 #include <cmath>
 
-#include "core/math/error.h"
-#include "optim/photon_noise.h"
-#include "optim/problem.h"
+#include "core/base/error.h"
+#include "optim/problem/photon_noise.h"
+#include "optim/problem/problem.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {

@@ -1,11 +1,11 @@
-#include "core/render/boundary_edges.h"
+#include "core/techniques/boundary_edges.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 #include <set>
 
-#include "core/math/random.h"
+#include "core/base/random.h"
 #include "scene_building.h"
 #include "support.h"
 

@@ -1,14 +1,14 @@
 // Guiding of the visibility term: its histograms against their densities, and guided against unguided estimates.
 // Chi-square tests fail by chance with probability 1e-4, z-tests at 4.5 standard errors with 7e-6; seeds are fixed.
-#include "core/render/boundary_guide.h"
+#include "core/techniques/boundary_guide.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 
-#include "core/math/random.h"
-#include "core/render/boundary_edges.h"
-#include "core/render/sinks.h"
+#include "core/base/random.h"
+#include "core/films/sinks.h"
+#include "core/techniques/boundary_edges.h"
 #include "support.h"
 
 namespace isochron::testing {

@@ -1,8 +1,8 @@
-#include "core/render/camera_model.h"
+#include "core/scene/camera_model.h"
 
 #include <gtest/gtest.h>
 
-#include "core/math/random.h"
+#include "core/base/random.h"
 
 namespace isochron::testing {
 namespace {

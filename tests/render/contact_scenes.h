@@ -5,7 +5,7 @@
 #include <ostream>
 #include <vector>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 

@@ -5,10 +5,10 @@
 #include <limits>
 #include <numeric>
 
-#include "core/math/cpu_time.h"
-#include "core/render/parallel.h"
-#include "core/render/secondary_boundary.h"
-#include "core/render/sinks.h"
+#include "core/base/cpu_time.h"
+#include "core/base/parallel.h"
+#include "core/films/sinks.h"
+#include "core/techniques/secondary_boundary.h"
 #include "scene_building.h"
 #include "support.h"
 

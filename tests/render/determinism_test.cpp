@@ -2,7 +2,7 @@
 // on how a range is cut.
 #include <gtest/gtest.h>
 
-#include "core/render/parallel.h"
+#include "core/base/parallel.h"
 #include "support.h"
 
 namespace isochron::testing {

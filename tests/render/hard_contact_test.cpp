@@ -8,7 +8,7 @@
 // on a floor.
 #include <gtest/gtest.h>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 

@@ -12,7 +12,7 @@
 
 #include <cmath>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 

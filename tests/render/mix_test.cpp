@@ -10,9 +10,9 @@
 
 #include <array>
 
-#include "core/render/gate_pick.h"
+#include "core/base/parallel.h"
 #include "core/render/measure_mix.h"
-#include "core/render/parallel.h"
+#include "core/techniques/gate_pick.h"
 #include "tests/render/support.h"
 
 namespace isochron::testing {

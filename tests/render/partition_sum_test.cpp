@@ -1,5 +1,5 @@
 // Sums over partitions: the same bits for any number of threads, in the order of a binary tree, and how many there are.
-#include "core/render/partition_sum.h"
+#include "core/base/partition_sum.h"
 
 #include <gtest/gtest.h>
 

@@ -1,14 +1,14 @@
 // The differential of a path against automatic differentiation (ceres::Jet) of ln F and l written anew from
 // theory section 2: as functions of all vertices, albedos, roughnesses and radiances, one degree of freedom
 // at a time.
-#include "core/render/path_differential.h"
+#include "core/paths/path_differential.h"
 
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
 #include <map>
 
-#include "core/math/random.h"
+#include "core/base/random.h"
 #include "scene_building.h"
 #include "tests/materials/walter.h"
 

@@ -1,5 +1,5 @@
 // Surfaces that pass through each other: the lines along which they do, and derivatives of what is seen there.
-#include "core/render/piercings.h"
+#include "core/geometry/piercings.h"
 
 #include <gtest/gtest.h>
 

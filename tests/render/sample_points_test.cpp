@@ -1,5 +1,5 @@
 // Which samples a technique takes, where its points lie together, and what that gains.
-#include "core/render/sample_points.h"
+#include "core/techniques/sample_points.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 
 #include <numeric>
 
-#include "core/math/random.h"
+#include "core/base/random.h"
 #include "support.h"
 
 namespace isochron::testing {

@@ -1,10 +1,10 @@
-#include "core/render/sparse_sum.h"
+#include "core/base/sparse_sum.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/math/random.h"
+#include "core/base/random.h"
 
 namespace isochron {
 namespace {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "core/render/boundary_guide.h"
 #include "core/render/renderer.h"
 #include "core/scene/scene_loader.h"
+#include "core/techniques/boundary_guide.h"
 
 namespace isochron::testing {
 

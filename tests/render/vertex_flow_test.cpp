@@ -1,12 +1,12 @@
 // What the camera sees follows what moves close to it, and so do the other vertices of a path (VertexFlows): which term
 // holds what changes, the derivative of every pixel does not.
-#include "core/render/vertex_flow.h"
+#include "core/paths/vertex_flow.h"
 
 #include <gtest/gtest.h>
 
-#include "core/math/random.h"
-#include "core/render/path_differential.h"
-#include "core/render/secondary_boundary.h"
+#include "core/base/random.h"
+#include "core/paths/path_differential.h"
+#include "core/techniques/secondary_boundary.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 

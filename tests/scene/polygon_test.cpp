@@ -7,7 +7,7 @@
 #include <map>
 #include <numeric>
 
-#include "core/math/constants.h"
+#include "core/base/constants.h"
 #include "core/scene/mesh.h"
 #include "tests/scene/temporary_folder.h"
 

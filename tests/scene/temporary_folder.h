@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/math/error.h"
+#include "core/base/error.h"
 
 namespace isochron {
 

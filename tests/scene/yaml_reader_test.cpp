@@ -1,4 +1,4 @@
-#include "core/scene/yaml_reader.h"
+#include "core/base/yaml_reader.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@
 #include <cstdlib>
 #include <map>
 
-#include "core/math/cpu_time.h"
-#include "core/render/parallel.h"
+#include "core/base/cpu_time.h"
+#include "core/base/parallel.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 

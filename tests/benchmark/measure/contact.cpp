@@ -9,15 +9,15 @@
 //   z       the cases of tests/render/contact_scenes.h: derivative of the image's mean against finite differences, in
 //           standard errors; `low` and `high` are the mean and its standard error
 //   flagged share of rounds of such a derivative, with the samples of the test, whose standard error rests on too few
-//           deviations (optim/heavy_tail.h); `low` and `high` a standard error to each side
+//           deviations (optim/problem/heavy_tail.h); `low` and `high` a standard error to each side
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 
-#include "core/math/cpu_time.h"
-#include "core/render/parallel.h"
-#include "optim/estimates.h"
-#include "optim/heavy_tail.h"
+#include "core/base/cpu_time.h"
+#include "core/base/parallel.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/heavy_tail.h"
 #include "tests/render/contact_scenes.h"
 #include "tests/render/pixel_statistics.h"
 

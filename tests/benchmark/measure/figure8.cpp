@@ -18,8 +18,8 @@
 #include <functional>
 #include <string>
 
-#include "core/math/cpu_time.h"
-#include "optim/problem.h"
+#include "core/base/cpu_time.h"
+#include "optim/problem/problem.h"
 #include "tests/render/pixel_statistics.h"
 
 namespace isochron::benchmarks {

@@ -14,8 +14,8 @@
 #include <cstdlib>
 #include <string>
 
-#include "core/math/cpu_time.h"
-#include "optim/problem.h"
+#include "core/base/cpu_time.h"
+#include "optim/problem/problem.h"
 #include "tests/render/pixel_statistics.h"
 #include "tests/render/support.h"
 

@@ -9,9 +9,9 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "core/math/cpu_time.h"
+#include "core/base/cpu_time.h"
+#include "core/base/parallel.h"
 #include "core/render/measure_mix.h"
-#include "core/render/parallel.h"
 #include "tests/render/support.h"
 #include "tests/render/width_growth.h"
 

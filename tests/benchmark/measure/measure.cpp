@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "core/render/parallel.h"
+#include "core/base/parallel.h"
 #include "core/render/renderer.h"
 #include "tests/benchmark/rays.h"
 #include "tests/benchmark/scenes.h"

@@ -1,0 +1,430 @@
+#include "core/base/yaml_reader.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+#include <sstream>
+#include <string_view>
+
+#include "core/base/error.h"
+#include "core/base/file.h"
+
+namespace isochron {
+
+struct YamlValue::Document {
+  std::string file;
+  std::vector<std::string> overridden;  ///< paths whose values come from the command line
+
+  /// The file, or the override that the value at `key` belongs to.
+  std::string source(const std::string& key) const {
+    for (auto path = overridden.rbegin(); path != overridden.rend(); ++path) {
+      const bool below = key.size() > path->size() && (key[path->size()] == '.' || key[path->size()] == '[');
+      if (key.compare(0, path->size(), *path) == 0 && (key.size() == path->size() || below)) return "--set " + *path;
+    }
+    return file;
+  }
+};
+
+namespace {
+
+std::string join(const std::vector<std::string>& words) {
+  return std::accumulate(words.begin(), words.end(), std::string(),
+                         [](const std::string& a, const std::string& b) { return a.empty() ? b : a + ", " + b; });
+}
+
+std::string describe(const YAML::Node& node) {
+  switch (node.Type()) {
+    case YAML::NodeType::Map:
+      return "a map";
+    case YAML::NodeType::Sequence:
+      return fmt::format("a list of {}", node.size());
+    case YAML::NodeType::Scalar:
+      return quote(node.Scalar());
+    default:
+      return "nothing";
+  }
+}
+
+/// yaml-cpp tags quoted scalars with "!".
+bool is_plain(const YAML::Node& node) {
+  return node.IsScalar() && node.Tag() != "!";
+}
+
+template <class T>
+std::optional<T> parse(const YAML::Node& node) {
+  if (!is_plain(node)) return {};
+  std::string_view text = node.Scalar();
+  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return {};
+  if constexpr (std::is_floating_point_v<T>) {
+    if (!std::isfinite(value)) return {};
+  }
+  return value;
+}
+
+std::string child(const std::string& parent, const std::string& name) {
+  return parent.empty() ? name : parent + "." + name;
+}
+
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
+  return text;
+}
+
+std::string place(const std::string& source, const YAML::Mark& mark) {
+  return fmt::format("{}:{}:{}", source, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1);
+}
+
+/// Follows a document for the place where it begins.
+struct DocumentStart final : YAML::EventHandler {
+  YAML::Mark mark;
+  void OnDocumentStart(const YAML::Mark& at) override { mark = at; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+};
+
+/// The only document in `text`. Not by YAML::LoadAll, which finds empty documents without end before some
+/// characters.
+YAML::Node parse_document(const std::string& source, const std::string& text) {
+  try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    DocumentStart document;
+    if (!parser.HandleNextDocument(document)) throw InputError(source + ":1:1: syntax: is empty");
+    if (parser.HandleNextDocument(document))
+      throw InputError(place(source, document.mark) + ": syntax: a second document begins (one per file is allowed)");
+    return YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw InputError(place(source, error.mark) + ": syntax: " + one_line(error.msg));
+  }
+}
+
+std::string read_text(const std::string& file) {
+  std::string problem;
+  const std::optional<std::string> text = read_regular_file(file, problem);
+  if (!text) throw InputError(file + ":1:1: file: " + problem + (problem.starts_with("is ") ? " (a YAML file)" : ""));
+  return *text;
+}
+
+/// One step of an override's path: a key, or an index into a list.
+struct Step {
+  std::string key;
+  std::optional<std::size_t> index;
+};
+
+std::vector<Step> split_path(const std::string& path, const std::string& text) {
+  std::vector<Step> steps;
+  const auto malformed = [&] { return InputError("--set " + text + ": must be KEY.PATH=VALUE"); };
+  for (std::size_t at = 0; at < path.size();) {
+    if (path[at] == '[') {
+      const std::size_t close = path.find(']', at);
+      std::size_t index = 0;
+      if (close == std::string::npos) throw malformed();
+      const auto [end, error] = std::from_chars(path.data() + at + 1, path.data() + close, index);
+      if (error != std::errc() || end != path.data() + close) throw malformed();
+      steps.push_back({{}, index});
+      at = close + 1;
+    } else {
+      if (path[at] == '.' && !steps.empty()) ++at;
+      const std::size_t end = std::min(path.find_first_of(".[", at), path.size());
+      if (end == at) throw malformed();
+      steps.push_back({path.substr(at, end - at), {}});
+      at = end;
+    }
+  }
+  if (steps.empty() || path.back() == '.') throw malformed();
+  return steps;
+}
+
+void remove_entry(YAML::Node& list, std::size_t index) {
+  YAML::Node shorter(YAML::NodeType::Sequence);
+  for (std::size_t i = 0; i < list.size(); ++i)
+    if (i != index) shorter.push_back(list[i]);
+  list = shorter;
+}
+
+/// Puts an override's value into the tree and adds its path to `overridden`. Sections on the way that the
+/// file leaves out are made, and added too.
+void apply_override(YAML::Node node, const std::string& text, std::vector<std::string>& overridden) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos) throw InputError("--set " + text + ": must be KEY.PATH=VALUE");
+  const std::string path = text.substr(0, equals), source = "--set " + path;
+  const std::vector<Step> steps = split_path(path, text);
+  const std::string value_text = text.substr(equals + 1);
+  const bool removes = value_text.find_first_not_of(" \t") == std::string::npos;
+  const YAML::Node value = removes ? YAML::Node() : parse_document(source, value_text);
+  std::string here;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const Step& step = steps[i];
+    const bool last = i + 1 == steps.size();
+    here += step.index ? fmt::format("[{}]", *step.index) : (i > 0 ? "." : "") + step.key;
+    YAML::Node next;
+    if (step.index) {
+      if (!node.IsSequence() || *step.index >= node.size())
+        throw InputError(fmt::format("{}: there is no entry {} (the list has {})", source, *step.index,
+                                     node.IsSequence() ? node.size() : 0));
+      if (last && removes) {
+        remove_entry(node, *step.index);
+        return;
+      }
+      if (last) node[*step.index] = value;
+      next.reset(node[*step.index]);
+    } else {
+      if (!node.IsMap())
+        throw InputError(fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
+      if (last && removes) {
+        if (!node.remove(step.key))
+          throw InputError(fmt::format("{}: there is no key '{}' to remove", source, step.key));
+        return;
+      }
+      if (last) {
+        node[step.key] = value;
+      } else if (!std::as_const(node)[step.key].IsDefined() && !steps[i + 1].index) {
+        node[step.key] = YAML::Node(YAML::NodeType::Map);
+        overridden.push_back(here);
+      }
+      const YAML::Node found = std::as_const(node)[step.key];
+      if (!found.IsDefined()) throw InputError(fmt::format("{}: there is no key '{}'", source, step.key));
+      next.reset(found);
+    }
+    node.reset(next);
+  }
+  overridden.push_back(path);
+}
+
+}  // namespace
+
+bool NumberRange::contains(double value) const {
+  return (low_open ? value > low : value >= low) && (high_open ? value < high : value <= high);
+}
+
+std::string NumberRange::describe() const {
+  std::string text;
+  if (std::isfinite(low)) text = fmt::format("{} {}", low_open ? "above" : "at least", low);
+  if (std::isfinite(high))
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", high_open ? "below" : "at most", high);
+  return text;
+}
+
+YamlValue::YamlValue(std::shared_ptr<const Document> document, const YAML::Node& node, std::string key)
+    : document_(std::move(document)), node_(std::make_shared<const YAML::Node>(node)), key_(std::move(key)) {}
+
+const std::string& YamlValue::file() const {
+  return document_->file;
+}
+bool YamlValue::is_map() const {
+  return node_->IsMap();
+}
+bool YamlValue::is_list() const {
+  return node_->IsSequence();
+}
+bool YamlValue::is_scalar() const {
+  return node_->IsScalar();
+}
+bool YamlValue::is_number() const {
+  return parse<double>(*node_).has_value();
+}
+
+void YamlValue::fail(const std::string& wrong, const std::string& allowed) const {
+  std::string message = place(document_->source(key_), node_->Mark()) + ": ";
+  if (!key_.empty()) message += key_ + ": ";
+  message += wrong;
+  if (!allowed.empty()) message += " (" + allowed + ")";
+  throw InputError(one_line(message));
+}
+
+double YamlValue::number(const NumberRange& range) const {
+  const std::optional<double> value = parse<double>(*node_);
+  const std::string bounds = range.describe();
+  const std::string allowed = bounds.empty() ? "a finite number" : "a number " + bounds;
+  if (!value) fail(describe(*node_) + " is not a finite number", allowed);
+  if (!range.contains(*value)) fail(fmt::format("{} is out of range", node_->Scalar()), allowed);
+  return *value;
+}
+
+long long YamlValue::integer(long long low, long long high) const {
+  constexpr long long kHighest = std::numeric_limits<long long>::max();
+  const std::string allowed = high == kHighest ? fmt::format("an integer, at least {}", low)
+                                               : fmt::format("an integer from {} to {}", low, high);
+  const std::optional<long long> value = parse<long long>(*node_);
+  if (!value) fail(describe(*node_) + " is not an integer that fits", allowed);
+  if (*value < low || *value > high) fail(fmt::format("{} is out of range", *value), allowed);
+  return *value;
+}
+
+bool YamlValue::boolean() const {
+  if (is_plain(*node_)) {
+    if (node_->Scalar() == "true") return true;
+    if (node_->Scalar() == "false") return false;
+  }
+  fail(describe(*node_) + " is neither", "true or false");
+}
+
+std::string YamlValue::text() const {
+  if (!node_->IsScalar()) fail(describe(*node_) + " is not a word", "a text");
+  if (node_->Scalar().empty()) fail("is empty", "a text");
+  return node_->Scalar();
+}
+
+int YamlValue::choice(const std::vector<std::string>& options) const {
+  const std::string allowed = "allowed: " + join(options);
+  if (!node_->IsScalar()) fail(describe(*node_) + " is not a word", allowed);
+  const auto found = std::find(options.begin(), options.end(), node_->Scalar());
+  if (found != options.end()) return static_cast<int>(found - options.begin());
+  const std::string near = nearest_word(node_->Scalar(), options);
+  fail(describe(*node_) + " is not known" + (near.empty() ? "" : ", did you mean '" + near + "'?"), allowed);
+}
+
+std::vector<YamlValue> YamlValue::list() const {
+  if (!node_->IsSequence()) fail(describe(*node_) + " is not a list", "[entry, ...]");
+  std::vector<YamlValue> values;
+  for (const auto& entry : *node_)
+    values.push_back(YamlValue(document_, entry, fmt::format("{}[{}]", key_, values.size())));
+  return values;
+}
+
+std::vector<double> YamlValue::numbers(const NumberRange& range) const {
+  std::vector<double> values;
+  for (const YamlValue& entry : list()) values.push_back(entry.number(range));
+  return values;
+}
+
+Vec3 YamlValue::vec3() const {
+  if (!node_->IsSequence() || node_->size() != 3) fail(describe(*node_) + " is not a vector", "[x, y, z]");
+  const std::vector<double> v = numbers();
+  return {v[0], v[1], v[2]};
+}
+
+Vec3 YamlValue::direction() const {
+  const Vec3 v = vec3();
+  if (v == Vec3{}) fail("the zero vector has no direction", "[x, y, z], not all zero");
+  return v;
+}
+
+Rgb YamlValue::color(const NumberRange& range, bool& grey) const {
+  if (!node_->IsSequence()) {
+    if (!node_->IsScalar()) fail(describe(*node_) + " is not a colour", "a number or [r, g, b]");
+    return Rgb(number(range));
+  }
+  if (node_->size() != 3) fail(describe(*node_) + " is not a colour", "a number or [r, g, b]");
+  grey = false;
+  const std::vector<double> v = numbers(range);
+  return {v[0], v[1], v[2]};
+}
+
+YamlMap YamlValue::map() const {
+  if (!node_->IsMap()) fail(describe(*node_) + " is not a map", "keys and values");
+  YamlMap map(*this);
+  for (const auto& pair : *node_) {
+    if (!pair.first.IsScalar())
+      YamlValue(document_, pair.first, key_).fail(describe(pair.first) + " is used as a key", "a word");
+    const std::string name = pair.first.Scalar();
+    const std::string path = child(key_, name);
+    YamlMap::Entry entry{name, YamlValue(document_, pair.first, path), YamlValue(document_, pair.second, path)};
+    for (const YamlMap::Entry& earlier : map.entries_) {
+      if (earlier.name == name)
+        entry.key.fail(fmt::format("stands here twice, first on line {}", earlier.key.node_->Mark().line + 1));
+    }
+    map.entries_.push_back(std::move(entry));
+  }
+  return map;
+}
+
+std::optional<YamlValue> YamlMap::find(const std::string& key) {
+  if (std::find(asked_.begin(), asked_.end(), key) == asked_.end()) asked_.push_back(key);
+  for (Entry& entry : entries_) {
+    if (entry.name == key) {
+      entry.asked = true;
+      return entry.value;
+    }
+  }
+  return {};
+}
+
+YamlValue YamlMap::require(const std::string& key) {
+  if (std::optional<YamlValue> value = find(key)) return *value;
+  std::vector<std::string> unread;
+  for (const Entry& entry : entries_) {
+    if (!entry.asked) unread.push_back(entry.name);
+  }
+  const std::string near = nearest_word(key, unread);
+  YamlValue missing = value_;
+  missing.key_ = child(value_.key_, key);
+  missing.fail("is missing" + (near.empty() ? "" : ", is '" + near + "' a misspelling of it?"));
+}
+
+std::vector<std::pair<std::string, YamlValue>> YamlMap::entries() {
+  std::vector<std::pair<std::string, YamlValue>> all;
+  for (Entry& entry : entries_) {
+    entry.asked = true;
+    all.emplace_back(entry.name, entry.value);
+  }
+  return all;
+}
+
+void YamlMap::reject_unknown() const {
+  for (const Entry& entry : entries_) {
+    if (entry.asked) continue;
+    for (const auto& [key, why] : explained_)
+      if (key == entry.name) entry.key.fail(why, "allowed: " + join(asked_));
+    const std::string near = nearest_word(entry.name, asked_);
+    entry.key.fail("is not a known key" + (near.empty() ? "" : ", did you mean '" + near + "'?"),
+                   "allowed: " + join(asked_));
+  }
+}
+
+void YamlMap::fail(const std::string& wrong, const std::string& allowed) const {
+  value_.fail(wrong, allowed);
+}
+
+std::string nearest_word(const std::string& word, const std::vector<std::string>& candidates) {
+  // Edit distance in which swapping two neighbours is one step; a misspelling takes one step in three
+  // letters.
+  std::string best;
+  std::size_t least = std::max<std::size_t>(1, word.size() / 3) + 1;
+  for (const std::string& other : candidates) {
+    std::vector<std::vector<std::size_t>> d(word.size() + 1, std::vector<std::size_t>(other.size() + 1));
+    for (std::size_t i = 0; i <= word.size(); ++i) {
+      for (std::size_t j = 0; j <= other.size(); ++j) {
+        if (i == 0 || j == 0) {
+          d[i][j] = i + j;
+          continue;
+        }
+        const std::size_t differs = word[i - 1] == other[j - 1] ? 0 : 1;
+        d[i][j] = std::min({d[i - 1][j] + 1, d[i][j - 1] + 1, d[i - 1][j - 1] + differs});
+        if (i > 1 && j > 1 && word[i - 1] == other[j - 2] && word[i - 2] == other[j - 1])
+          d[i][j] = std::min(d[i][j], d[i - 2][j - 2] + 1);
+      }
+    }
+    if (d[word.size()][other.size()] < least) {
+      least = d[word.size()][other.size()];
+      best = other;
+    }
+  }
+  return best;
+}
+
+YamlValue open_yaml(const std::string& file, const std::vector<std::string>& overrides) {
+  const YAML::Node root = parse_document(file, read_text(file));
+  auto document = std::make_shared<YamlValue::Document>();
+  document->file = file;
+  for (const std::string& text : overrides) apply_override(root, text, document->overridden);
+  return YamlValue(document, root, "");
+}
+
+}  // namespace isochron

@@ -1,0 +1,82 @@
+#include "core/geometry/piercings.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/parallel.h"
+
+namespace isochron {
+namespace {
+
+/// An edge of the first triangle, or of the second, goes through the other here.
+struct Hole {
+  std::array<int, 2> triangle;
+  Vec3 point;
+};
+
+bool has_vertex(const Scene& scene, int triangle, int vertex) {
+  const auto& v = scene.triangles[triangle].vertex;
+  return v[0] == vertex || v[1] == vertex || v[2] == vertex;
+}
+
+/// Goes along the edge from triangle to triangle.
+void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, std::vector<Hole>& holes) {
+  const Vec3 from = scene.positions[edge.vertex[0]], to = scene.positions[edge.vertex[1]];
+  const double offset = caster.offset(), end = length(to - from) - offset;
+  if (!(end > offset)) return;
+  const Vec3 along = normalize(to - from);
+  if (!caster.occluded(from + along * offset, from + along * end)) return;
+  double passed = 0, step = offset;
+  while (passed + step < end) {
+    const int t = caster.first_triangle(from + along * (passed + step), along);
+    if (t < 0) return;
+    const auto& v = scene.triangles[t].vertex;
+    const Vec3& corner = scene.positions[v[0]];
+    const Vec3 normal = cross(scene.positions[v[1]] - corner, scene.positions[v[2]] - corner);
+    const double rate = dot(normal, along), distance = dot(normal, corner - from) / rate;
+    if (!(std::abs(rate) > kCoplanarAngle * length(normal) && distance > passed + 0.5 * step)) {
+      step *= 2;  // the edge runs within this triangle's plane, or has just left it
+      continue;
+    }
+    if (!(distance < end)) return;
+    if (!has_vertex(scene, t, edge.vertex[0]) && !has_vertex(scene, t, edge.vertex[1]))
+      for (const int face : edge.face)
+        if (face >= 0) holes.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance});
+    passed = distance;
+    step = offset;
+  }
+}
+
+}  // namespace
+
+std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster) {
+  constexpr std::size_t kChunk = 1024;
+  const std::size_t edges = scene.edges.size(), chunks = (edges + kChunk - 1) / kChunk;
+  std::vector<std::vector<Hole>> found(chunks);
+  parallel(static_cast<int>(chunks), [&](int chunk) {
+    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
+    for (std::size_t e = begin; e < std::min(edges, begin + kChunk); ++e)
+      find_holes(scene, caster, scene.edges[e], found[static_cast<std::size_t>(chunk)]);
+  });
+  std::vector<Hole> holes;
+  for (const auto& some : found) holes.insert(holes.end(), some.begin(), some.end());
+  std::stable_sort(holes.begin(), holes.end(), [](const Hole& a, const Hole& b) { return a.triangle < b.triangle; });
+
+  std::vector<Piercing> piercings;
+  for (std::size_t begin = 0, end; begin < holes.size(); begin = end) {
+    for (end = begin; end < holes.size() && holes[end].triangle == holes[begin].triangle;) ++end;
+    const auto& [a, b] = holes[begin].triangle;
+    Piercing piercing{holes[begin].triangle, {holes[begin].point, holes[begin].point}};
+    // The farthest from the first: through a vertex or an edge the same point is found several times.
+    const auto consider = [&](const Vec3& p) {
+      if (length(p - piercing.end[0]) > length(piercing.end[1] - piercing.end[0])) piercing.end[1] = p;
+    };
+    for (std::size_t i = begin + 1; i < end; ++i) consider(holes[i].point);
+    for (const int v : scene.triangles[a].vertex)
+      if (has_vertex(scene, b, v)) consider(scene.positions[v]);
+    if (length(piercing.end[1] - piercing.end[0]) > caster.offset()) piercings.push_back(piercing);
+  }
+  return piercings;
+}
+
+}  // namespace isochron

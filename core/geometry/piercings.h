@@ -1,0 +1,21 @@
+// Where triangles pass through each other: lines along which what is seen changes from one surface to the other though
+// neither has an edge there.
+#pragma once
+#include <array>
+#include <vector>
+
+#include "core/geometry/ray_caster.h"
+
+namespace isochron {
+
+/// The segment that two triangles have in common. They may share a vertex, its one end.
+struct Piercing {
+  std::array<int, 2> triangle;  ///< ascending
+  std::array<Vec3, 2> end;
+};
+
+/// All pairs that cross, by triangles. A segment ends where an edge of one triangle goes through the other, which a ray along
+/// each of the scene's edges finds. What merely touches is not found.
+std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster);
+
+}  // namespace isochron

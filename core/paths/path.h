@@ -1,0 +1,98 @@
+// Light transport paths x0 (camera), x1, ..., xn (scattering), x(n+1) (on an emitter).
+#pragma once
+#include <vector>
+
+#include "core/paths/prepared_scene.h"
+
+namespace isochron {
+
+/// Stack of fixed capacity. Pushing moves nothing: references to entries below stay valid.
+template <class T>
+class FixedStack {
+ public:
+  explicit FixedStack(std::size_t capacity) : items_(capacity) {}
+  void start(const T& first) {
+    items_[0] = first;
+    size_ = 1;
+  }
+  void push_back(const T& item) { items_[size_++] = item; }
+  void pop_back() { --size_; }
+  const T& back() const { return items_[size_ - 1]; }
+  const T& operator[](std::size_t i) const { return items_[i]; }
+  const T* data() const { return items_.data(); }
+  const T* begin() const { return data(); }
+  const T* end() const { return data() + size_; }
+  std::size_t size() const { return size_; }
+
+ private:
+  std::vector<T> items_;
+  std::size_t size_ = 0;
+};
+
+/// A path under construction: vertices from the camera on. `vertex[0]` is the camera (or, for the light side of a
+/// boundary segment, the point that the walk looks from); its triangle is -1 for the camera.
+struct Path {
+  FixedStack<SurfacePoint> vertex;
+  FixedStack<double> length;  ///< length[k]: optical, from vertex 0 to vertex k, plus what length[0] starts with
+  FixedStack<char> moves;     ///< moves[k]: some vertex up to k can have a derivative
+
+  explicit Path(int max_bounces) : vertex(max_bounces + 3), length(max_bounces + 3), moves(max_bounces + 3) {}
+  void start(const SurfacePoint& origin, double length_so_far) {
+    vertex.start(origin);
+    length.start(length_so_far);
+    moves.start(0);
+  }
+  void push(const PreparedScene& scene, const SurfacePoint& x) {
+    push(scene, x, isochron::length(x.p - vertex.back().p));
+  }
+  /// `distance`: of x from the last vertex, geometric.
+  void push(const PreparedScene& scene, const SurfacePoint& x, double distance) {
+    length.push_back(length.back() + distance * scene.index_between(back(), x));
+    moves.push_back(moves.back() || scene.moves(x.triangle));
+    vertex.push_back(x);
+  }
+  void pop() {
+    vertex.pop_back();
+    length.pop_back();
+    moves.pop_back();
+  }
+  const SurfacePoint& back() const { return vertex.back(); }
+  int size() const { return static_cast<int>(vertex.size()); }
+};
+
+/// Whether a path that ends at emitter point y after `path` can have a derivative.
+inline bool can_move(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
+  return path.moves[last] || scene.has_moving_vertex(emitter_triangle) ||
+         scene.moving.emission[scene.shape_index(emitter_triangle)];
+}
+
+/// Cosines at a scattering vertex x between the neighbours `before` (camera side) and `after` (light side).
+struct Scattering {
+  Vec3 w_o, w_i;
+  double distance_o, distance_i;
+  double cos_o, cos_i, cos_io;
+  Scattering(const Vec3& before, const SurfacePoint& x, const Vec3& after)
+      : Scattering(x, (before - x.p) * (1 / length(before - x.p)), length(before - x.p), after) {}
+  /// `towards_camera`: unit direction to the neighbour on the camera side, which is `distance` away.
+  Scattering(const SurfacePoint& x, const Vec3& towards_camera, double distance, const Vec3& after)
+      : w_o(towards_camera), w_i(after - x.p), distance_o(distance), distance_i(length(w_i)) {
+    w_i *= 1 / distance_i;
+    cos_o = dot(x.n, w_o);
+    cos_i = dot(x.n, w_i);
+    cos_io = dot(w_o, w_i);
+  }
+  double lobe(const Material& m) const { return isochron::lobe(m, cos_i, cos_o, cos_io); }
+  /// Density per solid angle of drawing w_i from w_o.
+  double pdf_towards_light(const Material& m) const { return direction_pdf(m, cos_i, cos_o, cos_io); }
+  /// Density per solid angle of drawing w_o from w_i.
+  double pdf_towards_camera(const Material& m) const { return direction_pdf(m, cos_o, cos_i, cos_io); }
+};
+
+/// Converts a density per solid angle at x into one per area at y.
+inline double solid_angle_to_area(const Vec3& x, const SurfacePoint& y) {
+  const Vec3 d = y.p - x;
+  const double squared = length_squared(d);
+  return std::abs(dot(y.n, d)) / (squared * std::sqrt(squared));
+}
+
+}  // namespace isochron

@@ -1,0 +1,191 @@
+#include "core/paths/path_differential.h"
+
+#include <array>
+
+namespace isochron {
+namespace {
+
+/// What the segments that meet at a vertex say about it.
+struct Accumulated {
+  Vec3 position;  ///< d ln F / d x_k, normals held
+  Vec3 normal;    ///< d ln F / d n_k, as if n_k were free
+  Vec3 length;    ///< d l / d x_k, l optical
+};
+
+/// d (unit direction of d) contracted with g: (g - (g.w) w) / |d|.
+Vec3 through_normalize(const Vec3& g, const Vec3& w, double distance) {
+  return (g - w * dot(g, w)) / distance;
+}
+
+/// Adds the scattering lobe's part at vertex x between its neighbours; returns the lobe's derivative.
+LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s, Accumulated& before,
+                        Accumulated& here, Accumulated& after) {
+  const LobeDerivative lobe = lobe_derivative(material, s.cos_i, s.cos_o, s.cos_io);
+  const Vec3 to_after = through_normalize(x.n * lobe.d_cos_i + s.w_o * lobe.d_cos_io, s.w_i, s.distance_i);
+  const Vec3 to_before = through_normalize(x.n * lobe.d_cos_o + s.w_i * lobe.d_cos_io, s.w_o, s.distance_o);
+  after.position += to_after;
+  before.position += to_before;
+  here.position -= to_after + to_before;
+  here.normal += s.w_i * lobe.d_cos_i + s.w_o * lobe.d_cos_o;
+  return lobe;
+}
+
+/// What a vertex's material point adds up beyond what its base flow says: from neighbours that follow it, from x1 itself.
+struct Extra {
+  Vec3 position, length;
+  double area = 0;  ///< counts d ln (area of its triangle)
+};
+
+Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
+  return g - x.n * dot(g, x.n);
+}
+
+/// Lets x_k follow its neighbours (theory section 8): takes the gradients there and hands its part of them to what it
+/// follows; `density` is d ln (sampling measure) / dx in the plane of x_k. Returns what its base flow loses by it.
+Extra let_follow(const VertexFlow& flow, const SurfacePoint& x, const Accumulated& g, const Vec3& density,
+                 Extra* before, Extra* own, Extra* after) {
+  Extra lost;
+  const auto hand = [&](const Following& f, Extra* to) {
+    if (!(f.weight > 0)) return;
+    const Vec3 position = in_plane(x, (g.position + density) * f.weight + f.gradient);
+    const Vec3 along = in_plane(x, g.length * f.weight);
+    to->position += position;
+    to->length += along;
+    lost.position += position;
+    lost.length += along;
+    lost.area += f.weight;
+  };
+  hand(flow.before, before);
+  hand(flow.after, after);
+  hand(flow.own, own);
+  return lost;
+}
+
+/// Carries position and normal gradients of a vertex to its triangle's vertices.
+/// `area`: how often d ln (area of the triangle) counts (paper Eq. 11).
+void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, double area, bool length_only,
+                 LocalDifferential& out) {
+  if (!scene.has_moving_vertex(x.triangle)) return;
+  // Both turn with the doubled area's vector.
+  const Vec3 through_cross = (in_plane(x, g.normal) + x.n * area) / (2 * scene.area(x.triangle));
+  const auto b = scene.barycentrics(x);
+  const auto& edge = scene.edges(x.triangle);
+  const Vec3 opposite[3] = {edge[0] - edge[1], edge[1], -edge[0]};  // from the next but one corner to the next
+  scene.for_each_moving_corner(x.triangle, [&](int i, int vertex) {
+    VertexGradient entry{vertex, g.position * b[i], g.length * b[i]};
+    if (!length_only) entry.log_f += cross(opposite[i], through_cross);
+    out.vertices.push_back(entry);
+  });
+}
+
+/// Carries the gradients at the path's vertices through their flows to the vertices of the mesh.
+void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std::vector<Accumulated>& g,
+              bool length_only, LocalDifferential& out) {
+  thread_local std::vector<Extra> extra;
+  extra.assign(count, {});
+  // Each material point counts its area but that of x1, which the pixel holds.
+  for (int k = 2; k < count; ++k) extra[k].area = 1;
+
+  const Vec3 ray = x[1].p - x[0].p;
+  const double height = dot(x[1].n, ray);
+  // Gradient of what an area of the surface at x1 takes of the image, ln |n . ray| / (forward . ray)^3 (theory section 8).
+  const auto log_density = [&] {
+    const Vec3& forward = scene.camera.forward;
+    return x[1].n / height - forward * (3 / dot(forward, ray));
+  };
+  VertexFlows::Pair before, after;
+  Extra lost_by_pixel;
+  for (int k = 1; k < count; ++k) {
+    after = k + 1 < count ? scene.flows.pair(scene, x[k], x[k + 1], k) : VertexFlows::Pair{};
+    const VertexFlow flow = VertexFlows::at(before, after, k);
+    before = after;
+    if (!flow.follows()) continue;
+    const Extra lost = let_follow(flow, x[k], g[k], k == 1 ? log_density() : Vec3(), &extra[k - 1], &extra[k],
+                                  k + 1 < count ? &extra[k + 1] : nullptr);
+    if (k == 1) {
+      lost_by_pixel = lost;
+      extra[k].area = flow.own.weight;
+    } else {
+      extra[k].position -= lost.position;
+      extra[k].length -= lost.length;
+      extra[k].area -= lost.area;
+    }
+  }
+
+  // The pixel flow: along the ray, as far as the surface moves along its normal.
+  Vec3 through_ray = g[1].position - lost_by_pixel.position;
+  if (lost_by_pixel.area > 0) {
+    through_ray += log_density() * lost_by_pixel.area;
+    g[1].normal += ray * (lost_by_pixel.area / height);
+  }
+  g[1].position = x[1].n * (dot(ray, through_ray) / height);
+  g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
+  for (int k = 1; k < count; ++k) {
+    g[k].position += extra[k].position;
+    g[k].length += extra[k].length;
+    to_triangle(scene, x[k], g[k], extra[k].area, length_only, out);
+  }
+}
+
+}  // namespace
+
+void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int count, bool length_only,
+                        LocalDifferential& out) {
+  out.clear();
+  thread_local std::vector<Accumulated> g;
+  g.assign(count, {});
+  for (int k = 0; k + 1 < count; ++k) {
+    const Vec3 d = x[k + 1].p - x[k].p;
+    const double squared = length_squared(d);
+    const double inverse = 1 / std::sqrt(squared);
+    const Vec3 w = d * inverse;
+    const Material* medium = scene.medium_between(x[k], x[k + 1]);
+    const Vec3 g_length = medium ? w * medium->ior : w;
+    g[k].length -= g_length;
+    g[k + 1].length += g_length;
+    if (medium) {
+      const int m = static_cast<int>(medium - scene.scene.materials.data());
+      if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, 0, squared * inverse});
+    }
+    if (length_only || k == 0) continue;
+    const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
+    if (cos_near == 0 || cos_far == 0) {
+      out.clear();
+      return;
+    }
+    const Vec3 g_d = x[k].n / cos_near + x[k + 1].n / cos_far - d * (4 / squared);
+    g[k].position -= g_d;
+    g[k + 1].position += g_d;
+    g[k].normal += d / cos_near;
+    g[k + 1].normal += d / cos_far;
+  }
+  if (!length_only) {
+    for (int k = 1; k + 1 < count; ++k) {
+      const int m = scene.shape_of(x[k].triangle).material;
+      const Material& material = scene.scene.materials[m];
+      if (material.type != MaterialType::diffuse) {
+        const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
+        const LobeDerivative lobe = add_lobe(material, x[k], s, g[k - 1], g[k], g[k + 1]);
+        if (scene.moving.roughness[m]) out.scalars.push_back({scene.layout.roughness(m), -1, lobe.d_roughness});
+        if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, lobe.d_ior});
+      }
+      if (scene.moving.albedo[m])
+        for (int c = 0; c < 3; ++c)
+          if (material.albedo[c] > 0) out.scalars.push_back({scene.layout.albedo(m, c), c, 1 / material.albedo[c]});
+    }
+    const int s = scene.shape_index(x[count - 1].triangle);
+    if (scene.moving.emission[s])
+      for (int c = 0; c < 3; ++c)
+        if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
+          out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
+  }
+  let_flow(scene, x, count, g, length_only, out);
+}
+
+void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
+  if (!scene.has_moving_vertex(x.triangle)) return;
+  const auto b = scene.barycentrics(x);
+  scene.for_each_moving_corner(x.triangle, [&](int i, int vertex) { out.vertices.push_back({vertex, g * b[i], {}}); });
+}
+
+}  // namespace isochron

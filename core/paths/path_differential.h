@@ -1,0 +1,46 @@
+// The one local differential of a path, by hand in reverse (theory section 2): how ln F (contribution) and l (length)
+// change with everything the path touches. Tangent, adjoint and Jacobian are sinks of what this writes.
+#pragma once
+#include <vector>
+
+#include "core/paths/path.h"
+
+namespace isochron {
+
+/// Gradients with respect to one mesh vertex.
+struct VertexGradient {
+  int vertex;
+  Vec3 log_f;   ///< of ln F
+  Vec3 length;  ///< of the (optical) path length
+};
+
+/// Gradients with respect to a scalar degree of freedom; `channel` -1: of every channel.
+struct ScalarGradient {
+  int dof;
+  int channel;
+  double log_f;       ///< of ln F
+  double length = 0;  ///< of the path length
+};
+
+/// Sparse gradient of one path (or boundary segment). What appears more than once adds up.
+struct LocalDifferential {
+  std::vector<VertexGradient> vertices;
+  std::vector<ScalarGradient> scalars;
+  void clear() {
+    vertices.clear();
+    scalars.clear();
+  }
+  bool empty() const { return vertices.empty() && scalars.empty(); }
+};
+
+/// Differentiates the path vertex[0..count-1], vertex[0] the camera and vertex[count-1] on an emitter (or, where
+/// `length_only`, only its length). Vertices flow as VertexFlows says; area factors of material points, and what F gains
+/// where the flow spreads, count in ln F. Static vertices are left out. Empty where a segment lies exactly in a surface that it ends at:
+/// F is zero there, or by rounding next to it, and ln F has no derivative.
+void differentiate_path(const PreparedScene& scene, const SurfacePoint* vertex, int count, bool length_only,
+                        LocalDifferential& out);
+
+/// Adds g . (velocity of the material point x) to `out`: entries on the triangle's three vertices.
+void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out);
+
+}  // namespace isochron

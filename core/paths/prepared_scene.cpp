@@ -1,0 +1,106 @@
+#include "core/paths/prepared_scene.h"
+
+#include <limits>
+
+namespace isochron {
+
+MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
+    : vertex(scene.positions.size(), 0),
+      triangle(scene.triangles.size(), 0),
+      albedo(scene.materials.size(), 0),
+      roughness(scene.materials.size(), 0),
+      ior(scene.materials.size(), 0),
+      emission(scene.shapes.size(), 0),
+      scatters(scene.triangles.size(), 0) {
+  if (!basis || basis->columns == 0) return;
+  const DofLayout layout(scene);
+  for (int v = 0; v < layout.vertices; ++v)
+    for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->moves(layout.vertex(v, axis));
+  for (int m = 0; m < layout.materials; ++m) {
+    for (int c = 0; c < 3; ++c) albedo[m] |= basis->moves(layout.albedo(m, c));
+    roughness[m] = basis->moves(layout.roughness(m));
+    ior[m] = basis->moves(layout.ior(m)) && scene.materials[m].type == MaterialType::rough_dielectric;
+    lengths |= ior[m] != 0;
+  }
+  for (int s = 0; s < layout.shapes; ++s)
+    for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
+  for (std::size_t t = 0; t < triangle.size(); ++t) {
+    for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
+    const int m = scene.shapes[scene.triangles[t].shape].material;
+    scatters[t] = albedo[m] || roughness[m] || ior[m];
+    if (!triangle[t]) continue;
+    geometry = true;
+    for (int v : scene.triangles[t].vertex) bounds.add(scene.positions[v]);
+  }
+  lengths |= geometry;
+  any = !basis->entries.empty();
+}
+
+PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow)
+    : scene(source),
+      camera(source.camera),
+      layout(source),
+      moving(source, basis),
+      flows(source, camera, moving, follow),
+      caster(source),
+      moving_bounds(moving.bounds.grown(caster.offset())),
+      flowing_bounds(flows.near().grown(caster.offset())) {
+  for (const Shape& shape : scene.shapes) shapes_.push_back({&scene.materials[shape.material]});
+  const std::size_t count = scene.triangles.size();
+  records_.resize(count);
+  std::vector<EllipsoidBvh::Input> all, moved, emitting;
+  all.reserve(count);
+  std::vector<double> power;
+  for (std::size_t i = 0; i < count; ++i) {
+    const int t = static_cast<int>(i);
+    const auto& v = scene.triangles[t].vertex;
+    const EllipsoidBvh::Input input{{scene.positions[v[0]], scene.positions[v[1]], scene.positions[v[2]]}, t};
+    TriangleRecord& record = records_[t];
+    record.origin = input.vertex[0];
+    for (int k = 0; k < 2; ++k) record.edge[k] = input.vertex[k + 1] - record.origin;
+    const Vec3 normal = cross(record.edge[0], record.edge[1]);
+    const double doubled = length(normal);
+    record.area = 0.5 * doubled;
+    record.shape = scene.triangles[t].shape;
+    record.vertex = v;
+    if (is_dielectric(t)) {
+      has_dielectric_ = true;
+      least_index_ = std::min(least_index_, material_of(t).ior);
+    }
+    for (int k = 0; k < 3; ++k) record.moving_corners |= (moving.vertex[v[k]] != 0) << k;
+    record.moves = record.moving_corners || moving.scatters[t];
+    // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
+    if (doubled > 0) record.normal = normal / doubled;
+    all.push_back(input);
+    if (record.moves) moved.push_back(input);
+    if (!shape_of(t).emission.is_black() && record.area > 0) {
+      record.emits = true;
+      emitters.push_back(t);
+      emitting.push_back(input);
+      const auto& [a, b, c] = input.vertex;
+      camera_sees_emitters |= height_over(t, camera.position) > 0 && !camera.misses_image(a, b, c);
+      power.push_back(record.area * shape_of(t).emission.max());
+    }
+  }
+  all_triangles = EllipsoidBvh(all);
+  moving_triangles = EllipsoidBvh(moved);
+  emitter_triangles = EllipsoidBvh(emitting);
+
+  emitter_distribution_ = DiscreteDistribution(power);
+  for (std::size_t i = 0; i < shapes_.size(); ++i) {
+    const Shape& shape = scene.shapes[i];
+    if (shape.emission.is_black()) continue;
+    if (!emitters.empty()) shapes_[i].emitter_pdf = shape.emission.max() / emitter_distribution_.total();
+    Bounds bounds;
+    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) bounds.add(scene.positions[v]);
+    emitter_bounds_.push_back(bounds);
+  }
+}
+
+double PreparedScene::distance_to_emitters(const Vec3& p) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Bounds& bounds : emitter_bounds_) nearest = std::min(nearest, bounds.distance_squared(p));
+  return std::sqrt(nearest) * least_index_;
+}
+
+}  // namespace isochron

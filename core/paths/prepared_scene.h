@@ -1,0 +1,232 @@
+// What the estimators need of a scene at one value of the parameters, computed once.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/base/discrete_distribution.h"
+#include "core/base/large_array.h"
+#include "core/geometry/bounds.h"
+#include "core/geometry/ellipsoid.h"
+#include "core/geometry/ellipsoid_bvh.h"
+#include "core/geometry/ray_caster.h"
+#include "core/paths/vertex_flow.h"
+#include "core/scene/camera_model.h"
+#include "core/scene/scene.h"
+
+namespace isochron {
+
+/// A point on a triangle.
+struct SurfacePoint {
+  Vec3 p;
+  Vec3 n;  ///< unit face normal
+  int triangle = -1;
+};
+
+/// What paths ask of a triangle, side by side in memory: two cache lines, the first of which decides where a ray ends and how
+/// it goes on. On a fine mesh each is a wait for main memory.
+struct alignas(64) TriangleRecord {
+  Vec3 normal;  ///< unit; zero when the triangle has no area
+  Vec3 origin;  ///< corner 0
+  double area = 0;
+  int shape = -1;
+  bool emits = false;
+  bool moves = false;               ///< a path through the triangle can have a derivative
+  std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
+  Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
+  std::array<int, 3> vertex = {};
+};
+static_assert(sizeof(TriangleRecord) == 128);
+
+/// What paths ask of a shape.
+struct ShapeRecord {
+  const Material* material = nullptr;
+  double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
+};
+
+/// Which degrees of freedom move. Everything else is skipped by the derivative passes.
+struct MovingParts {
+  std::vector<std::uint8_t> vertex, triangle;
+  std::vector<std::uint8_t> albedo, roughness, ior;  ///< per material
+  std::vector<std::uint8_t> emission;                ///< per shape
+  std::vector<std::uint8_t> scatters;                ///< per triangle: its material's albedo, roughness or ior moves
+  bool any = false, geometry = false;
+  Bounds bounds;         ///< of the triangles with a vertex that moves
+  bool lengths = false;  ///< paths can change their length
+  MovingParts(const Scene& scene, const TangentBasis* basis);
+};
+
+class PreparedScene {
+ public:
+  PreparedScene(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow = {});
+
+  const Scene& scene;
+  CameraModel camera;
+  DofLayout layout;
+  MovingParts moving;
+  VertexFlows flows;
+  RayCaster caster;
+  /// Of the triangles with a vertex that moves, and as much more as rays go astray by rounding; and of all vertices but x1
+  /// that may follow or be followed.
+  Bounds moving_bounds, flowing_bounds;
+  std::vector<int> emitters;          ///< triangles that emit
+  bool camera_sees_emitters = false;  ///< may, if nothing is in between
+  EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
+
+  int shape_index(int triangle) const { return records_[triangle].shape; }
+  const Shape& shape_of(int triangle) const { return scene.shapes[shape_index(triangle)]; }
+  const Material& material_of(int triangle) const { return *shapes_[shape_index(triangle)].material; }
+
+  /// Radiance that leaves the point towards the unit direction w; black on the back of an emitter.
+  Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
+    return dot(x.n, w) > 0 ? shape_of(x.triangle).emission : Rgb();
+  }
+
+  /// The dielectric that the segment between x and y, which see each other, runs inside of: one with an end on the
+  /// back of its face. Null outside. Opaque surfaces and the camera (triangle -1) know no medium: a segment between
+  /// two of them counts as outside.
+  const Material* medium_between(const SurfacePoint& x, const SurfacePoint& y) const {
+    if (!has_dielectric_) return nullptr;
+    const Vec3 d = y.p - x.p;
+    if (is_behind(x, d)) return &material_of(x.triangle);
+    if (is_behind(y, -d)) return &material_of(y.triangle);
+    return nullptr;
+  }
+  /// Optical length of the segment over its geometric length.
+  double index_between(const SurfacePoint& x, const SurfacePoint& y) const {
+    const Material* medium = medium_between(x, y);
+    return medium ? medium->ior : 1;
+  }
+  bool outside(const SurfacePoint& x, const SurfacePoint& y) const { return !medium_between(x, y); }
+  bool is_dielectric(int triangle) const { return material_of(triangle).type == MaterialType::rough_dielectric; }
+  /// Lower bound of the optical length of any path over the distance between its ends.
+  double least_index() const { return least_index_; }
+
+  /// Unit; zero when the triangle has no area.
+  const Vec3& normal(int triangle) const { return records_[triangle].normal; }
+  double area(int triangle) const { return records_[triangle].area; }
+  bool emits(int triangle) const { return records_[triangle].emits; }
+  /// Whether a path through the triangle can have a derivative because of it.
+  bool moves(int triangle) const { return records_[triangle].moves; }
+  /// Whether one of its vertices moves.
+  bool has_moving_vertex(int triangle) const { return records_[triangle].moving_corners != 0; }
+  /// f(corner, vertex) for each of the triangle's vertices that move.
+  template <class F>
+  void for_each_moving_corner(int triangle, F&& f) const {
+    const TriangleRecord& r = records_[triangle];
+    for (int i = 0; i < 3; ++i)
+      if (r.moving_corners >> i & 1) f(i, r.vertex[i]);
+  }
+
+  /// Uniform by area x radiance over the emitters; `pdf` per area.
+  SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const {
+    const int t = pick_emitter(u0);
+    pdf = emitter_pdf(t);
+    return point_on_emitter(t, u1, u2);
+  }
+  /// The same in steps, so that what each reads is on its way from memory while something else is done; the first may be
+  /// left out.
+  void expect_emitter(double u) const {
+    const int i = emitter_distribution_.expect(u);
+    __builtin_prefetch(&emitters[i]);
+  }
+  int pick_emitter(double u) const {
+    const int t = emitters[emitter_distribution_.sample(u)];
+    prefetch(t);
+    return t;
+  }
+  SurfacePoint point_on_emitter(int triangle, double u1, double u2) const {
+    const TriangleRecord& r = records_[triangle];
+    return {r.origin + (r.edge[0] * (1 - u2) + r.edge[1] * u2) * std::sqrt(u1), r.normal, triangle};
+  }
+  /// Asks for the triangle's record early.
+  void prefetch(int triangle) const { isochron::prefetch(records_[triangle]); }
+  /// Of a triangle that emits.
+  double emitter_pdf(int triangle) const { return shapes_[shape_index(triangle)].emitter_pdf; }
+
+  /// Edges from corner 0 to corners 1 and 2.
+  const Vec3 (&edges(int triangle) const)[2] { return records_[triangle].edge; }
+  /// Weights of the triangle's three vertices at x.
+  std::array<double, 3> barycentrics(const SurfacePoint& x) const {
+    const TriangleRecord& r = records_[x.triangle];
+    const Vec3 d = x.p - r.origin, n = r.normal / (2 * r.area);
+    const double b1 = dot(cross(d, r.edge[1]), n), b2 = dot(cross(r.edge[0], d), n);
+    return {1 - b1 - b2, b1, b2};
+  }
+  /// What the ellipsoid's surface leaves on the triangle; false for nothing.
+  bool clip(const Ellipsoid& ellipsoid, int triangle, EllipseArcs& arcs) const {
+    const TriangleRecord& r = records_[triangle];
+    return clip_ellipse(ellipsoid, r.origin, r.origin + r.edge[0], r.origin + r.edge[1], arcs);
+  }
+  /// Signed distance of p from the triangle's plane, positive on the normal's side.
+  double height_over(int triangle, const Vec3& p) const {
+    const TriangleRecord& r = records_[triangle];
+    return dot(r.normal, p - r.origin);
+  }
+  /// Point where the line from `origin` along `direction` (unit) meets the triangle's plane, in double precision.
+  SurfacePoint point_on_triangle(int triangle, const Vec3& origin, const Vec3& direction) const {
+    const TriangleRecord& r = records_[triangle];
+    const double distance = dot(r.normal, r.origin - origin) / dot(r.normal, direction);
+    return {origin + direction * distance, r.normal, triangle};
+  }
+
+  /// The triangle that the ray from `x` (offset off its surface) along the unit direction w meets first, or -1. Its record is
+  /// on its way from memory: who has other things to do meanwhile does not wait for it.
+  int cast(const SurfacePoint& x, const Vec3& w) const { return met(leave(x, w), w); }
+  /// The same of what is not farther away than `distance`, or a little more.
+  int cast_within(const SurfacePoint& x, const Vec3& w, double distance) const {
+    const Vec3 start = leave(x, w);
+    return caster.first_triangle(start, w, static_cast<float>(distance + 4 * caster.offset()));
+  }
+  /// The same of a ray from the camera.
+  int cast_camera(const Vec3& direction) const { return met(camera.position, direction); }
+  /// Where the ray from `origin` along w, which meets `triangle` (-1: none), ends; empty also for a face along which it runs.
+  std::optional<SurfacePoint> end_point(int triangle, const Vec3& origin, const Vec3& w) const {
+    if (triangle < 0 || dot(records_[triangle].normal, w) == 0) return std::nullopt;
+    return point_on_triangle(triangle, origin, w);
+  }
+  /// First surface point of such rays.
+  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const {
+    return end_point(cast(x, w), x.p, w);
+  }
+  std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
+    return end_point(cast_camera(direction), camera.position, direction);
+  }
+  bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
+    const Vec3 d = y.p - x.p;
+    return !caster.occluded(leave(x, d), leave(y, -d));
+  }
+  bool visible_from_camera(const SurfacePoint& x) const {
+    return !caster.occluded(camera.position, leave(x, camera.position - x.p));
+  }
+
+  /// `x.p` moved off its surface to the side of the unit direction w.
+  Vec3 leave(const SurfacePoint& x, const Vec3& w) const {
+    return x.p + x.n * std::copysign(caster.offset(), dot(x.n, w));
+  }
+
+  /// Lower bound of the optical length of any path from p to an emitter.
+  double distance_to_emitters(const Vec3& p) const;
+
+ private:
+  /// Whether x is on a dielectric's face whose back the direction d leaves from.
+  bool is_behind(const SurfacePoint& x, const Vec3& d) const {
+    return x.triangle >= 0 && is_dielectric(x.triangle) && dot(x.n, d) < 0;
+  }
+  int met(const Vec3& from, const Vec3& w) const {
+    const int t = caster.first_triangle(from, w);
+    if (t >= 0) prefetch(t);
+    return t;
+  }
+
+  LargeArray<TriangleRecord> records_;
+  std::vector<ShapeRecord> shapes_;
+  std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
+  DiscreteDistribution emitter_distribution_;
+  bool has_dielectric_ = false;
+  double least_index_ = 1;
+};
+
+}  // namespace isochron

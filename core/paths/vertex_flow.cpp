@@ -1,0 +1,293 @@
+#include "core/paths/vertex_flow.h"
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include "core/paths/path_differential.h"
+
+namespace isochron {
+namespace {
+
+/// Sets of numbers that are joined pair by pair.
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int root(int i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(int i, int j) { parent_[root(i)] = root(j); }
+  /// Numbers the sets from 0 on, in the order of their first members; returns each member's.
+  std::vector<int> numbered(int& count) {
+    std::vector<int> number(parent_.size(), -1), result(parent_.size());
+    count = 0;
+    for (std::size_t i = 0; i < parent_.size(); ++i) {
+      int& n = number[root(static_cast<int>(i))];
+      if (n < 0) n = count++;
+      result[i] = n;
+    }
+    return result;
+  }
+
+ private:
+  std::vector<int> parent_;
+};
+
+DisjointSets bodies_of(const Scene& scene) {
+  DisjointSets sets(scene.positions.size());
+  for (const Triangle& t : scene.triangles)
+    for (const int v : t.vertex) sets.join(v, t.vertex[0]);
+  return sets;
+}
+
+Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
+  Bounds bounds;
+  for (const int v : triangle.vertex) bounds.add(scene.positions[v]);
+  return bounds;
+}
+
+Vec3 doubled_normal(const Scene& scene, int t) {
+  const auto& v = scene.triangles[t].vertex;
+  const Vec3& p = scene.positions[v[0]];
+  return cross(scene.positions[v[1]] - p, scene.positions[v[2]] - p);
+}
+
+/// Whether the two faces of the edge lie in one plane, on either side of the edge.
+bool is_flat(const Scene& scene, const Edge& edge) {
+  if (edge.face[1] < 0) return false;
+  const Vec3 a = doubled_normal(scene, edge.face[0]), b = doubled_normal(scene, edge.face[1]);
+  return dot(a, b) > 0 && length(cross(a, b)) <= kCoplanarAngle * length(a) * length(b);
+}
+
+/// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat
+/// piece whose dark side is inside.
+bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
+  DisjointSets bodies = bodies_of(scene);
+  int any_vertex = -1;
+  for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
+    if (!moving.triangle[t]) continue;
+    const Triangle& triangle = scene.triangles[t];
+    const Material& material = scene.materials[scene.shapes[triangle.shape].material];
+    if (material.two_sided || material.type == MaterialType::rough_dielectric) return false;
+    if (any_vertex < 0) any_vertex = triangle.vertex[0];
+    if (bodies.root(triangle.vertex[0]) != bodies.root(any_vertex)) return false;
+  }
+  bool open = false, flat = true;
+  for (const Edge& edge : scene.edges) {
+    const bool moves[2] = {moving.triangle[edge.face[0]] != 0, edge.face[1] >= 0 && moving.triangle[edge.face[1]]};
+    if (!moves[0] && !moves[1]) continue;
+    if (!moves[0] || !moves[1]) {
+      open = true;
+      continue;
+    }
+    const Vec3 n = doubled_normal(scene, edge.face[0]);
+    for (const int v : scene.triangles[edge.face[1]].vertex) {
+      const Vec3 d = scene.positions[v] - scene.positions[edge.vertex[0]];
+      const double height = dot(n, d), scale = kCoplanarAngle * length(n) * length(d);
+      if (height > scale) return false;
+      flat &= height >= -scale;
+    }
+  }
+  return flat || !open;
+}
+
+Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
+  return g - x.n * dot(g, x.n);
+}
+
+}  // namespace
+
+VertexFlows::VertexFlows(const Scene& scene, const CameraModel& camera, const MovingParts& moving,
+                         const FollowOptions& options)
+    : position_(camera.position),
+      forward_(camera.forward),
+      radius_(options.radius_in_pixels * camera.pixel_size()),
+      near_(moving.bounds) {
+  if (!moving.geometry) return;
+  if (options.radius_in_pixels > 0) {
+    // x1 is within s of the box, and its own depth enters s.
+    constexpr double kLargest = 0.5;
+    const Vec3 farthest{camera.forward.x > 0 ? moving.bounds.high.x : moving.bounds.low.x,
+                        camera.forward.y > 0 ? moving.bounds.high.y : moving.bounds.low.y,
+                        camera.forward.z > 0 ? moving.bounds.high.z : moving.bounds.low.z};
+    const double depth = std::max(0.0, dot(camera.forward, farthest - camera.position));
+    const double margin =
+        radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
+    camera_near_ = moving.bounds.grown(margin);
+    camera_possible_ = !sees_nothing_of_itself(scene, moving);
+    for (std::size_t t = 0; t < scene.triangles.size() && !camera_possible_; ++t)
+      camera_possible_ = !moving.triangle[t] && bounds_of(scene, scene.triangles[t]).overlaps(camera_near_);
+  }
+  if (options.bodies > 0) {
+    find_patches(scene);
+    std::vector<Bounds> bodies(body_radius_.size());
+    std::vector<char> moves(body_radius_.size(), 0);
+    for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
+      const int body = patches_[patch_[t]].body;
+      bodies[body].add(bounds_of(scene, scene.triangles[t]));
+      moves[body] |= moving.triangle[t] != 0;
+    }
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      body_radius_[i] = options.bodies * 0.5 * length(bodies[i].high - bodies[i].low);
+    double largest = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i)
+      for (std::size_t j = 0; j < bodies.size() && moves[i]; ++j)
+        if (j != i && largest < std::min(body_radius_[i], body_radius_[j]) &&
+            bodies[j].grown(std::min(body_radius_[i], body_radius_[j])).overlaps(bodies[i]))
+          largest = std::min(body_radius_[i], body_radius_[j]);
+    if (largest > 0)
+      near_ = moving.bounds.grown(largest);
+    else
+      patch_.clear();  // no two bodies are close enough
+  }
+}
+
+void VertexFlows::find_patches(const Scene& scene) {
+  int bodies, count;
+  const std::vector<int> body = bodies_of(scene).numbered(bodies);
+  body_radius_.resize(bodies);
+  DisjointSets sets(scene.triangles.size());
+  for (const Edge& e : scene.edges)
+    if (is_flat(scene, e)) sets.join(e.face[0], e.face[1]);
+  patch_ = sets.numbered(count);
+  patches_.resize(count);
+  for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
+    Patch& patch = patches_[patch_[t]];
+    patch.body = body[scene.triangles[t].vertex[0]];
+    patch.area += 0.5 * length(doubled_normal(scene, static_cast<int>(t)));
+  }
+  const auto for_each_crease = [&](auto&& f) {
+    for (const Edge& e : scene.edges)
+      for (int i = 0; i < 2 && e.face[i] >= 0; ++i)
+        if (e.face[1] < 0 || patch_[e.face[0]] != patch_[e.face[1]]) f(patches_[patch_[e.face[i]]], e);
+  };
+  for_each_crease([](Patch& patch, const Edge&) { ++patch.creases; });
+  int first = 0;
+  for (Patch& patch : patches_) {
+    patch.first_crease = first;
+    first += std::exchange(patch.creases, 0);
+  }
+  creases_.resize(first);
+  for_each_crease([&](Patch& patch, const Edge& e) {
+    const Vec3 &a = scene.positions[e.vertex[0]], d = scene.positions[e.vertex[1]] - a;
+    const double size = length(d);
+    creases_[patch.first_crease + patch.creases++] = {a, size > 0 ? d / size : Vec3(), size};
+  });
+}
+
+VertexFlows::Pair::Weight VertexFlows::weight(const Vec3& x, int patch, const Vec3& y, double largest,
+                                              Vec3& gradient_other) const {
+  const Vec3 d = x - y;
+  const double squared = length_squared(d);
+  double s2 = largest * largest;
+  Vec3 to_nearest;  // from the nearest crease to x, where that is what limits s
+  const Patch& p = patches_[patch];
+  for (int i = p.first_crease; i < p.first_crease + p.creases; ++i) {
+    const Crease& c = creases_[i];
+    const Vec3 a = x - c.origin;
+    const Vec3 off = a - c.direction * std::clamp(dot(a, c.direction), 0.0, c.length);
+    const double distance = length_squared(off);
+    if (distance >= s2) continue;
+    if (distance <= squared) return {};
+    s2 = distance;
+    to_nearest = off;
+  }
+  if (!(squared < s2)) return {};
+  const double q = squared / s2, slope = -2 * (1 - q);
+  gradient_other = d * (slope * -2 / s2);
+  Pair::Weight w;
+  w.value = (1 - q) * (1 - q);
+  w.missing = q * (2 - q);
+  // grad s = to_nearest / s, grad q = 2 d / s^2 - 2 q grad s / s
+  w.gradient = (d - to_nearest * q) * (slope * 2 / s2);
+  return w;
+}
+
+VertexFlows::Pair VertexFlows::pair(const PreparedScene& scene, const SurfacePoint& x, const SurfacePoint& y,
+                                    int k) const {
+  Pair result;
+  Vec3 gradient_near;  // of the weight of y with respect to x, and the other way round
+  if (!patch_.empty()) {
+    const int patch_x = patch_[x.triangle], patch_y = patch_[y.triangle];
+    const int body_x = patches_[patch_x].body, body_y = patches_[patch_y].body;
+    if (body_x != body_y) {
+      const double largest = std::min(body_radius_[body_x], body_radius_[body_y]);
+      if (length_squared(x.p - y.p) < largest * largest && (near_.holds(x.p) || near_.holds(y.p))) {
+        result.far = weight(y.p, patch_y, x.p, largest, gradient_near);
+        if (k > 1) {
+          Vec3 gradient_far;
+          result.near = weight(x.p, patch_x, y.p, largest, gradient_far);
+          // The one on the larger patch comes first.
+          const auto second = [](Pair::Weight& w, const Pair::Weight& first, const Vec3& gradient_first) {
+            w.gradient = w.gradient * first.missing - gradient_first * w.value;
+            w.missing += w.value * first.value;
+            w.value *= first.missing;
+          };
+          if (patches_[patch_x].area >= patches_[patch_y].area)
+            second(result.far, result.near, gradient_far);
+          else
+            second(result.near, result.far, gradient_near);
+        }
+      }
+    }
+  }
+  if (k == 1 && camera_possible_ && (scene.has_moving_vertex(x.triangle) || scene.has_moving_vertex(y.triangle))) {
+    const double s = camera_radius_at(x.p), inverse = 1 / (s * s);
+    const Vec3 d = x.p - y.p;
+    const double q = length_squared(d) * inverse;
+    if (q < 1) {
+      const double w = (1 - q) * (1 - q);
+      const Vec3 gradient = (d * (2 * inverse) - forward_ * (2 * q * radius_ / s)) * (-2 * (1 - q));
+      const Pair::Weight& far = result.far;
+      result.near.value = w * far.missing;
+      result.near.gradient = gradient * far.missing - gradient_near * w;
+      result.own = {w * far.value, gradient * far.value + gradient_near * w};
+    }
+  }
+  return result;
+}
+
+VertexFlow VertexFlows::at(const Pair& before, const Pair& after, int k) {
+  VertexFlow flow;
+  if (k == 1) {
+    flow.after = {after.near.value, after.near.gradient};
+    flow.own = after.own;
+    return flow;
+  }
+  const Pair::Weight &w1 = before.far, &w2 = after.near;
+  if (w2.value == 0) {
+    flow.before = {w1.value, w1.gradient};
+  } else if (w1.value == 0) {
+    flow.after = {w2.value, w2.gradient};
+  } else if (const double d = w1.missing + w2.missing - w1.missing * w2.missing; d > 0) {
+    const auto share = [d](const Pair::Weight& w, const Pair::Weight& other) {
+      return Following{w.value * other.missing / d,
+                       (w.gradient * other.missing - other.gradient * (w.value * w.missing)) / (d * d)};
+    };
+    flow.before = share(w1, w2);
+    flow.after = share(w2, w1);
+  }
+  return flow;
+}
+
+void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g, LocalDifferential& out) {
+  const Vec3 ray = x1.p - scene.camera.position;
+  add_material_flow(scene, x1, x1.n * (dot(ray, g) / dot(x1.n, ray)), out);
+}
+
+void add_following_flow(const PreparedScene& scene, const VertexFlow& flow, const SurfacePoint* before,
+                        const SurfacePoint& x, const SurfacePoint* after, int k, const Vec3& g,
+                        LocalDifferential& out) {
+  const Vec3 along = in_plane(x, g);
+  if (flow.before.weight > 0) add_material_flow(scene, *before, along * flow.before.weight, out);
+  if (flow.after.weight > 0) add_material_flow(scene, *after, along * flow.after.weight, out);
+  if (flow.own.weight > 0) add_material_flow(scene, x, along * flow.own.weight, out);
+  const Vec3 of_base = along * -(flow.before.weight + flow.after.weight + flow.own.weight);
+  if (k == 1)
+    add_pixel_flow(scene, x, of_base, out);
+  else
+    add_material_flow(scene, x, of_base, out);
+}
+
+}  // namespace isochron

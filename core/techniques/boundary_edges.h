@@ -1,0 +1,82 @@
+// Mesh edges as visibility boundaries: their geometry and how they are picked (theory section 5).
+#pragma once
+#include "core/base/discrete_distribution.h"
+#include "core/base/large_array.h"
+#include "core/paths/path_differential.h"
+#include "core/paths/prepared_scene.h"
+
+namespace isochron {
+
+/// An edge at the current parameters, or the line along which two triangles pass through each other. Two cache lines: of
+/// many edges each is a wait for main memory.
+struct alignas(64) BoundaryEdge {
+  Vec3 origin, end;
+  int vertex[2] = {-1, -1};  ///< none of the line between two triangles
+  int face[2];               ///< face[1] is -1 on an open border
+  Vec3 inward[2];            ///< unit, in the plane of face i, perpendicular to the edge, pointing into the face
+  /// Angle that directions are drawn from, on either side: that of the wedge of grazing directions, which is pi less the
+  /// angle between the faces (pi on an open border), or, without it, pi.
+  double azimuths = 0;
+  bool moves = false;
+
+  int faces() const { return face[1] < 0 ? 1 : 2; }
+  /// Of two triangles that go on beyond it.
+  bool pierced() const { return vertex[0] < 0; }
+  Vec3 point(double s) const { return origin + (end - origin) * s; }
+};
+static_assert(sizeof(BoundaryEdge) == 128);
+
+class BoundaryEdges {
+ public:
+  /// `wedge`: pick edges and azimuths by the wedge of grazing directions (see BoundaryTechniques).
+  explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true);
+
+  /// Which edge, and where on it. The edge itself is on its way from memory.
+  struct Place {
+    const BoundaryEdge* edge = nullptr;
+    double s = 0;                 ///< fraction along the edge
+    double begin = 0, share = 0;  ///< the edge takes the numbers from `begin` to `begin` + `share`
+    /// The number that gives this point.
+    double x() const { return begin + s * share; }
+  };
+  struct Sample : Place {
+    Vec3 y;
+    Vec3 tangent;    ///< unit, from the edge's origin to its end
+    double pdf = 0;  ///< per length
+    Sample() = default;
+    explicit Sample(const Place& place);
+  };
+  /// Edges and lines of piercing triangles that the camera may see moving, by their length in the image and, inside of an
+  /// outline, the angle between their faces; the same of static ones where points beside them may follow others, in equal
+  /// shares. `u` in (0, 1).
+  bool has_primary() const { return !primary_.distribution.empty(); }
+  Sample sample_primary(double u) const { return Sample(primary_.place(u)); }
+  /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
+  /// where what lies behind or before them moves) get equal shares.
+  bool has_secondary() const { return !secondary_.distribution.empty(); }
+  Sample sample_secondary(double u) const { return Sample(place_secondary(u)); }
+  /// The same in two steps, for who has something else to do before the edge is there.
+  Place place_secondary(double u) const { return secondary_.place(u); }
+
+  /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
+  /// both (no boundary) or the plane holds a face.
+  static int occluder_side(const BoundaryEdge& edge, const Vec3& n_b);
+
+  /// Adds n_b . (velocity of the edge at y), n_b being normal to the edge.
+  static void add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b, LocalDifferential& out);
+
+ private:
+  /// Edges to pick from by weight; where there are both, moving and static ones get equal shares.
+  struct Choice {
+    LargeArray<BoundaryEdge> edges;
+    std::vector<double> weights;
+    DiscreteDistribution distribution;
+    void add(const BoundaryEdge& edge, double weight);
+    void finish();
+    Place place(double u) const;
+  };
+  Choice primary_, secondary_;
+  void add_piercings(const PreparedScene& scene, bool wedge);
+};
+
+}  // namespace isochron

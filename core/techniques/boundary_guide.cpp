@@ -1,0 +1,115 @@
+#include "core/techniques/boundary_guide.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numeric>
+
+namespace isochron {
+namespace {
+
+/// Share of every histogram that stays unguided: no density falls below this fraction of the unguided one.
+constexpr double kDefensiveShare = 0.25;
+constexpr int kMostBins = 512;
+/// A histogram has a bin for as many records as this, and fewer than these teach a tile nothing of its own.
+constexpr int kRecordsPerBin = 4, kFewRecords = 32;
+/// How often a technique is used follows from the sum of its squares, which is known as well as if so many records of
+/// equal squares made it up. With as few as these, half of it (of its logarithm) is believed.
+constexpr double kFewEqual = 8;
+/// How many times as often as without guiding a technique may be used.
+constexpr double kMostRate = 8, kLeastRate = 1.0 / 8;
+
+/// The density that minimises the variance is, in each bin, the root of the mean square of the contributions: given
+/// equally many unguided samples, of their sum.
+std::vector<double> histogram(const std::vector<GuideRecord>& records, int bins) {
+  std::vector<double> p(bins, 0.0);
+  for (const GuideRecord& r : records) p[std::min(static_cast<int>(r.x * bins), bins - 1)] += r.square;
+  for (double& x : p) x = std::sqrt(x);
+  const double sum = std::accumulate(p.begin(), p.end(), 0.0);
+  for (double& x : p) x = sum > 0 ? x / sum : 1.0 / bins;
+  return p;
+}
+
+int bins_for(std::size_t records) {
+  return static_cast<int>(std::bit_floor(std::clamp<std::size_t>(records / kRecordsPerBin, 1, kMostBins)));
+}
+
+/// Repeats each bin so that there are `bins`, a multiple.
+std::vector<double> refined(const std::vector<double>& p, int bins) {
+  const int factor = bins / static_cast<int>(p.size());
+  std::vector<double> fine(bins);
+  for (int i = 0; i < bins; ++i) fine[i] = p[i / factor] / factor;
+  return fine;
+}
+
+/// (1 - share) p + share q
+std::vector<double> mix(const std::vector<double>& p, const std::vector<double>& q, double share) {
+  const int bins = static_cast<int>(std::max(p.size(), q.size()));
+  std::vector<double> result = refined(p, bins);
+  const std::vector<double> other = refined(q, bins);
+  for (int i = 0; i < bins; ++i) result[i] += share * (other[i] - result[i]);
+  return result;
+}
+
+}  // namespace
+
+Warp::Warp(const std::vector<double>& probability) {
+  double sum = 0;
+  below_.push_back(0);
+  for (const double p : probability) below_.push_back(sum += p);
+  for (double& x : below_) x /= sum;
+}
+
+double Warp::sample(double u) const {
+  const auto above = std::upper_bound(below_.begin() + 1, below_.end() - 1, u);
+  const int i = static_cast<int>(above - below_.begin()) - 1;
+  const double x = (i + (u - below_[i]) / (below_[i + 1] - below_[i])) / bins();
+  return std::clamp(x, 0x1p-53, 1 - 0x1p-53);
+}
+
+BoundaryGuide::BoundaryGuide(const Each<bool>& possible) : warps_(kTables) {
+  const auto count = std::count(possible.begin(), possible.end(), true);
+  for (int t = 0; t < kTechniques; ++t) rate_[t] = possible[t] ? 1.0 / static_cast<double>(count) : 0;
+}
+
+BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records,
+                             const Each<double>& cost)
+    : BoundaryGuide(possible) {
+  std::vector<std::vector<GuideRecord>> of_table(kTables), of_technique(kTechniques);
+  for (const GuideRecord& r : records) {
+    of_table[r.table].push_back(r);
+    of_technique[std::min<int>(r.table, from_camera)].push_back(r);
+  }
+  const std::vector<double> uniform(1, 1.0);
+  for (int table = 0; table < kTables; ++table) {
+    const auto& all = of_technique[std::min<int>(table, from_camera)];
+    const auto& own = of_table[table];
+    const double trust = own.size() / (own.size() + static_cast<double>(kFewRecords));
+    const double trust_all = all.size() / (all.size() + static_cast<double>(kFewRecords));
+    const std::vector<double> learned =
+        mix(histogram(all, bins_for(all.size())), histogram(own, bins_for(own.size())), trust);
+    warps_[table] = Warp(mix(uniform, learned, trust_all * (1 - kDefensiveShare)));
+  }
+
+  // For a given total cost, the variance is least where each technique is used in proportion to the root of its
+  // second moment, which is that of guided samples, over its cost.
+  Each<double> wanted{}, trust;
+  trust.fill(1);
+  double unguided_cost = 0, wanted_cost = 0;
+  for (int t = 0; t < kTechniques; ++t) {
+    double square = 0, fourth = 0;
+    for (const GuideRecord& r : of_technique[t]) {
+      const double guided = r.square / warps_[r.table].density(r.x);
+      square += guided, fourth += guided * guided;
+    }
+    if (fourth > 0) trust[t] = square * square / (square * square + kFewEqual * fourth);
+    wanted[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
+    unguided_cost += cost[t];
+    wanted_cost += wanted[t] * cost[t];
+  }
+  if (!(wanted_cost > 0)) return;
+  for (int t = 0; t < kTechniques; ++t)
+    rate_[t] *= std::pow(std::clamp(wanted[t] * unguided_cost / wanted_cost, kLeastRate, kMostRate), trust[t]);
+}
+
+}  // namespace isochron

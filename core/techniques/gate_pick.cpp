@@ -1,0 +1,44 @@
+#include "core/techniques/gate_pick.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isochron {
+
+GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint) : gates_(gates) {
+  const int count = gates.size(), pixels = adjoint.pixels();
+  below_.assign(static_cast<std::size_t>(pixels + 1) * (count + 1), 0.0);
+  // Makes probabilities of weights; returns their sum.
+  const auto accumulate = [&](int pixel) {
+    double* p = &below_[row(pixel)];
+    for (int g = 0; g < count; ++g) p[g + 1] += p[g];
+    const double sum = p[count];
+    if (sum > 0)
+      for (int g = 1; g <= count; ++g) p[g] = g == count ? 1 : p[g] / sum;
+    return sum;
+  };
+  rate_.assign(pixels, 0.0);
+  double* image = &below_[row(kImage)];
+  for (int pixel = 0; pixel < pixels; ++pixel) {
+    double* p = &below_[row(pixel)];
+    for (int g = 0; g < count; ++g) {
+      for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
+      image[g + 1] += p[g + 1];
+    }
+    rate_[pixel] = accumulate(pixel);
+  }
+  const double all = accumulate(kImage);
+  if (all > 0)
+    for (double& rate : rate_) rate *= pixels / all;
+}
+
+int GatePick::sample_row(int pixel, double& u) const {
+  const double* p = &below_[row(pixel)];
+  const int count = gates_.size();
+  if (!(p[count] > 0)) return -1;
+  const int gate = static_cast<int>(std::upper_bound(p + 1, p + count, u) - p) - 1;
+  u = (u - p[gate]) / (p[gate + 1] - p[gate]);
+  return gate;
+}
+
+}  // namespace isochron

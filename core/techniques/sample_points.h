@@ -1,0 +1,85 @@
+// The samples of a pass and their random numbers. Each technique has points of its own, which cover evenly what it draws
+// from: techniques that start in a pixel have a set of points per pixel, those that may land anywhere have one set for the
+// whole image, which every pixel's samples are a part of.
+#pragma once
+#include <cmath>
+
+#include "core/base/progress.h"
+#include "core/base/random.h"
+#include "core/paths/options.h"
+
+namespace isochron {
+
+/// Ways to find paths that a pass may combine; tells their random numbers apart.
+enum class Technique : std::uint32_t {
+  standard,        ///< from the pixel, by standard sampling
+  walk,            ///< from the pixel, with ellipsoidal connections
+  camera_lengths,  ///< connections of the camera itself, lengths drawn from the gates
+  camera_pairs,    ///< the same, in pairs from the gates' derivative
+  primary_edge,
+  pixel_border,
+  from_edge,
+  from_camera
+};
+
+/// One set of points, to be visited in parts.
+class PointSet {
+ public:
+  PointSet(const Stream& stream, Technique technique, std::uint32_t place, SampleRange range, Numbers numbers)
+      : rng_(Rng(stream, static_cast<std::uint64_t>(technique) << 32 | place, 0)
+                 .in_set(static_cast<std::uint32_t>(range.begin))),
+        together_(numbers == Numbers::low_discrepancy),
+        key_(together_ ? rng_.scramble_key() : 0) {}
+
+  /// sample(rng) for the points from number `from` up to `to` of a set that goes on from part to part. Both may be
+  /// fractions: all of a set's parts are then shifted by the same random number, so that each has to - from samples
+  /// on average.
+  template <class F>
+  void visit(double from, double to, F&& sample) const {
+    const bool whole = from == std::floor(from) && to == std::floor(to);
+    const double shift = whole ? 0 : rng_.shift();
+    const auto end = static_cast<std::int64_t>(to + shift);
+    for (auto i = static_cast<std::int64_t>(from + shift); i < end; ++i) {
+      throw_if_stopped();
+      const auto number = static_cast<std::uint32_t>(i);
+      Rng rng = together_ ? rng_.with_point(number, key_, number) : rng_.with_sample(number);
+      sample(rng);
+    }
+  }
+
+ private:
+  Rng rng_;
+  bool together_;
+  std::uint64_t key_;
+};
+
+class SamplePoints {
+ public:
+  SamplePoints(const Stream& stream, SampleRange range, Numbers numbers)
+      : stream_(stream), range_(range), numbers_(numbers) {}
+
+  /// sample(rng) for each of the samples that a technique takes from `pixel`: `rate` times those of the range, on average.
+  template <class F>
+  void in_pixel(Technique technique, int pixel, double rate, F&& sample) const {
+    if (rate > 0)
+      PointSet(stream_, technique, static_cast<std::uint32_t>(pixel), range_, numbers_)
+          .visit(0, rate * range_.count(), sample);
+  }
+  /// The points of a technique that serves the whole image.
+  PointSet of_image(Technique technique) const { return {stream_, technique, kImage, range_, numbers_}; }
+  /// Those of them that come with `pixel`, which need not land there.
+  template <class F>
+  void in_image(const PointSet& points, int pixel, double rate, F&& sample) const {
+    const double per_pixel = rate * range_.count();
+    points.visit(per_pixel * pixel, per_pixel * (pixel + 1), sample);
+  }
+
+ private:
+  static constexpr std::uint32_t kImage = ~std::uint32_t{0};  ///< in the place of a pixel
+
+  const Stream stream_;
+  const SampleRange range_;
+  const Numbers numbers_;
+};
+
+}  // namespace isochron

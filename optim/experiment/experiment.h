@@ -1,0 +1,204 @@
+// The experiment file: what a user writes, checked and with every default filled in.
+//
+// Defaults (the only place where they are listed; a key without one here is required):
+//   max_bounces 8                      parameters: none
+//   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0],
+//     scale by type, see parameters.h
+//   samples: 64 for each of primal, interior, visibility, path_length; what a sample is: Term in core/render/renderer.h
+//   estimator: sampling auto, antithetic true, pick contribution, numbers low_discrepancy, guiding true,
+//     follow 1, follow_radius 4
+//   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter; common_numbers true)
+//   loss: kind squared                (huber, cauchy: scale 1)
+//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);
+//     lbfgs: inner_iterations 5
+//   target: samples 4096, seed 7, max_bounces as above, noise none     seed 1
+//   resolution: the camera's           output: geometry ply, every 0
+#pragma once
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/base/yaml_reader.h"
+#include "core/gates/gate.h"
+#include "core/image/image.h"
+#include "core/render/renderer.h"
+
+namespace isochron {
+
+enum class LengthUnit { scene, ns, ps };
+
+/// Gates as written. All lengths are in `unit`; a time t is the length c t / scene_unit_m in scene units.
+struct GateSpec {
+  GateKind kind = GateKind::steady;
+  LengthUnit unit = LengthUnit::scene;
+  double scene_unit_m = 0;      ///< metres per scene unit; > 0 where unit is a time, else unused
+  std::vector<double> centers;  ///< steady: empty
+  double sigma = 0;             ///< gaussian, truncated_gaussian
+  double width = 0;             ///< boxcar
+  double half_width = 0;        ///< truncated_gaussian
+  std::vector<double> offsets,
+      values;  ///< tabulated: relative to the centre; read from `file` or given inline
+};
+
+/// Scene units per unit of the gates' lengths.
+double length_unit(const GateSpec& spec);
+
+/// Gates in scene units. Throws std::invalid_argument when the shape cannot be made (for example a table of
+/// zeros).
+GateSet make_gates(const GateSpec& spec);
+
+/// What an EXR file says of its gates, so that it can be drawn by itself: isochron.gateCenters (numbers in the unit of
+/// `spec`, separated by spaces; none where steady), isochron.gateUnit (scene units, ns, ps), isochron.quantity (what a
+/// pixel's value is).
+ExrNotes exr_notes(const GateSpec& spec);
+
+enum class ParameterType { translation, rotation, vertices, albedo, roughness, ior, emission };
+enum class VertexDirection { fixed, normal, free };
+/// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
+/// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
+enum class PivotKind { fixed, center, follow };
+const char* name(ParameterType type);
+/// Whether it is a material's, else a shape's.
+inline bool is_of_material(ParameterType type) {
+  return type == ParameterType::albedo || type == ParameterType::roughness || type == ParameterType::ior;
+}
+
+/// Which vertices of a shape a parameter moves: all, a list of indices, or those inside a box.
+struct Selection {
+  enum class Kind { all, list, box } kind = Kind::all;
+  std::vector<int> indices;  ///< within the shape, after vertices at one position were welded; counted from 0
+  Vec3 min, max;             ///< world space of the scene file, borders included
+};
+
+/// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
+/// file; those of albedo, roughness, ior and emission replace what the scene file says.
+struct ParameterSpec {
+  std::string name;
+  ParameterType type = ParameterType::translation;
+  std::string shape;     ///< translation, rotation, vertices, emission
+  std::string material;  ///< albedo, roughness, ior
+  Selection selection;
+  VertexDirection direction_kind = VertexDirection::fixed;
+  Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
+  Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
+  PivotKind pivot_kind = PivotKind::fixed;
+  Vec3 pivot;  ///< rotation; of follow: where the point is in the scene as loaded; of center: unused
+  std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
+                                                      ///< empty (all but initial)
+
+  double scale = 0;  ///< in units of the parameter, see parameters.h; 0: the default of its type
+
+  /// Of type vertices, see smoothing.h; 0: none.
+  double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
+  double slopes = 0;     ///< weight of the penalty on uneven offsets, in units of the target's mean square
+
+  /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
+  std::map<std::string, YamlValue> where;
+  /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
+  [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
+};
+
+struct TargetSpec {
+  std::string images;  ///< absolute path of an EXR; empty: render at the target values
+  int samples = 4096;
+  std::uint64_t seed = 7;
+  int max_bounces = 8;  ///< of the rendered target; the experiment's own where the file does not say
+  double photons = 0;   ///< of add_photon_noise; 0: no noise
+};
+
+/// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1, for runs 2.
+struct SampleSpec {
+  int primal = 64, interior = 64, visibility = 64, path_length = 64;
+  int term(Term t) const { return t == Term::interior ? interior : t == Term::visibility ? visibility : path_length; }
+  /// Sets every term to n, but leaves out what is left out already.
+  void set_all(int n);
+};
+
+enum class GradientMethod { analytic, finite_difference };
+
+struct GradientSpec {
+  GradientMethod method = GradientMethod::analytic;
+  double step = 0.01;       ///< finite_difference: half the distance of the two images, in units of the parameter
+  bool step_given = false;  ///< whether the file gives it
+  /// finite_difference: whether both images take the same random numbers, so that most of their noise cancels.
+  bool common_numbers = true;
+};
+
+enum class LossKind { squared, huber, cauchy };
+
+/// What is minimised: see RobustLoss.
+struct LossSpec {
+  LossKind kind = LossKind::squared;
+  double scale = 1;  ///< in units of the target's root mean square
+};
+
+enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
+const char* name(OptimizerMethod method);
+
+/// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
+struct RateDecay {
+  int start = 0;
+  double half_life = 0;  ///< 0: steps do not shrink
+  double factor(int iteration) const {
+    return half_life > 0 && iteration > start ? std::exp2((start - iteration) / half_life) : 1;
+  }
+};
+
+struct OptimizerSpec {
+  OptimizerMethod method = OptimizerMethod::adam;
+  /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
+  /// levenberg_marquardt: without meaning.
+  double learning_rate = 0.02;
+  int iterations = 100;
+  double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
+  int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
+  RateDecay decay;           ///< adam
+  int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
+};
+
+enum class GeometryFormat { ply, obj, none };
+
+/// What a run writes besides images and tables: see geometry_files.h.
+struct OutputSpec {
+  GeometryFormat geometry = GeometryFormat::ply;
+  int every = 0;  ///< meshes of every so many iterations besides the first and the last; 0: of none
+};
+
+struct Experiment {
+  std::string file;  ///< absolute path, for messages
+  std::string name;
+  std::string scene;                      ///< absolute path
+  std::vector<std::string> number_files;  ///< absolute paths of the files that gates and parameters were read from
+  /// Pixels, {width, height}, in place of the scene's; {0, 0}: as the scene says. The field of view stays across the
+  /// width.
+  std::array<int, 2> resolution{0, 0};
+  GateSpec gates;
+  EstimatorOptions estimator;
+  bool guiding = true;  ///< of the visibility term; see Problem::estimator
+  std::vector<ParameterSpec> parameters;
+  TargetSpec target;
+  SampleSpec samples;
+  GradientSpec gradient;
+  LossSpec loss;
+  OptimizerSpec optimizer;
+  OutputSpec output;
+  std::uint64_t seed = 1;
+};
+
+/// Reads and checks an experiment file, all that can be checked without the scene. `overrides` are
+/// KEY.PATH=VALUE strings, applied before the checks (see open_yaml). Throws InputError: one line that names
+/// file, line, column, key and what is allowed.
+Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides = {});
+
+/// The experiment with everything resolved, as YAML that load_experiment reads back to the same values when
+/// it lies in `folder`: paths are written relative to it, tables and value files inline, numbers with all
+/// their digits.
+std::string resolved_yaml(const Experiment& experiment, const std::string& folder);
+
+/// Version of this program, as written into experiment.yaml and checkpoints.
+const char* program_version();
+
+}  // namespace isochron

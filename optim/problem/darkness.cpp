@@ -1,0 +1,125 @@
+#include "optim/problem/darkness.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "optim/problem/loss.h"
+
+namespace isochron {
+namespace {
+
+constexpr int kSamples = 16, kMostPixels = 32, kMostBounces = 16, kBins = 128;
+
+/// The range narrowed to the bins of it that light falls into; empty where there are none.
+std::optional<std::pair<double, double>> narrowed(const Problem& problem, const Scene& scene, double low, double high) {
+  const double width = (high - low) / kBins;
+  std::vector<double> centers;
+  for (int i = 0; i < kBins; ++i) centers.push_back(low + (i + 0.5) * width);
+  const GateSet bins(GateShape::boxcar(width), centers);
+  const Experiment& experiment = problem.experiment();
+  EstimatorOptions options;
+  options.max_bounces =
+      std::min(kMostBounces, std::max(experiment.estimator.max_bounces, experiment.target.max_bounces));
+  options.sampling = Sampling::standard;
+  const GatedImage image = Renderer(scene, bins, options).render(problem.stream(Pass::mix), {0, kSamples});
+  int first = kBins, last = -1;
+  for (int i = 0; i < kBins; ++i) {
+    if (image.mean(i) == 0) continue;
+    first = std::min(first, i);
+    last = i;
+  }
+  if (last < 0) return std::nullopt;
+  return std::pair{low + first * width, low + (last + 1) * width};
+}
+
+bool is_black(const GatedImage& image, int gate) {
+  for (int p = 0; p < image.pixels(); ++p)
+    for (int c = 0; c < image.channels; ++c)
+      if (image.at(p, gate, c) != 0) return false;
+  return true;
+}
+
+/// Such as "0, 3 to 5".
+std::string ranges(const std::vector<int>& numbers) {
+  std::string text;
+  for (std::size_t i = 0, end = 0; i < numbers.size(); i = end) {
+    for (end = i + 1; end < numbers.size() && numbers[end] == numbers[end - 1] + 1;) ++end;
+    const int first = numbers[i], last = numbers[end - 1];
+    text += text.empty() ? "" : ", ";
+    text += first == last       ? fmt::format("{}", first)
+            : last == first + 1 ? fmt::format("{}, {}", first, last)
+                                : fmt::format("{} to {}", first, last);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::optional<std::pair<double, double>> path_length_range(const Problem& problem, const std::vector<double>& theta) {
+  Scene scene = problem.parameters().apply(theta);
+  int& width = scene.camera.width;
+  int& height = scene.camera.height;
+  const double shrink = std::min(1.0, static_cast<double>(kMostPixels) / std::max(width, height));
+  width = std::max(1, static_cast<int>(width * shrink));
+  height = std::max(1, static_cast<int>(height * shrink));
+  // A path of n bounces has n + 1 segments or, seen directly, one; none is longer than the scene.
+  Vec3 low = scene.camera.position, high = low;
+  for (const Vec3& p : scene.positions)
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], p[axis]);
+      high[axis] = std::max(high[axis], p[axis]);
+    }
+  double index = 1;
+  for (const Material& material : scene.materials)
+    if (material.type == MaterialType::rough_dielectric) index = std::max(index, material.ior);
+  const auto coarse = narrowed(problem, scene, 0, (kMostBounces + 2) * index * length(high - low));
+  return coarse ? narrowed(problem, scene, coarse->first, coarse->second) : coarse;
+}
+
+std::vector<double> point_of_target(const Problem& problem, const std::vector<double>& theta) {
+  return problem.parameters().target_known() ? problem.parameters().target() : theta;
+}
+
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta,
+                             const std::vector<const GatedImage*>& images, const std::string& what) {
+  const int gates = problem.gates().size();
+  std::vector<int> dark;
+  for (int g = 0; g < gates; ++g)
+    if (std::all_of(images.begin(), images.end(), [&](const GatedImage* image) { return is_black(*image, g); }))
+      dark.push_back(g);
+  if (dark.empty()) return {};
+  std::string text = "no light reaches the gates of " + what;
+  if (static_cast<int>(dark.size()) < gates)
+    text = fmt::format("no light reaches {} {} of {} of {}", dark.size() == 1 ? "gate" : "gates", ranges(dark), gates,
+                       what);
+  constexpr const char* kUnits[] = {"scene units", "ns", "ps"};
+  const GateSpec& spec = problem.experiment().gates;
+  const double unit = length_unit(spec);
+  const auto shown = [&](double low, double high) {
+    return fmt::format("{:.3g} to {:.3g} {}", low / unit, high / unit, kUnits[static_cast<int>(spec.unit)]);
+  };
+  const auto range = path_length_range(problem, theta);
+  text += range ? fmt::format("; paths with light are about {} long", shown(range->first, range->second))
+                : "; no path with light was found at all: does a lamp face the scene?";
+  if (range && spec.kind != GateKind::steady) {
+    const auto by_center = [&](int a, int b) { return problem.gates().center(a) < problem.gates().center(b); };
+    const auto [first, last] = std::minmax_element(dark.begin(), dark.end(), by_center);
+    const double low = problem.gates().center(*first), high = problem.gates().center(*last);
+    text += low == high ? fmt::format("; its centre is {:.4g}", low / unit)
+                        : fmt::format("; their centres are {:.4g} to {:.4g}", low / unit, high / unit);
+  }
+  return text;
+}
+
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
+                             const GatedImage& target) {
+  const bool black_image = mean_square(image) == 0, black_target = mean_square(target) == 0;
+  if (black_target && !black_image)
+    return darkness_warning(problem, point_of_target(problem, theta), {&target}, "the target");
+  if (black_image && !black_target) return darkness_warning(problem, theta, {&image}, "the image");
+  return darkness_warning(problem, theta, {&image, &target}, "the image and the target");
+}
+
+}  // namespace isochron

@@ -1,0 +1,28 @@
+// Gates that see no light: nearly always centres in another unit than the scene's, or lamps that face away.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/image/image.h"
+#include "optim/problem/problem.h"
+
+namespace isochron {
+
+/// One line that names the gates that are black in every one of the images, where they are, and how long the scene's paths
+/// at theta are, in the experiment's unit; empty where there is none. `what`: such as "the target".
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta,
+                             const std::vector<const GatedImage*>& images, const std::string& what);
+
+/// The same of a residual: gates that are black in both, or one of the two images where it is black as a whole. That a gate
+/// is black in one of them alone can be what an optimisation is about.
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
+                             const GatedImage& target);
+
+/// The target values where all are known, else `theta`: where to look for the target's light.
+std::vector<double> point_of_target(const Problem& problem, const std::vector<double>& theta);
+
+/// Shortest and longest path length in scene units among 16 paths per pixel of an image of 32 pixels at most across, with 16
+/// bounces at most, to about a hundredth of their distance. Empty where no path brings light.
+std::optional<std::pair<double, double>> path_length_range(const Problem& problem, const std::vector<double>& theta);
+
+}  // namespace isochron

@@ -1,0 +1,143 @@
+#include "optim/problem/estimates.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/error.h"
+
+namespace isochron {
+namespace {
+
+/// Throws InputError where they are too few for a standard error.
+void require_replicates(const char* term, int samples) {
+  if (samples < 2)
+    throw InputError(fmt::format("samples.{}: {} is too few for a standard error (allowed: at least 2{})", term,
+                                 samples, std::string_view(term) == "primal" ? "" : ", or 0 to leave the term out"));
+}
+
+/// Means and statistics of `count` images, which `estimate(range)` gives for parts of the samples.
+template <class Estimate>
+DerivativeEstimate collect(const std::string& component, int samples, int replicates, bool pixels_are_independent,
+                           int count, const Poll& poll, Estimate&& estimate) {
+  std::vector<ImageStatistics> statistics(count, ImageStatistics(pixels_are_independent));
+  ProgressStage stage("rendering the " + component, replicates);
+  for (int r = 0; r < replicates; ++r) {
+    const SampleRange range = Share{r, replicates}.of(samples);
+    std::vector<GatedImage> images = estimate(range);
+    for (int i = 0; i < count; ++i) statistics[i].add(std::move(images[i]), range.count());
+    stage.advance();
+    poll();
+  }
+  DerivativeEstimate result{component, {}, {}};
+  for (ImageStatistics& of_image : statistics) {
+    result.images.push_back(of_image.mean());
+    result.gates.push_back(of_image.gates());
+    of_image = ImageStatistics(pixels_are_independent);  // its images are no longer needed
+  }
+  return result;
+}
+
+/// Sum of the terms, whose random numbers are independent.
+DerivativeEstimate total_of(const std::vector<DerivativeEstimate>& terms) {
+  DerivativeEstimate total = terms.front();
+  total.component = "total";
+  for (std::size_t i = 0; i < total.images.size(); ++i) {
+    std::vector<const Statistics*> of_terms;
+    for (const DerivativeEstimate& term : terms) of_terms.push_back(&term.gates[i]);
+    total.gates[i] = sum_of(of_terms);
+    for (std::size_t t = 1; t < terms.size(); ++t)
+      for (std::size_t k = 0; k < total.images[i].data.size(); ++k)
+        total.images[i].data[k] += terms[t].images[i].data[k];
+  }
+  return total;
+}
+
+int pixels_of(const Problem& problem) {
+  return problem.scene().camera.width * problem.scene().camera.height;
+}
+
+}  // namespace
+
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll) {
+  const int samples = problem.experiment().samples.primal;
+  require_replicates("primal", samples);
+  const Scene scene = problem.parameters().apply(theta);
+  const Renderer renderer(scene, problem.gates(), problem.image_estimator());
+  const Stream stream = problem.stream(Pass::primal);
+  const bool independent = renderer.pixels_are_independent();
+  const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
+  DerivativeEstimate result = collect("image", samples, replicates, independent, 1, poll, [&](SampleRange range) {
+    return std::vector<GatedImage>{renderer.render(stream, range)};
+  });
+  return {std::move(result.images[0]), std::move(result.gates[0])};
+}
+
+std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
+                                                     int first, int count, const Poll& poll, int most_replicates) {
+  const SampleSpec& spec = problem.experiment().samples;
+  const int pixels = pixels_of(problem);
+  if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
+    require_replicates("primal", spec.primal);
+    const Stream stream = problem.stream(Pass::finite_difference);
+    const bool independent = sampling_mix(problem.estimator(), problem.gates()).image == 0;
+    const int replicates = replicate_count(spec.primal, pixels, independent, most_replicates);
+    return {collect("total", spec.primal, replicates, independent, count, poll, [&](SampleRange range) {
+      std::vector<GatedImage> images;
+      for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
+      return images;
+    })};
+  }
+  for (Term term : kTerms)
+    if (spec.term(term) > 0) require_replicates(name(term), spec.term(term));  // before anything is rendered
+  const Scene scene = problem.parameters().apply(theta);
+  const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
+  const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility, Purpose::images), &basis);
+  std::vector<DerivativeEstimate> components;
+  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return spec.term(t) > 0; });
+  ProgressStage stage("rendering the derivatives", static_cast<int>(terms));
+  for (Term term : kTerms) {
+    const int samples = spec.term(term);
+    if (samples == 0) continue;
+    const Stream stream = problem.stream(pass_of(term));
+    const bool independent = renderer.pixels_are_independent(term);
+    const int replicates = replicate_count(samples, pixels, independent, most_replicates);
+    components.push_back(collect(name(term), samples, replicates, independent, count, poll,
+                                 [&](SampleRange range) { return renderer.derive(term, stream, range); }));
+    stage.advance();
+  }
+  if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
+  components.insert(components.begin(), total_of(components));
+  return components;
+}
+
+int gradient_repeats(const Problem& problem) {
+  const SampleSpec& spec = problem.experiment().samples;
+  const int pixels = pixels_of(problem);
+  require_replicates("primal", spec.primal);
+  int repeats = replicate_count(spec.primal, pixels, false, kMostReplicates);
+  if (problem.experiment().gradient.method == GradientMethod::finite_difference) return repeats;
+  for (Term term : kTerms) {
+    if (spec.term(term) == 0) continue;
+    require_replicates(name(term), spec.term(term));
+    repeats = std::min(repeats, replicate_count(spec.term(term), pixels, false, kMostReplicates));
+  }
+  return repeats;
+}
+
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                   const Poll& poll) {
+  const int repeats = gradient_repeats(problem);
+  ReplicateStatistics statistics;
+  ProgressStage stage("estimating the gradient", repeats);
+  for (int r = 0; r < repeats; ++r) {
+    std::vector<std::vector<double>> parts;
+    const Evaluation evaluation = problem.evaluate(theta, target, 0, poll, {r, repeats}, &parts);
+    statistics.add(evaluation.gradient, std::move(parts), 1);
+    stage.advance();
+  }
+  return {statistics.result()};
+}
+
+}  // namespace isochron

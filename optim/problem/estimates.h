@@ -1,0 +1,50 @@
+// Images, derivatives and gradients with standard errors from replicates: independent estimates that share the samples.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "core/image/image.h"
+#include "optim/problem/problem.h"
+#include "optim/problem/statistics.h"
+
+namespace isochron {
+
+/// Replicates at most (see replicate_count) of derivatives and gradients, and of those that are checked: enough degrees of
+/// freedom for a sharp test.
+inline constexpr int kMostReplicates = 8, kMostCheckReplicates = 16;
+
+struct ImageEstimate {
+  GatedImage image;
+  Statistics gates;  ///< of the average over pixels and channels, one entry per gate
+};
+
+/// The gated images at theta. Throws InputError when samples.primal is below 2.
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll);
+
+/// One component of the derivative images of a range of unknowns.
+struct DerivativeEstimate {
+  std::string component;           ///< total, interior, visibility or path_length
+  std::vector<GatedImage> images;  ///< one per unknown
+  std::vector<Statistics> gates;   ///< one per unknown, as in ImageEstimate
+};
+
+/// Derivative images of the unknowns [first, first + count) at theta: `total` first, then the terms with
+/// samples. The finite-difference method gives `total` alone, from samples.primal. Throws InputError when a
+/// term has one sample.
+std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
+                                                     int first, int count, const Poll& poll,
+                                                     int most_replicates = kMostReplicates);
+
+struct GradientEstimate {
+  Statistics gradient;  ///< one entry per unknown; replicates of residual and derivative
+};
+
+/// Number of replicates that estimate_gradient makes. Throws InputError when a term has one sample.
+int gradient_repeats(const Problem& problem);
+
+/// The gradient of the loss at theta. All replicates together use the experiment's samples once. Throws as
+/// above.
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                   const Poll& poll);
+
+}  // namespace isochron

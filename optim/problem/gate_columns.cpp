@@ -1,0 +1,34 @@
+#include "optim/problem/gate_columns.h"
+
+#include <fmt/format.h>
+
+namespace isochron {
+namespace {
+
+const char* unit_name(LengthUnit unit) {
+  return unit == LengthUnit::ns ? "ns" : "ps";
+}
+
+}  // namespace
+
+std::string gate_column_names(const GateSpec& spec) {
+  return spec.unit == LengthUnit::scene ? ",gate_center"
+                                        : fmt::format(",gate_center,gate_center_{}", unit_name(spec.unit));
+}
+
+std::string gate_column_values(const Problem& problem, int gate) {
+  const GateSpec& spec = problem.experiment().gates;
+  const bool steady = problem.gates().shape().is_steady();
+  std::string text = steady ? ",nan" : fmt::format(",{}", problem.gates().center(gate));
+  if (spec.unit != LengthUnit::scene) text += steady ? ",nan" : fmt::format(",{}", spec.centers[gate]);
+  return text;
+}
+
+std::string gate_label(const Problem& problem, int gate) {
+  if (problem.gates().shape().is_steady()) return "all";
+  const GateSpec& spec = problem.experiment().gates;
+  if (spec.unit == LengthUnit::scene) return fmt::format("{:.5g}", problem.gates().center(gate));
+  return fmt::format("{:.5g} {}", spec.centers[gate], unit_name(spec.unit));
+}
+
+}  // namespace isochron

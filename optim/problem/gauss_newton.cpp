@@ -1,0 +1,32 @@
+#include "optim/problem/gauss_newton.h"
+
+#include <Eigen/Core>
+
+namespace isochron {
+
+void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint, const std::vector<double>& weight,
+                  Evaluation& into) {
+  const auto rows = static_cast<Eigen::Index>(jacobian.residuals),
+             columns = static_cast<Eigen::Index>(jacobian.unknowns);
+  Eigen::Map<Eigen::MatrixXd> a(jacobian.half[0].data(), rows, columns), b(jacobian.half[1].data(), rows, columns);
+  const Eigen::Map<const Eigen::VectorXd> slope(adjoint.data(), rows), weights(weight.data(), rows);
+
+  into.gradient.resize(jacobian.unknowns);
+  Eigen::Map<Eigen::VectorXd> gradient(into.gradient.data(), columns);
+  gradient = (a.transpose() * slope + b.transpose() * slope) / 2;
+
+  const Eigen::VectorXd root = weights.cwiseSqrt();
+  a.array().colwise() *= root.array();
+  b.array().colwise() *= root.array();
+  const double scale = 2.0 / static_cast<double>(rows);
+  into.curvature.resize(jacobian.unknowns * jacobian.unknowns);
+  into.curvature_bound.resize(into.curvature.size());
+  Eigen::Map<Eigen::MatrixXd> curvature(into.curvature.data(), columns, columns),
+      bound(into.curvature_bound.data(), columns, columns);
+  const Eigen::MatrixXd product = a.transpose() * b;
+  curvature = scale / 2 * (product + product.transpose());
+  a += b;
+  bound.noalias() = scale / 4 * (a.transpose() * a);
+}
+
+}  // namespace isochron

@@ -1,0 +1,137 @@
+#include "optim/problem/memory.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <limits>
+
+#include "core/base/error.h"
+#include "optim/problem/estimates.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Copies of an image's size that sums of work partitions take at a time: one for every thread and those that wait for
+/// others to be added (core/base/partition_sum.h). With more than a few threads they may be more, with few samples, which
+/// touch a part of the image alone, less.
+constexpr double kPartialSums = 8;
+
+/// The number that follows `key` in a file of `KEY: NUMBER kB` lines, in bytes; none: infinite.
+double kilobytes(const char* file, const std::string& key) {
+  std::ifstream lines(file);
+  for (std::string word; lines >> word;)
+    if (double number = 0; word == key && lines >> number) return 1024 * number;
+  return kInfinity;
+}
+
+double first_number(const std::string& file) {
+  double number = 0;
+  return std::ifstream(file) >> number ? number : kInfinity;
+}
+
+/// Of the process's control group; "max" where there is no limit.
+double group_memory() {
+  std::ifstream groups("/proc/self/cgroup");
+  double least = kInfinity;
+  for (std::string line; std::getline(groups, line);) {
+    const std::size_t at = line.rfind(':');
+    const std::string group = line.substr(at + 1);
+    // Version 2 has one line, 0::/group; in a container the group's files are at the root. Version 1: N:memory:/group.
+    for (const std::string& folder : {"/sys/fs/cgroup" + group, std::string("/sys/fs/cgroup")})
+      least = std::min(least, first_number(folder + "/memory.max") - first_number(folder + "/memory.current"));
+    if (line.find(":memory:") == std::string::npos) continue;
+    for (const std::string& folder : {"/sys/fs/cgroup/memory" + group, std::string("/sys/fs/cgroup/memory")})
+      least = std::min(
+          least, first_number(folder + "/memory.limit_in_bytes") - first_number(folder + "/memory.usage_in_bytes"));
+  }
+  return std::isnan(least) ? kInfinity : least;
+}
+
+double limit(int resource, const std::string& used) {
+  rlimit most{};
+  if (getrlimit(static_cast<__rlimit_resource>(resource), &most) != 0 || most.rlim_cur == RLIM_INFINITY)
+    return kInfinity;
+  return static_cast<double>(most.rlim_cur) - kilobytes("/proc/self/status", used);
+}
+
+double image_bytes(const Problem& problem) {
+  const Camera& camera = problem.scene().camera;
+  return 8.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
+}
+
+/// Standard sampling shares one image; what automatic sampling settles on is not known before its trial.
+bool shares_one_image(const Problem& problem) {
+  const Experiment& experiment = problem.experiment();
+  return experiment.estimator.sampling == Sampling::standard || experiment.gates.kind == GateKind::steady;
+}
+
+std::string amount(double bytes) {
+  return bytes >= 1e9 ? fmt::format("{:.3g} GB", bytes / 1e9) : fmt::format("{:.0f} MB", std::ceil(bytes / 1e6));
+}
+
+/// `copies` of the images, and what their rendering takes.
+std::vector<MemoryUse> rendering_memory(const Problem& problem, double copies) {
+  const double image = image_bytes(problem);
+  std::vector<MemoryUse> parts = {{"images, their mean and their file", copies * image}};
+  if (!shares_one_image(problem)) parts.push_back({"images of work partitions", kPartialSums * image});
+  return parts;
+}
+
+}  // namespace
+
+double available_memory() {
+  return std::min({kilobytes("/proc/meminfo", "MemAvailable:"), group_memory(), limit(RLIMIT_AS, "VmSize:"),
+                   limit(RLIMIT_DATA, "VmData:")});
+}
+
+std::vector<MemoryUse> image_memory(const Problem& problem) {
+  const Camera& camera = problem.scene().camera;
+  return rendering_memory(problem,
+                          2.5 + replicate_count(problem.experiment().samples.primal, camera.width * camera.height,
+                                                shares_one_image(problem), kMostReplicates));
+}
+
+std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns, int images) {
+  const double image = image_bytes(problem);
+  return {
+      {fmt::format("derivative images of {} unknown{}", columns, columns == 1 ? "" : "s"), image * columns * images},
+      {"derivative images of work partitions", kPartialSums * image * columns}};
+}
+
+std::vector<MemoryUse> run_memory(const Problem& problem) {
+  std::vector<MemoryUse> parts = rendering_memory(problem, 4.5);
+  const double image = image_bytes(problem), unknowns = problem.parameters().size();
+  parts.push_back({"target, residual and adjoint images", 3 * image});
+  if (problem.experiment().optimizer.method != OptimizerMethod::levenberg_marquardt) return parts;
+  parts.push_back(
+      {fmt::format("two halves of the Jacobian of {:.0f} residuals by {:.0f} unknowns", image / 8, unknowns),
+       2 * image * unknowns});
+  for (const MemoryUse& part : derivative_memory(problem, 1, 2)) parts.push_back(part);
+  return parts;
+}
+
+void require_memory(const Problem& problem, const std::vector<MemoryUse>& parts, double available) {
+  double sum = 0;
+  std::string list;
+  for (const MemoryUse& part : parts) {
+    sum += part.bytes;
+    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", part.what, amount(part.bytes));
+  }
+  if (sum <= available) return;
+  const Camera& camera = problem.scene().camera;
+  const int channels = problem.scene().grey ? 1 : 3;
+  throw InputError(
+      fmt::format("{}: needs about {} of memory for {} x {} pixels, {} gate{} and {} channel{} ({}); {} are "
+                  "available: lower resolution or the number of gates",
+                  problem.experiment().file, amount(sum), camera.width, camera.height, problem.gates().size(),
+                  problem.gates().size() == 1 ? "" : "s", channels, channels == 1 ? "" : "s", list,
+                  amount(std::max(0.0, available))));
+}
+
+}  // namespace isochron

@@ -1,0 +1,108 @@
+// How the parameters move vertices and the pivots that they turn about.
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/constants.h"
+#include "optim/problem/parameters.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kDegree = kPi / 180;
+
+/// Rodrigues' formula.
+Vec3 rotate(const Vec3& p, const Vec3& axis, double radians) {
+  const double c = std::cos(radians), s = std::sin(radians);
+  return c * p + s * cross(axis, p) + (1 - c) * dot(axis, p) * axis;
+}
+
+}  // namespace
+
+void Parameters::bind_pivot(const ParameterSpec& spec, Motion& motion, int shape_index) const {
+  motion.pivot = spec.pivot;
+  if (spec.pivot_kind == PivotKind::fixed) return;
+  if (spec.pivot_kind == PivotKind::center) {
+    Vec3 sum;
+    int count = 0;
+    for (std::size_t v = 0; v < motion.slot.size(); ++v) {
+      if (motion.slot[v] < 0) continue;
+      sum += scene_.positions[scene_.shapes[shape_index].first_vertex + v];
+      ++count;
+    }
+    motion.pivot = sum / count;
+  }
+  const std::vector<Motion>& earlier = motions_[shape_index];
+  for (std::size_t m = 0; m < earlier.size(); ++m) {
+    if (earlier[m].type == ParameterType::vertices) continue;
+    bool of_all = true;
+    for (std::size_t v = 0; v < motion.slot.size(); ++v) of_all &= motion.slot[v] < 0 || earlier[m].slot[v] >= 0;
+    if (of_all) motion.carriers.push_back(static_cast<int>(m));
+  }
+}
+
+void Parameters::turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,
+                      std::vector<Moved>* tangent) {
+  const double radians = theta[rotation.first_component] * kDegree;
+  p = pivot.position + rotate(p - pivot.position, rotation.direction, radians);
+  if (!tangent) return;
+  for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, rotation.direction, radians);
+  // p = c + R (p_before - c): what moves the pivot c moves p by (1 - R) dc. What carries a pivot acts on all that turns
+  // about it, so that its column is there.
+  for (const Moved& of_pivot : pivot.velocity) {
+    const Vec3 velocity = of_pivot.velocity - rotate(of_pivot.velocity, rotation.direction, radians);
+    const auto same = std::find_if(tangent->begin(), tangent->end(),
+                                   [&](const Moved& earlier) { return earlier.column == of_pivot.column; });
+    same->velocity += velocity;
+  }
+  tangent->push_back({rotation.first_component, kDegree * cross(rotation.direction, p - pivot.position)});
+}
+
+std::vector<Parameters::CarriedPoint> Parameters::pivots(int shape_index, const std::vector<double>& theta) const {
+  const std::vector<Motion>& motions = motions_[shape_index];
+  std::vector<CarriedPoint> points(motions.size());
+  for (std::size_t m = 0; m < motions.size(); ++m) {
+    CarriedPoint& point = points[m];
+    point.position = motions[m].pivot;
+    for (int carrier : motions[m].carriers) {
+      const Motion& motion = motions[carrier];
+      if (motion.type == ParameterType::rotation) {
+        turn(motion, points[carrier], theta, point.position, &point.velocity);
+      } else {
+        point.position += theta[motion.first_component] * motion.direction;
+        point.velocity.push_back({motion.first_component, motion.direction});
+      }
+    }
+  }
+  return points;
+}
+
+Vec3 Parameters::move(int shape_index, int v, const std::vector<CarriedPoint>& pivots, const std::vector<double>& theta,
+                      std::vector<Moved>* tangent) const {
+  Vec3 p = scene_.positions[scene_.shapes[shape_index].first_vertex + v];
+  for (std::size_t m = 0; m < motions_[shape_index].size(); ++m) {
+    const Motion& motion = motions_[shape_index][m];
+    const int slot = motion.slot[v];
+    if (slot < 0) continue;
+    const auto add = [&](int column, const Vec3& direction) {
+      p += theta[column] * direction;
+      if (tangent) tangent->push_back({column, direction});
+    };
+    if (motion.type == ParameterType::translation) {
+      add(motion.first_component, motion.direction);
+    } else if (motion.type == ParameterType::rotation) {
+      turn(motion, pivots[m], theta, p, tangent);
+    } else if (motion.direction_kind == VertexDirection::free) {
+      for (int axis = 0; axis < 3; ++axis) {
+        Vec3 unit;
+        unit[axis] = 1;
+        add(motion.first_component + 3 * slot + axis, unit);
+      }
+    } else {
+      const bool normal = motion.direction_kind == VertexDirection::normal;
+      add(motion.first_component + slot, normal ? motion.normals[slot] : motion.direction);
+    }
+  }
+  return p;
+}
+
+}  // namespace isochron

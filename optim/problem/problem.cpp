@@ -1,0 +1,271 @@
+#include "optim/problem/problem.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/base/error.h"
+#include "core/scene/coincidence.h"
+#include "core/scene/scene_loader.h"
+#include "optim/problem/loss.h"
+#include "optim/problem/photon_noise.h"
+
+namespace isochron {
+namespace {
+
+Scene load_scene_at(const Experiment& experiment) {
+  Scene scene = load_scene(experiment.scene);
+  if (experiment.resolution[0] > 0) {
+    scene.camera.width = experiment.resolution[0];
+    scene.camera.height = experiment.resolution[1];
+  }
+  return scene;
+}
+
+}  // namespace
+
+Pass pass_of(Term term) {
+  switch (term) {
+    case Term::interior:
+      return Pass::interior;
+    case Term::visibility:
+      return Pass::visibility;
+    case Term::path_length:
+      return Pass::path_length;
+  }
+  throw std::logic_error("unknown term");
+}
+
+SplitImage render_halves(const Renderer& renderer, const Stream& stream, SampleRange range) {
+  if (range.count() < 2) return {renderer.render(stream, range), {}, 1};
+  const int middle = range.begin + (range.count() + 1) / 2;
+  const SampleRange first{range.begin, middle}, second{middle, range.end};
+  return join_halves(renderer.render(stream, first), first.count(), renderer.render(stream, second), second.count());
+}
+
+void ImageMean::add(const GatedImage& image, int samples) {
+  if (samples_ == 0) sum_ = GatedImage(image.width, image.height, image.gates, image.channels);
+  for (std::size_t i = 0; i < image.data.size(); ++i) sum_.data[i] += samples * image.data[i];
+  samples_ += samples;
+}
+
+GatedImage ImageMean::mean() const {
+  GatedImage mean = sum_;
+  for (double& value : mean.data) value /= static_cast<double>(samples_);
+  return mean;
+}
+
+void set_loss(const LossEstimate& estimate, Evaluation& into) {
+  into.loss = estimate.value;
+  into.loss_noise = estimate.noise;
+  into.mean_squared_error = estimate.mean_squared_error;
+  into.mean_squared_error_noise = estimate.mean_squared_error_noise;
+}
+
+Problem::Problem(Experiment experiment, const std::function<void(const std::string&)>& warning)
+    : experiment_(std::move(experiment)),
+      scene_(load_scene_at(experiment_)),
+      gates_(make_gates(experiment_.gates)),
+      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)),
+      evaluations_(std::max(1, experiment_.optimizer.iterations)) {
+  for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
+    const ParameterSpec& spec = experiment_.parameters[i];
+    const Parameters::Block& block = parameters_->blocks()[i];
+    if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
+    if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
+  }
+  if (!can_render(parameters_->initial()) || (parameters_->target_known() && !can_render(parameters_->target())))
+    throw InputError(
+        fmt::format("{}: parameters: initial or target values put a vertex too far away (allowed: "
+                    "coordinates of at most {})",
+                    experiment_.file, kLargestCoordinate));
+  if (!warning) return;
+  std::string coincidences = coincidence_warning(parameters_->apply(parameters_->initial()));
+  if (coincidences.empty() && parameters_->target_known())
+    coincidences = coincidence_warning(parameters_->apply(parameters_->target()));
+  if (!coincidences.empty()) warning(experiment_.scene + ": " + coincidences);
+}
+
+const EstimatorOptions& Problem::estimator(Purpose purpose) const {
+  auto& known = estimator_[purpose == Purpose::gradients];
+  if (!known) {
+    EstimatorOptions options = experiment_.estimator;
+    const std::vector<double> theta = parameters_->initial();
+    const Scene scene = parameters_->apply(theta);
+    const TangentBasis basis = parameters_->tangent(theta);
+    const SampleSpec& samples = experiment_.samples;
+    Job job{0, double{1} * samples.interior, double{1} * samples.path_length};
+    if (purpose == Purpose::gradients) {
+      const double images =
+          experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;
+      job = {evaluations_ * images * samples.primal, evaluations_ * job.interior, evaluations_ * job.path_length};
+      if (experiment_.target.images.empty()) job.image += experiment_.target.samples;
+    }
+    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose, job);
+    known = options;
+  }
+  return *known;
+}
+
+const EstimatorOptions& Problem::image_estimator() const {
+  if (!image_estimator_) {
+    EstimatorOptions options = experiment_.estimator;
+    options.mix = measure_mix(parameters_->apply(parameters_->initial()), gates_, options, nullptr, stream(Pass::mix),
+                              Purpose::images, {double{1} * experiment_.samples.primal, 0, 0});
+    image_estimator_ = options;
+  }
+  return *image_estimator_;
+}
+
+void Problem::require_parameters() const {
+  if (experiment_.parameters.empty())
+    throw InputError(experiment_.file + ": parameters: there is none (at least one is needed here)");
+}
+
+bool Problem::can_render(const std::vector<double>& theta) const {
+  return coordinates_fit(parameters_->apply(theta));
+}
+
+Evaluation Problem::no_evaluation(const GatedImage& target) const {
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  Evaluation result;
+  result.image = target;
+  std::fill(result.image.data.begin(), result.image.data.end(), kNothing);
+  result.loss = result.mean_squared_error = std::numeric_limits<double>::infinity();
+  result.gradient.assign(static_cast<std::size_t>(parameters_->size()), kNothing);
+  return result;
+}
+
+GatedImage Problem::render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const {
+  if (!can_render(theta))
+    throw InputError(fmt::format("{}: a vertex would be rendered too far away (allowed: coordinates of at most {})",
+                                 experiment_.file, kLargestCoordinate));
+  const Scene scene = parameters_->apply(theta);
+  return Renderer(scene, gates_, estimator()).render(stream, range);
+}
+
+GatedImage Problem::read_target(const std::string& file) const {
+  GatedImage image = read_exr(file);
+  const Camera& camera = scene_.camera;
+  const auto require = [&](bool equal, const std::string& found, const std::string& wanted) {
+    if (!equal)
+      throw InputError(fmt::format("{}: {} in the target images (the experiment has {})", file, found, wanted));
+  };
+  require(image.width == camera.width && image.height == camera.height,
+          fmt::format("{} x {} pixels", image.width, image.height),
+          fmt::format("{} x {}", camera.width, camera.height));
+  require(image.gates == gates_.size(), fmt::format("{} gates", image.gates), fmt::format("{}", gates_.size()));
+  const int channels = scene_.grey ? 1 : 3;
+  require(image.channels == channels, image.channels == 1 ? "one grey channel (Y)" : "three channels (R, G, B)",
+          channels == 1 ? "one grey channel, Y" : "three channels, R, G and B");
+  return image;
+}
+
+GatedImage Problem::make_target(const Poll& poll) const {
+  const TargetSpec& target = experiment_.target;
+  if (!target.images.empty()) return read_target(target.images);
+  // Rendered in parts so that a request to stop does not wait for thousands of samples per pixel.
+  const int parts = std::min(32, target.samples);
+  const Stream stream{target.seed, 0, pass_number(Pass::target)};
+  const Scene scene = parameters_->apply(parameters_->target());
+  EstimatorOptions options = estimator();
+  options.max_bounces = target.max_bounces;
+  const Renderer renderer(scene, gates_, options);
+  ImageMean mean;
+  ProgressStage stage("rendering the target", parts);
+  for (int i = 0; i < parts; ++i) {
+    const SampleRange range = Share{i, parts}.of(target.samples);
+    mean.add(renderer.render(stream, range), range.count());
+    stage.advance();
+    poll();
+  }
+  GatedImage image = mean.mean();
+  if (target.photons > 0) add_photon_noise(image, target.photons, {target.seed, 0, pass_number(Pass::photon_noise)});
+  return image;
+}
+
+RobustLoss Problem::robust_loss(const GatedImage& target) const {
+  const double scale = experiment_.loss.scale * std::sqrt(mean_square(target));
+  return scale > 0 ? RobustLoss{experiment_.loss.kind, scale} : RobustLoss{};
+}
+
+LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
+  LossEstimate estimate = estimate_loss(image, target, robust_loss(target));
+  if (!penalty_.empty()) estimate.value += mean_square(target) * penalty_.value(theta);
+  return estimate;
+}
+
+EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) const {
+  constexpr double kLearningShare = 0.06;
+  EstimatorOptions options = estimator(purpose);
+  if (experiment_.guiding) options.guiding_samples = kLearningShare * visibility_samples;
+  return options;
+}
+
+Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
+                             const Poll& poll, Share share, std::vector<std::vector<double>>* parts) const {
+  if (!can_render(theta)) return no_evaluation(target);
+  const SampleSpec& samples = experiment_.samples;
+  const Scene scene = parameters_->apply(theta);
+  const TangentBasis basis = parameters_->tangent(theta);
+  const Renderer renderer(scene, gates_, estimator(share.of(samples.visibility).count()), &basis);
+  Evaluation result;
+  const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
+  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
+  ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
+  SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
+  stage.advance();
+  set_loss(loss(image, target, theta), result);
+  const GatedImage adjoint = loss_adjoint(image, target, robust_loss(target));
+  result.image = std::move(image.image);
+  poll();
+  if (differences) {
+    if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
+    for (int i = 0; i < parameters_->size(); ++i) {
+      const GatedImage derivative =
+          finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(samples.primal));
+      result.gradient.push_back(inner_product(adjoint, derivative));
+      stage.advance();
+      const std::size_t values = derivative.data.size() / derivative.pixels();
+      for (std::size_t k = 0; parts && k < derivative.data.size(); ++k)
+        (*parts)[k / values % kGradientParts][i] += adjoint.data[k] * derivative.data[k];
+      poll();
+    }
+    penalty_.add_gradient(theta, mean_square(target), result.gradient);
+    return result;
+  }
+  std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
+  for (Term term : kTerms) {
+    const SampleRange range = share.of(samples.term(term));
+    if (range.count() == 0) continue;
+    std::vector<std::vector<double>> of_term;
+    renderer.add_gradient(term, adjoint, stream(pass_of(term), iteration), range, dof_gradient,
+                          parts ? &of_term : nullptr);
+    if (parts) parts->insert(parts->end(), of_term.begin(), of_term.end());
+    stage.advance();
+    poll();
+  }
+  result.gradient = basis.transpose_apply(dof_gradient);
+  penalty_.add_gradient(theta, mean_square(target), result.gradient);
+  return result;
+}
+
+GatedImage Problem::finite_difference(const std::vector<double>& theta, int component, const Stream& stream,
+                                      SampleRange range) const {
+  std::vector<double> above = theta, below = theta;
+  const double step = experiment_.gradient.step;
+  above[component] = std::min(theta[component] + step, parameters_->upper()[component]);
+  below[component] = std::max(theta[component] - step, parameters_->lower()[component]);
+  GatedImage difference = render(above, stream, range);
+  Stream of_lower = stream;
+  if (!experiment_.gradient.common_numbers) of_lower.pass = pass_number(Pass::other_side);
+  const GatedImage lower = render(below, of_lower, range);
+  const double distance = above[component] - below[component];
+  for (std::size_t i = 0; i < difference.data.size(); ++i)
+    difference.data[i] = (difference.data[i] - lower.data[i]) / distance;
+  return difference;
+}
+
+}  // namespace isochron

@@ -1,0 +1,153 @@
+// An experiment made ready: scene, gates and parameters, and what the optimiser asks of them.
+#pragma once
+#include <array>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/base/progress.h"
+#include "core/gates/gate.h"
+#include "core/image/image.h"
+#include "core/render/measure_mix.h"
+#include "core/scene/scene.h"
+#include "optim/experiment/experiment.h"
+#include "optim/problem/loss.h"
+#include "optim/problem/objective.h"
+#include "optim/problem/parameters.h"
+#include "optim/problem/smoothing.h"
+
+namespace isochron {
+
+/// Random streams (Stream::pass). Each estimate has its own, so that residual and derivative are independent.
+enum class Pass : std::uint32_t {
+  primal = 0,
+  interior = 1,
+  visibility = 2,
+  path_length = 3,
+  target = 4,
+  finite_difference = 5,
+  photon_noise = 6,
+  mix = 7,
+  other_side = 8  ///< of a finite difference, where its images take random numbers of their own
+};
+
+/// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.
+struct Share {
+  int index = 0, parts = 1;
+  SampleRange of(int samples) const {
+    const auto cut = [&](int i) { return static_cast<int>(static_cast<long long>(samples) * i / parts); };
+    return {cut(index), cut(index + 1)};
+  }
+};
+
+/// Called between the passes of an estimate. May throw to abandon it (see Interrupted).
+using Poll = std::function<void()>;
+
+class Problem {
+ public:
+  /// Loads the scene and binds the parameters. Throws InputError. `warning` receives one line where shapes
+  /// lie on each other at the initial or the target values.
+  explicit Problem(Experiment experiment, const std::function<void(const std::string&)>& warning = {});
+
+  const Experiment& experiment() const { return experiment_; }
+  const Scene& scene() const { return scene_; }
+  const GateSet& gates() const { return gates_; }
+  const Parameters& parameters() const { return *parameters_; }
+  const Preconditioner& preconditioner() const { return preconditioner_; }
+  /// Of the offsets' slopes, to be multiplied by the target's mean square.
+  const PairPenalty& penalty() const { return penalty_; }
+
+  /// The experiment's, with the mix of techniques that automatic sampling settles on, once for all values of the
+  /// parameters: by a trial at their initial values, in proportion to the work that it decides about. For gradients that is
+  /// an optimisation of the experiment's iterations with its target, so that it is the same for a resumed one; for
+  /// derivative images (Purpose::images) the experiment's samples once.
+  const EstimatorOptions& estimator(Purpose purpose = Purpose::gradients) const;
+  /// The same to render the experiment's images once, and nothing else.
+  const EstimatorOptions& image_estimator() const;
+  /// Gradients at so many points are all that is asked for, not an optimisation. Before any of them.
+  void set_evaluations(int evaluations) { evaluations_ = evaluations; }
+
+  /// Takes the place of the experiment's numbers of samples; what automatic sampling has settled on stays.
+  void set_samples(const SampleSpec& samples) { experiment_.samples = samples; }
+
+  /// Throws InputError when the experiment has no parameters: nothing to differentiate.
+  void require_parameters() const;
+
+  Stream stream(Pass pass, std::uint32_t iteration = 0) const {
+    return {experiment_.seed, iteration, pass_number(pass)};
+  }
+
+  /// Whether theta leaves all coordinates at sizes that can be rendered (kLargestCoordinate).
+  bool can_render(const std::vector<double>& theta) const;
+  /// What `evaluate` gives where it does not: infinite loss, an image and a gradient of NaN.
+  Evaluation no_evaluation(const GatedImage& target) const;
+
+  /// Gated images at theta. Throws InputError where it cannot be rendered.
+  GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
+
+  /// The images that the optimisation aims at: rendered at the target values, with photon noise where it is
+  /// asked for, or read from a file. Throws InputError when the file's shape is not that of this experiment's
+  /// images.
+  GatedImage make_target(const Poll& poll) const;
+  /// Reads a target image and checks its shape against this experiment's.
+  GatedImage read_target(const std::string& file) const;
+
+  /// The experiment's options for a renderer that will take so many visibility samples per pixel: guiding learns from
+  /// a small share of their number.
+  EstimatorOptions estimator(int visibility_samples, Purpose purpose = Purpose::gradients) const;
+
+  /// The experiment's loss, made absolute by the target's root mean square. Squared where the target is
+  /// black.
+  RobustLoss robust_loss(const GatedImage& target) const;
+
+  /// Loss of an image rendered at theta, the penalty included.
+  LossEstimate loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const;
+
+  /// Image, loss and gradient at theta from the random numbers of one iteration, unbiased (robust losses: as loss.h
+  /// says). The loss is NaN where the share has a single sample of the image.
+  /// `parts`, where asked for, becomes what terms and sets of pixels contribute to the gradient, the penalty aside:
+  /// [part][unknown], the same terms and pixels whatever the share.
+  Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
+                      const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
+
+  /// Central difference of the images along one unknown with common random numbers. Where theta +- step
+  /// leaves the bounds, the difference is taken between the bound and the other side.
+  GatedImage finite_difference(const std::vector<double>& theta, int component, const Stream& stream,
+                               SampleRange range) const;
+
+ private:
+  static std::uint32_t pass_number(Pass pass) { return static_cast<std::uint32_t>(pass); }
+
+  Experiment experiment_;
+  Scene scene_;
+  GateSet gates_;
+  std::unique_ptr<Parameters> parameters_;
+  Preconditioner preconditioner_;
+  PairPenalty penalty_;
+  int evaluations_;                                                   ///< of the loss gradient
+  mutable std::array<std::optional<EstimatorOptions>, 2> estimator_;  ///< per purpose
+  mutable std::optional<EstimatorOptions> image_estimator_;
+};
+
+Pass pass_of(Term term);
+
+/// Gated images from two halves of a range, each of which is a range by itself: independent of each other, with
+/// low-discrepancy numbers of their own. The first half has one sample more where their number is odd.
+SplitImage render_halves(const Renderer& renderer, const Stream& stream, SampleRange range);
+
+void set_loss(const LossEstimate& estimate, Evaluation& into);
+
+/// Average of images weighted by their samples.
+class ImageMean {
+ public:
+  void add(const GatedImage& image, int samples);
+  GatedImage mean() const;
+
+ private:
+  GatedImage sum_;
+  long long samples_ = 0;
+};
+
+}  // namespace isochron

@@ -1,0 +1,41 @@
+// The loss of an experiment's images as the optimisers see it.
+#pragma once
+#include "optim/problem/objective.h"
+#include "optim/problem/problem.h"
+
+namespace isochron {
+
+/// The most that linearise() and a step on its result may take, in bytes: two halves of the Jacobian, residuals x
+/// unknowns, and matrices of unknowns x unknowns.
+inline constexpr double kMostLinearisationBytes = 2e9;
+
+/// Throws InputError when the experiment's method is Levenberg-Marquardt and that would be more.
+void require_jacobian_fits(const Problem& problem);
+
+/// Throws InputError when the image has a single sample per pixel, of which no loss can be estimated without bias.
+void require_two_samples(const Problem& problem);
+
+class RenderedObjective : public Objective {
+ public:
+  /// All must outlive this. `poll` is called between passes; what it throws leaves every function.
+  RenderedObjective(const Problem& problem, const GatedImage& target, Poll poll)
+      : problem_(problem), target_(target), poll_(std::move(poll)) {}
+
+  const std::vector<double>& lower() const override { return problem_.parameters().lower(); }
+  const std::vector<double>& upper() const override { return problem_.parameters().upper(); }
+  /// From two halves of the image's samples, as all losses here; see loss.h.
+  double loss(const std::vector<double>& theta, std::uint32_t iteration) const override;
+  Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
+  /// Each term's samples are cut into two halves, an odd number rounded up. The Jacobian is rendered for a
+  /// group of unknowns at a time, each time from the same random numbers.
+  Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
+
+ private:
+  SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;
+
+  const Problem& problem_;
+  const GatedImage& target_;
+  Poll poll_;
+};
+
+}  // namespace isochron

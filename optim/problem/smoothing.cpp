@@ -1,0 +1,113 @@
+#include "optim/problem/smoothing.h"
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <array>
+#include <stdexcept>
+
+namespace isochron {
+namespace {
+
+/// Edges between vertices of the field, as places in it.
+std::vector<std::array<int, 2>> edges_of(const Scene& scene, const Parameters::VertexField& field) {
+  std::vector<int> place(scene.positions.size(), -1);
+  for (std::size_t i = 0; i < field.vertices.size(); ++i) place[field.vertices[i]] = static_cast<int>(i);
+  std::vector<std::array<int, 2>> edges;
+  for (const Edge& edge : scene.edges) {
+    const int a = place[edge.vertex[0]], b = place[edge.vertex[1]];
+    if (a >= 0 && b >= 0) edges.push_back({a, b});
+  }
+  return edges;
+}
+
+}  // namespace
+
+struct Preconditioner::Impl {
+  struct Diffusion {
+    int begin, stride, count;  ///< of unknowns; `stride` fields of `count` vertices each, interleaved
+    Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors;
+  };
+  std::vector<std::unique_ptr<Diffusion>> diffusions;
+  std::vector<Parameters::Block> blocks;
+};
+
+Preconditioner::Preconditioner() : impl_(std::make_unique<Impl>()) {}
+Preconditioner::~Preconditioner() = default;
+Preconditioner::Preconditioner(Preconditioner&&) noexcept = default;
+
+bool Preconditioner::empty() const {
+  return impl_->diffusions.empty();
+}
+const std::vector<Parameters::Block>& Preconditioner::blocks() const {
+  return impl_->blocks;
+}
+
+void Preconditioner::add_diffusion(const Scene& scene, const Parameters::VertexField& field, double lambda) {
+  const int count = static_cast<int>(field.vertices.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < count; ++i) entries.emplace_back(i, i, 1.0);
+  for (const auto& [a, b] : edges_of(scene, field)) {
+    entries.emplace_back(a, a, lambda);
+    entries.emplace_back(b, b, lambda);
+    entries.emplace_back(a, b, -lambda);
+    entries.emplace_back(b, a, -lambda);
+  }
+  Eigen::SparseMatrix<double> matrix(count, count);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  auto diffusion = std::make_unique<Impl::Diffusion>();
+  diffusion->begin = field.begin;
+  diffusion->stride = field.stride;
+  diffusion->count = count;
+  diffusion->factors.compute(matrix);
+  if (diffusion->factors.info() != Eigen::Success) throw std::logic_error("diffusion: the matrix is not definite");
+  impl_->diffusions.push_back(std::move(diffusion));
+  impl_->blocks.push_back({field.name, field.begin, field.stride * count});
+}
+
+void Preconditioner::apply(std::vector<double>& values) const {
+  for (const auto& diffusion : impl_->diffusions)
+    for (int axis = 0; axis < diffusion->stride; ++axis) {
+      Eigen::Map<Eigen::VectorXd, 0, Eigen::InnerStride<>> field(
+          values.data() + diffusion->begin + axis, diffusion->count, Eigen::InnerStride<>(diffusion->stride));
+      const Eigen::VectorXd smooth = diffusion->factors.solve(Eigen::VectorXd(field));
+      field = smooth;
+    }
+}
+
+void PairPenalty::add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight) {
+  const auto edges = edges_of(scene, field);
+  for (const auto& [a, b] : edges) {
+    const Vec3 along = scene.positions[field.vertices[a]] - scene.positions[field.vertices[b]];
+    const double w = weight * field.unit * field.unit / (dot(along, along) * static_cast<double>(edges.size()));
+    for (int axis = 0; axis < field.stride; ++axis)
+      pairs_.push_back({field.begin + field.stride * a + axis, field.begin + field.stride * b + axis, w});
+  }
+}
+
+double PairPenalty::value(const std::vector<double>& theta) const {
+  double sum = 0;
+  for (const Pair& p : pairs_) sum += p.weight * (theta[p.a] - theta[p.b]) * (theta[p.a] - theta[p.b]);
+  return sum;
+}
+
+void PairPenalty::add_gradient(const std::vector<double>& theta, double scale, std::vector<double>& gradient) const {
+  for (const Pair& p : pairs_) {
+    const double slope = 2 * scale * p.weight * (theta[p.a] - theta[p.b]);
+    gradient[p.a] += slope;
+    gradient[p.b] -= slope;
+  }
+}
+
+void PairPenalty::add_curvature(int unknowns, double scale, std::vector<double>& curvature) const {
+  const auto n = static_cast<std::size_t>(unknowns);
+  for (const Pair& p : pairs_) {
+    const auto a = static_cast<std::size_t>(p.a), b = static_cast<std::size_t>(p.b);
+    const double w = 2 * scale * p.weight;
+    curvature[a * n + a] += w;
+    curvature[b * n + b] += w;
+    curvature[a * n + b] -= w;
+    curvature[b * n + a] -= w;
+  }
+}
+
+}  // namespace isochron

@@ -1,0 +1,54 @@
+// For offsets of many vertices: a penalty on uneven offsets, and diffusion of gradients over the mesh.
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "optim/problem/parameters.h"
+
+namespace isochron {
+
+/// A symmetric positive definite matrix applied to some blocks of the unknowns; the others are left alone.
+class Preconditioner {
+ public:
+  Preconditioner();
+  ~Preconditioner();
+  Preconditioner(Preconditioner&&) noexcept;
+  /// Diffusion over the mesh, (I + lambda L)^-1, for one parameter; L is the graph Laplacian of its vertices:
+  /// the degree on the diagonal, -1 for each edge of the mesh between two of them. Constants stay as they
+  /// are, and so do the offsets of a vertex without neighbours. Each axis of free vertices diffuses by
+  /// itself. lambda > 0, dimensionless: details of up to about sqrt(lambda) edges are smoothed.
+  void add_diffusion(const Scene& scene, const Parameters::VertexField& field, double lambda);
+  bool empty() const;
+  /// In place, theta's size.
+  void apply(std::vector<double>& values) const;
+  /// Blocks [begin, begin + count) of unknowns that it acts on.
+  const std::vector<Parameters::Block>& blocks() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Sum over pairs of weight (theta_a - theta_b)^2.
+class PairPenalty {
+ public:
+  /// Adds `weight` times the mean, over the mesh's edges between selected vertices, of (change of offset /
+  /// length)^2, with the lengths of the loaded mesh: the squared slope of the offsets, dimensionless.
+  void add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight);
+  bool empty() const { return pairs_.empty(); }
+  double value(const std::vector<double>& theta) const;
+  /// Adds scale times the gradient.
+  void add_gradient(const std::vector<double>& theta, double scale, std::vector<double>& gradient) const;
+  /// Adds scale times the second derivative, n x n row after row.
+  void add_curvature(int unknowns, double scale, std::vector<double>& curvature) const;
+
+ private:
+  struct Pair {
+    int a, b;
+    double weight;
+  };
+  std::vector<Pair> pairs_;
+};
+
+}  // namespace isochron

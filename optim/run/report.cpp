@@ -1,0 +1,92 @@
+#include "optim/run/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+
+namespace isochron {
+namespace {
+
+constexpr int kMostRows = 3;
+
+struct Row {
+  std::string name;
+  double initial, found, target, error, initial_error;  ///< NaN: unknown
+};
+
+double root_mean_square(const std::vector<double>& values, const Parameters::Block& block) {
+  double sum = 0;
+  for (int i = block.begin; i < block.begin + block.count; ++i) sum += values[i] * values[i];
+  return std::sqrt(sum / block.count);
+}
+
+std::vector<Row> rows_of(const Parameters& parameters, const std::vector<double>& theta) {
+  const std::vector<double>&initial = parameters.initial(), &target = parameters.target();
+  std::vector<double> error(theta.size()), initial_error(theta.size());
+  for (std::size_t i = 0; i < theta.size(); ++i) {
+    error[i] = theta[i] - target[i];
+    initial_error[i] = initial[i] - target[i];
+  }
+  std::vector<Row> rows;
+  for (const Parameters::Block& block : parameters.blocks()) {
+    if (block.count > kMostRows) {
+      const auto rms = [&](const std::vector<double>& values) { return root_mean_square(values, block); };
+      rows.push_back({fmt::format("{} (rms of {})", block.name, block.count), rms(initial), rms(theta), rms(target),
+                      rms(error), rms(initial_error)});
+      continue;
+    }
+    for (int i = block.begin; i < block.begin + block.count; ++i)
+      rows.push_back({parameters.component_names()[i], initial[i], theta[i], target[i], error[i], initial_error[i]});
+  }
+  return rows;
+}
+
+std::string table(const std::vector<Row>& rows) {
+  std::size_t width = std::string("parameter").size();
+  for (const Row& row : rows) width = std::max(width, row.name.size());
+  const auto number = [](double value) { return std::isnan(value) ? std::string("-") : fmt::format("{:.5g}", value); };
+  std::string text;
+  const auto line = [&](const std::string& name, const std::array<std::string, 5>& cells) {
+    text += fmt::format("  {:<{}}", name, width);
+    for (const std::string& cell : cells) text += fmt::format("  {:>13}", cell);
+    text += "\n";
+  };
+  line("parameter", {"initial", "found", "target", "error", "initial error"});
+  for (const Row& row : rows)
+    line(row.name,
+         {number(row.initial), number(row.found), number(row.target), number(row.error), number(row.initial_error)});
+  return text;
+}
+
+}  // namespace
+
+std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
+                       const Parameters& parameters) {
+  const int rejected = state.safeguard.rejected + state.steps_rejected;
+  std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {}\n", name(result.status),
+                                 state.iteration, std::max(state.seconds, last.seconds),
+                                 rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice));
+  text += table(rows_of(parameters, state.theta));
+  auto out = std::back_inserter(text);
+  if (!std::isnan(last.loss)) {
+    fmt::format_to(out, "  loss {:.3g} +- {:.2g} (at the start {:.3g} +- {:.2g}){}\n", last.loss, last.loss_noise,
+                   state.loss_initial, state.loss_noise_initial,
+                   last.loss < 2 * last.loss_noise ? ": it cannot be told from 0" : "");
+    const LossSpread spread = loss_spread(state.descent);
+    if (!std::isnan(spread.noise_share))
+      fmt::format_to(out, "  noise makes {:.0f} % of the loss's variance over the last {} iterations\n",
+                     100 * spread.noise_share, spread.rows);
+    fmt::format_to(out, "  image RMSE {:.3g} (at the start {:.3g})\n", last.image_rmse, state.image_rmse_initial);
+  }
+  return text;
+}
+
+std::string files_to_look_at(const std::string& folder, bool plots) {
+  return fmt::format("  {}: summary.yaml, log.csv, final.exr beside target.exr and initial.exr{}\n", folder,
+                     plots ? ", PNGs of them, rmse.png" : "");
+}
+
+}  // namespace isochron

@@ -1,0 +1,20 @@
+// What a run found, as text for the screen.
+#pragma once
+#include <string>
+
+#include "optim/experiment/experiment.h"
+#include "optim/run/log.h"
+#include "optim/run/loop.h"
+
+namespace isochron {
+
+/// A table of the parameters and lines about loss and noise, each ended by a newline. `last` and `state` as in
+/// summary_yaml. A parameter with at most 3 components has a row for each; one with more has one row, with root mean
+/// squares over its components in all columns. Targets and errors that are unknown are left out.
+std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
+                       const Parameters& parameters);
+
+/// One line: the files of a run's folder to look at; `plots`: whether they have been drawn.
+std::string files_to_look_at(const std::string& folder, bool plots);
+
+}  // namespace isochron

@@ -1,0 +1,188 @@
+#include "optim/run/run.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "core/base/error.h"
+#include "core/image/image.h"
+#include "optim/experiment/files.h"
+#include "optim/problem/darkness.h"
+#include "optim/problem/loss.h"
+#include "optim/problem/memory.h"
+#include "optim/problem/problem.h"
+#include "optim/problem/rendered_objective.h"
+#include "optim/problem/vector_math.h"
+#include "optim/run/checkpoint.h"
+#include "optim/run/geometry_files.h"
+#include "optim/run/inputs.h"
+#include "optim/run/log.h"
+#include "optim/run/report.h"
+#include "optim/run/run_folder.h"
+#include "optim/run/summary.h"
+
+namespace isochron {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+class Run {
+ public:
+  Run(const Problem& problem, const RunOptions& options)
+      : problem_(problem), parameters_(problem.parameters()), options_(options) {}
+
+  RunStatus execute() {
+    std::string warning;
+    const auto saved = load_checkpoint(options_.folder, parameters_, &warning);
+    if (!warning.empty() && options_.warning) options_.warning(warning);
+    if (saved) state_ = *saved;
+    if (!saved) state_.theta = parameters_.initial();
+    last_.loss = last_.loss_noise = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
+    LoopResult result;
+    try {
+      load_target();
+      result = optimise();
+    } catch (const Interrupted&) {
+      save_checkpoint(options_.folder, state_, parameters_);
+      result.status = RunStatus::interrupted;
+    }
+    write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_));
+    if (options_.report) options_.report(run_report(result, state_, last_, parameters_));
+    return result.status;
+  }
+
+ private:
+  std::string path(const char* file) const { return options_.folder + "/" + file; }
+
+  void poll() const {
+    if (options_.stop && options_.stop()) throw Interrupted{};
+  }
+
+  void load_target() {
+    const std::string file = path("target.exr");
+    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
+    target_ = problem_.read_target(file);
+  }
+
+  LoopResult optimise() {
+    const OptimizerSpec& spec = problem_.experiment().optimizer;
+    const RenderedObjective objective(problem_, target_, [this] { poll(); });
+    const auto optimizer = make_optimizer(spec, problem_.preconditioner(), parameters_.scales());
+    const GeometryFiles geometry(options_.folder, problem_.experiment().output, parameters_);
+    if (state_.iteration == 0) geometry.write("target", parameters_.target());
+    Log log(path("log.csv"), parameters_, state_.iteration);
+    GatedImage final_image;
+    const Clock::time_point call_start = Clock::now();
+    Clock::time_point iteration_start = call_start;
+    const int first = state_.iteration;
+    LoopOptions loop;
+    loop.iterations = spec.iterations;
+    loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_));
+    loop.warning = options_.warning;
+    loop.row = [&](const Evaluation& now, const std::vector<double>& theta, bool closing) {
+      last_ = {state_.iteration + (closing ? 1 : 0),
+               state_.seconds + seconds_since(iteration_start),
+               now.loss,
+               root_mean_square_error(now.mean_squared_error),
+               parameters_.distance_to_target(theta),
+               scaled_norm(now.gradient),
+               now.loss_noise};
+      if (last_.iteration == 0) {
+        write_exr(path("initial.exr"), now.image, notes_);
+        geometry.write("initial", theta);
+        if (const std::string dark = darkness_warning(problem_, theta, now.image, target_);
+            options_.warning && !dark.empty())
+          options_.warning(dark);
+        state_.image_rmse_initial = last_.image_rmse;
+        state_.param_rmse_initial = last_.param_rmse;
+      }
+      if (!closing) geometry.write_iteration(last_.iteration, theta);
+      log.append(last_, theta, now.gradient);
+      final_image = now.image;
+      if (!closing) report(first, seconds_since(call_start));
+    };
+    loop.save = [&] {
+      state_.seconds += seconds_since(iteration_start);
+      iteration_start = Clock::now();
+      save_checkpoint(options_.folder, state_, parameters_);
+      poll();
+    };
+    ProgressStage stage("optimising", std::max(1, spec.iterations - first));
+    loop.save = [&, save = loop.save] {
+      save();
+      stage.advance();
+    };
+    const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
+    geometry.write("final", state_.theta);
+    write_exr(path("final.exr"), final_image, notes_);
+    return result;
+  }
+
+  double scaled_norm(std::vector<double> gradient) const {
+    const std::vector<double> scales = parameters_.scales();
+    for (std::size_t i = 0; i < gradient.size(); ++i) gradient[i] *= scales[i];
+    return norm(gradient);
+  }
+
+  void report(int first, double seconds) const {
+    if (!options_.progress) return;
+    const int iterations = problem_.experiment().optimizer.iterations;
+    const double each = seconds / (state_.iteration - first + 1);
+    options_.progress(
+        {state_.iteration, iterations, last_.loss, last_.param_rmse, each, each * (iterations - state_.iteration)});
+  }
+
+  const Problem& problem_;
+  const Parameters& parameters_;
+  const RunOptions& options_;
+  const ExrNotes notes_ = exr_notes(problem_.experiment().gates);
+  Checkpoint state_;
+  GatedImage target_;
+  LogRow last_;
+};
+
+/// Goes on in a locked folder that holds a run.
+RunStatus go_on(const RunOptions& options, const std::function<void(const std::string&)>& warning_of_scene) {
+  const Problem problem(load_experiment(options.folder + "/experiment.yaml"), warning_of_scene);
+  problem.require_parameters();
+  require_two_samples(problem);
+  require_jacobian_fits(problem);
+  return Run(problem, options).execute();
+}
+
+}  // namespace
+
+RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
+  {
+    const Problem problem(experiment, options.warning);
+    problem.require_parameters();
+    require_two_samples(problem);
+    require_jacobian_fits(problem);
+    require_memory(problem, run_memory(problem));
+  }
+  const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
+  const FolderLock lock = prepare_run_folder(options.folder, options.force, options.warning);
+  Experiment copied = experiment;
+  write_inputs(options.folder, inputs, copied);
+  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  // As a resumed run does, so that both see the same to the last bit.
+  return go_on(options, {});
+}
+
+RunStatus resume_run(const RunOptions& options) {
+  if (!std::filesystem::exists(options.folder + "/experiment.yaml"))
+    throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
+  make_output_folder(options.folder);
+  const FolderLock lock(options.folder, options.warning);
+  check_inputs(options.folder, options.warning);
+  return go_on(options, options.warning);
+}
+
+}  // namespace isochron

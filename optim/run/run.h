@@ -1,0 +1,42 @@
+// A run and its folder: the loop of loop.h with files. See checkpoint.h for what survives a kill, log.h for
+// the rows of log.csv.
+//
+// Order of writing: inputs/ (see inputs.h), experiment.yaml, target.exr, then per iteration the log's row and the checkpoint (before
+// them, in iteration 0, initial.exr), at last geometry/final_SHAPE, final.exr and summary.yaml. Every random number depends on
+// (seed, iteration, pass) alone and the target is used as target.exr holds it (rounded to float), so a run
+// that was killed anywhere and resumed gives the same bits.
+#pragma once
+#include <functional>
+#include <string>
+
+#include "optim/experiment/experiment.h"
+#include "optim/run/loop.h"
+
+namespace isochron {
+
+struct Progress {
+  int iteration = 0, iterations = 0;
+  double loss = 0;
+  double param_rmse = 0;             ///< NaN where unknown
+  double seconds_per_iteration = 0;  ///< average of this call
+  double seconds_left = 0;
+};
+
+struct RunOptions {
+  std::string folder;
+  bool force = false;                               ///< overwrite a run that the folder holds (else it is moved aside)
+  std::function<bool()> stop;                       ///< asked between passes; true: leave a checkpoint and return
+  std::function<void(const Progress&)> progress;    ///< after every row of the log
+  std::function<void(const std::string&)> warning;  ///< one line
+  std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
+};
+
+/// Optimises from the initial values. Throws InputError, before any rendering, when the experiment does not
+/// fit its scene, has no parameters, or the folder cannot be written or holds a run already.
+RunStatus start_run(const Experiment& experiment, const RunOptions& options);
+
+/// Goes on from the last checkpoint of options.folder, or from the start when there is none yet. Throws
+/// InputError when the folder holds no run.
+RunStatus resume_run(const RunOptions& options);
+
+}  // namespace isochron

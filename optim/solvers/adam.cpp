@@ -1,0 +1,43 @@
+#include "optim/solvers/adam.h"
+
+#include "optim/solvers/optimizer.h"
+
+namespace isochron {
+namespace {
+
+class Adam : public Optimizer {
+ public:
+  Adam(double learning_rate, const Preconditioner& preconditioner, const RateDecay& decay)
+      : learning_rate_(learning_rate), preconditioner_(preconditioner), decay_(decay) {}
+
+  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+                           std::uint32_t iteration, double rate) override {
+    std::vector<double> next = theta;
+    const double factor = rate * decay_.factor(static_cast<int>(iteration));
+    adam_step({.learning_rate = learning_rate_ * factor}, now.gradient, objective.lower(), objective.upper(), state_,
+              next, preconditioner_);
+    return next;
+  }
+  void reset() override { state_ = {}; }
+  OptimizerState state() const override {
+    return {{"steps", {static_cast<double>(state_.steps)}}, {"m", state_.m}, {"v", state_.v}};
+  }
+  void restore(const OptimizerState& state) override {
+    state_ = {static_cast<long long>(state.at("steps").at(0)), state.at("m"), state.at("v")};
+  }
+
+ private:
+  double learning_rate_;
+  const Preconditioner& preconditioner_;
+  RateDecay decay_;
+  AdamState state_;
+};
+
+}  // namespace
+
+std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner& preconditioner,
+                                     const RateDecay& decay) {
+  return std::make_unique<Adam>(learning_rate, preconditioner, decay);
+}
+
+}  // namespace isochron
