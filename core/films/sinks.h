@@ -3,6 +3,7 @@
 //   PrimalSink    gated images;
 //   TangentSink   derivative images, one per column of the basis (one column: a tangent; all: the Jacobian);
 //   AdjointSink   gradient over the degrees of freedom, weighted by dLoss/dImage.
+// Breakdowns (breakdown_sinks.h) and the learning pass of the guiding (GuideSink) have sinks of their own.
 #pragma once
 #include <span>
 #include <vector>
@@ -14,14 +15,37 @@
 
 namespace isochron {
 
-/// How the gate enters a contribution: value * W d ln F + slope * W' dl.
+/// How the gate enters a contribution: value * W d ln F + slope * W' dl. Images take value * W.
 struct GateWeights {
   double value = 1, slope = 1;
 };
 inline constexpr GateWeights kValueOnly{1, 0};
 
-/// Where the values of a gated image are added up: in the image itself, or in a stretch of a sparse sum. What it refers to
-/// must outlive it.
+/// The interface that the estimators write to, see above. Not shared between threads.
+class Sink {
+ public:
+  virtual ~Sink() = default;
+
+  /// Whether contributions are derivatives: `bind` comes before them, and paths without a gradient may be left out.
+  virtual bool differential() const = 0;
+
+  /// The complete path (last vertex on an emitter) that the next contributions belong to.
+  virtual void note_path(const Path&) {}
+  /// The next contributions belong to a boundary segment at an edge of the triangle, on paths of so many bounces.
+  virtual void note_boundary(int /*bounces*/, int /*triangle*/) {}
+  /// What was added since the last call came from place x of a table of the guiding, see BoundaryGuide.
+  virtual void note_guide(int /*table*/, double /*x*/) {}
+
+  /// The differential that the next contributions share; lives until they are added.
+  virtual void bind(const LocalDifferential&) {}
+  /// One contribution, at a path length that the gates are to be evaluated for.
+  virtual void add(int pixel, const Rgb& value, double length, GateWeights use) = 0;
+  /// value * dl for one gate, where contributions are derivatives: a member of a coupled pair.
+  virtual void add_length_rate(int /*pixel*/, int /*gate*/, const Rgb& /*value*/) {}
+};
+
+/// Where the values of a gated image are added up: in the image itself, or in a part of a sparse sum. What it refers to must
+/// outlive it.
 class Film {
  public:
   Film(GatedImage& image) : channels_(image.channels), gates_(image.gates), values_(image.data.data()) {}
@@ -43,17 +67,12 @@ class Film {
   std::size_t offset_ = 0;
 };
 
-class PrimalSink {
+class PrimalSink final : public Sink {
  public:
-  static constexpr bool kDifferential = false;
   PrimalSink(const GateSet& gates, const Film& film) : gates_(gates), film_(film) {}
 
-  void add(int pixel, const Rgb& value, double length) {
-    gates_.for_each_value(length, [&](int g, double w) {
-      double* out = film_.at(pixel, g);
-      for (int c = 0; c < film_.channels(); ++c) out[c] += w * value[c];
-    });
-  }
+  bool differential() const override { return false; }
+  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
 
  private:
   const GateSet& gates_;
@@ -72,38 +91,14 @@ class ColumnRates {
   ColumnRates(const DofLayout& layout, const TangentBasis& basis)
       : layout_(layout), basis_(basis), rates_(basis.columns) {}
 
-  void bind(const LocalDifferential& differential) {
-    for (int column : touched_) rates_[column] = {};
-    touched_.clear();
-    for (const VertexGradient& v : differential.vertices)
-      for (int axis = 0; axis < 3; ++axis)
-        for_each_column(layout_.vertex(v.vertex, axis), [&](Rates& rates, double velocity) {
-          for (double& f : rates.log_f) f += v.log_f[axis] * velocity;
-          rates.length += v.length[axis] * velocity;
-        });
-    for (const ScalarGradient& s : differential.scalars)
-      for_each_column(s.dof, [&](Rates& rates, double velocity) {
-        for (int c = 0; c < 3; ++c)
-          if (s.channel < 0 || s.channel == c) rates.log_f[c] += s.log_f * velocity;
-        rates.length += s.length * velocity;
-      });
-  }
+  void bind(const LocalDifferential& differential);
 
   const std::vector<int>& touched() const { return touched_; }
   const Rates& operator[](int column) const { return rates_[column]; }
 
  private:
   template <class F>
-  void for_each_column(int dof, F&& f) {
-    for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i) {
-      const auto [column, coefficient] = basis_.entries[i];
-      if (!rates_[column].touched) {
-        rates_[column].touched = true;
-        touched_.push_back(column);
-      }
-      f(rates_[column], coefficient);
-    }
-  }
+  void for_each_column(int dof, F&& f);
 
   const DofLayout layout_;
   const TangentBasis& basis_;
@@ -111,83 +106,39 @@ class ColumnRates {
   std::vector<int> touched_;
 };
 
-class TangentSink {
+class TangentSink final : public Sink {
  public:
-  static constexpr bool kDifferential = true;
   /// One film per column.
   TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<const Film> films)
       : gates_(gates), films_(films), rates_(layout, basis) {}
 
-  /// The differential that the following contributions share.
-  void bind(const LocalDifferential& differential) { rates_.bind(differential); }
-
-  void add(int pixel, const Rgb& value, double length, GateWeights use) {
-    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-      for (int column : rates_.touched())
-        splat(column, pixel, g, value, w * use.value, slope * use.slope * rates_[column].length);
-    });
-  }
-
-  /// value * dl for one gate: a member of a coupled pair.
-  void add_length_rate(int pixel, int gate, const Rgb& value) {
-    for (int column : rates_.touched()) splat(column, pixel, gate, value, 0, rates_[column].length);
-  }
+  bool differential() const override { return true; }
+  void bind(const LocalDifferential& differential) override { rates_.bind(differential); }
+  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add_length_rate(int pixel, int gate, const Rgb& value) override;
 
  private:
-  void splat(int column, int pixel, int g, const Rgb& value, double w, double length_part) {
-    const Film& film = films_[column];
-    double* out = film.at(pixel, g);
-    for (int c = 0; c < film.channels(); ++c) out[c] += value[c] * (w * rates_[column].log_f[c] + length_part);
-  }
+  void splat(int column, int pixel, int gate, const Rgb& value, double w, double length_part);
 
   const GateSet& gates_;
   std::span<const Film> films_;
   ColumnRates rates_;
 };
 
-class AdjointSink {
+class AdjointSink final : public Sink {
  public:
-  static constexpr bool kDifferential = true;
   /// `adjoint` is dLoss/dImage; `gradient` gets the degrees of freedom that the basis moves.
   AdjointSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, const GatedImage& adjoint,
               SparseSum& gradient)
       : gates_(gates), layout_(layout), basis_(basis), adjoint_(adjoint), gradient_(gradient) {}
 
-  void bind(const LocalDifferential& differential) { differential_ = &differential; }
-
-  void add(int pixel, const Rgb& value, double length, GateWeights use) {
-    // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
-    Rgb weight;
-    double slope_weight = 0;
-    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-      const double* a = &adjoint_.data[adjoint_.index(pixel, g)];
-      for (int c = 0; c < adjoint_.channels; ++c) {
-        weight[c] += a[c] * w * value[c];
-        slope_weight += a[c] * slope * value[c];
-      }
-    });
-    scatter(weight * use.value, slope_weight * use.slope);
-  }
-
-  void add_length_rate(int pixel, int gate, const Rgb& value) {
-    const double* a = &adjoint_.data[adjoint_.index(pixel, gate)];
-    double slope_weight = 0;
-    for (int c = 0; c < adjoint_.channels; ++c) slope_weight += a[c] * value[c];
-    scatter({}, slope_weight);
-  }
+  bool differential() const override { return true; }
+  void bind(const LocalDifferential& differential) override { differential_ = &differential; }
+  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add_length_rate(int pixel, int gate, const Rgb& value) override;
 
  private:
-  void scatter(const Rgb& weight, double slope_weight) {
-    const double sum = weight.r + weight.g + weight.b;
-    if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
-    for (const VertexGradient& v : differential_->vertices)
-      for (int axis = 0; axis < 3; ++axis)
-        if (const int dof = layout_.vertex(v.vertex, axis); basis_.moves(dof))
-          gradient_.add(dof, sum * v.log_f[axis] + slope_weight * v.length[axis]);
-    for (const ScalarGradient& s : differential_->scalars)
-      if (basis_.moves(s.dof))
-        gradient_.add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
-  }
+  void scatter(const Rgb& weight, double slope_weight);
 
   const GateSet& gates_;
   const DofLayout layout_;

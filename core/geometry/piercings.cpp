@@ -28,7 +28,7 @@ void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, s
   if (!caster.occluded(from + along * offset, from + along * end)) return;
   double passed = 0, step = offset;
   while (passed + step < end) {
-    const int t = caster.first_triangle(from + along * (passed + step), along);
+    const int t = caster.closest_hit(from + along * (passed + step), along);
     if (t < 0) return;
     const auto& v = scene.triangles[t].vertex;
     const Vec3& corner = scene.positions[v[0]];

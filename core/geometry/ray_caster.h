@@ -18,8 +18,7 @@ class RayCaster {
   RayCaster& operator=(const RayCaster&) = delete;
 
   /// Index of the first triangle along (origin, direction) up to `far` lengths of `direction`, or -1.
-  int first_triangle(const Vec3& origin, const Vec3& direction,
-                     float far = std::numeric_limits<float>::infinity()) const {
+  int closest_hit(const Vec3& origin, const Vec3& direction, float far = std::numeric_limits<float>::infinity()) const {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     RTCRayHit query;

@@ -60,8 +60,8 @@ struct Path {
   int size() const { return static_cast<int>(vertex.size()); }
 };
 
-/// Whether a path that ends at emitter point y after `path` can have a derivative.
-inline bool can_move(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
+/// Whether the path x0 ... x(last) of `path`, followed by a point on an emitter's triangle, can have a gradient.
+inline bool path_has_gradient(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
   return path.moves[last] || scene.has_moving_vertex(emitter_triangle) ||
          scene.moving.emission[scene.shape_index(emitter_triangle)];
 }

@@ -128,7 +128,7 @@ class PreparedScene {
   }
   /// The same in steps, so that what each reads is on its way from memory while something else is done; the first may be
   /// left out.
-  void expect_emitter(double u) const {
+  void prefetch_light(double u) const {
     const int i = emitter_distribution_.expect(u);
     __builtin_prefetch(&emitters[i]);
   }
@@ -174,14 +174,14 @@ class PreparedScene {
 
   /// The triangle that the ray from `x` (offset off its surface) along the unit direction w meets first, or -1. Its record is
   /// on its way from memory: who has other things to do meanwhile does not wait for it.
-  int cast(const SurfacePoint& x, const Vec3& w) const { return met(leave(x, w), w); }
+  int closest_hit(const SurfacePoint& x, const Vec3& w) const { return prefetched_hit(offset_ray_origin(x, w), w); }
   /// The same of what is not farther away than `distance`, or a little more.
-  int cast_within(const SurfacePoint& x, const Vec3& w, double distance) const {
-    const Vec3 start = leave(x, w);
-    return caster.first_triangle(start, w, static_cast<float>(distance + 4 * caster.offset()));
+  int closest_hit_within(const SurfacePoint& x, const Vec3& w, double distance) const {
+    const Vec3 start = offset_ray_origin(x, w);
+    return caster.closest_hit(start, w, static_cast<float>(distance + 4 * caster.offset()));
   }
   /// The same of a ray from the camera.
-  int cast_camera(const Vec3& direction) const { return met(camera.position, direction); }
+  int closest_camera_hit(const Vec3& direction) const { return prefetched_hit(camera.position, direction); }
   /// Where the ray from `origin` along w, which meets `triangle` (-1: none), ends; empty also for a face along which it runs.
   std::optional<SurfacePoint> end_point(int triangle, const Vec3& origin, const Vec3& w) const {
     if (triangle < 0 || dot(records_[triangle].normal, w) == 0) return std::nullopt;
@@ -189,21 +189,21 @@ class PreparedScene {
   }
   /// First surface point of such rays.
   std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const {
-    return end_point(cast(x, w), x.p, w);
+    return end_point(closest_hit(x, w), x.p, w);
   }
   std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
-    return end_point(cast_camera(direction), camera.position, direction);
+    return end_point(closest_camera_hit(direction), camera.position, direction);
   }
   bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
     const Vec3 d = y.p - x.p;
-    return !caster.occluded(leave(x, d), leave(y, -d));
+    return !caster.occluded(offset_ray_origin(x, d), offset_ray_origin(y, -d));
   }
   bool visible_from_camera(const SurfacePoint& x) const {
-    return !caster.occluded(camera.position, leave(x, camera.position - x.p));
+    return !caster.occluded(camera.position, offset_ray_origin(x, camera.position - x.p));
   }
 
   /// `x.p` moved off its surface to the side of the unit direction w.
-  Vec3 leave(const SurfacePoint& x, const Vec3& w) const {
+  Vec3 offset_ray_origin(const SurfacePoint& x, const Vec3& w) const {
     return x.p + x.n * std::copysign(caster.offset(), dot(x.n, w));
   }
 
@@ -215,8 +215,8 @@ class PreparedScene {
   bool is_behind(const SurfacePoint& x, const Vec3& d) const {
     return x.triangle >= 0 && is_dielectric(x.triangle) && dot(x.n, d) < 0;
   }
-  int met(const Vec3& from, const Vec3& w) const {
-    const int t = caster.first_triangle(from, w);
+  int prefetched_hit(const Vec3& from, const Vec3& w) const {
+    const int t = caster.closest_hit(from, w);
     if (t >= 0) prefetch(t);
     return t;
   }

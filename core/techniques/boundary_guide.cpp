@@ -5,6 +5,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/base/random.h"
+
 namespace isochron {
 namespace {
 
@@ -110,6 +112,48 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
   if (!(wanted_cost > 0)) return;
   for (int t = 0; t < kTechniques; ++t)
     rate_[t] *= std::pow(std::clamp(wanted[t] * unguided_cost / wanted_cost, kLeastRate, kMostRate), trust[t]);
+}
+
+void GuideSink::note_guide(int table, double x) {
+  square_sums();
+  if (square_ > 0) records.push_back({table, x, square_});
+  square_ = 0;
+  ++sample_;
+}
+
+void GuideSink::bind(const LocalDifferential& differential) {
+  rate_ = 0;
+  for (const VertexGradient& v : differential.vertices)
+    for (int axis = 0; axis < 3; ++axis) {
+      const int dof = layout_.vertex(v.vertex, axis);
+      for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
+        rate_ += column_sign(basis_.entries[i].column) * v.log_f[axis] * basis_.entries[i].coefficient;
+    }
+}
+
+void GuideSink::add(int pixel, const Rgb& value, double length, GateWeights) {
+  if (pixel != pixel_) square_sums();
+  pixel_ = pixel;
+  gates_.for_each_value(length, [&](int gate, double w) {
+    sums_[gate] += value * (w * rate_);
+    touched_.push_back(gate);
+  });
+}
+
+/// The square of a sum of columns with random signs is, on average, the sum of their squares.
+double GuideSink::column_sign(int column) const {
+  if (basis_.columns == 1) return 1;
+  const auto bits = philox({static_cast<std::uint32_t>(column) / 32, sample_, 0, 0}, {0x7369676eu, 0});
+  return bits[0] >> (column % 32) & 1 ? 1 : -1;
+}
+
+void GuideSink::square_sums() {
+  for (const int gate : touched_) {
+    const Rgb& sum = sums_[gate];
+    square_ += sum.r * sum.r + sum.g * sum.g + sum.b * sum.b;
+    sums_[gate] = Rgb();
+  }
+  touched_.clear();
 }
 
 }  // namespace isochron

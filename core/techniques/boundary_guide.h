@@ -5,9 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "core/base/random.h"
-#include "core/gates/gate.h"
-#include "core/paths/path_differential.h"
+#include "core/films/sinks.h"
 #include "core/scene/camera_model.h"
 
 namespace isochron {
@@ -81,55 +79,21 @@ class BoundaryGuide {
 
 /// Sink of the learning pass. What one search adds to the same value of the same image is summed before it is squared: the
 /// two sides of a boundary cancel in part.
-class GuideSink {
+class GuideSink final : public Sink {
  public:
-  static constexpr bool kDifferential = true;
   GuideSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis)
       : gates_(gates), layout_(layout), basis_(basis), sums_(gates.size()) {}
 
-  void bind(const LocalDifferential& differential) {
-    rate_ = 0;
-    for (const VertexGradient& v : differential.vertices)
-      for (int axis = 0; axis < 3; ++axis) {
-        const int dof = layout_.vertex(v.vertex, axis);
-        for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
-          rate_ += sign(basis_.entries[i].column) * v.log_f[axis] * basis_.entries[i].coefficient;
-      }
-  }
-  template <class Use>
-  void add(int pixel, const Rgb& value, double length, Use) {
-    if (pixel != pixel_) square_sums();
-    pixel_ = pixel;
-    gates_.for_each_value(length, [&](int gate, double w) {
-      sums_[gate] += value * (w * rate_);
-      touched_.push_back(gate);
-    });
-  }
-  /// What was added since the last call came from place x of a table.
-  void note(int table, double x) {
-    square_sums();
-    if (square_ > 0) records.push_back({table, x, square_});
-    square_ = 0;
-    ++sample_;
-  }
+  bool differential() const override { return true; }
+  void note_guide(int table, double x) override;
+  void bind(const LocalDifferential& differential) override;
+  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
 
   std::vector<GuideRecord> records;
 
  private:
-  /// The square of a sum of columns with random signs is, on average, the sum of their squares.
-  double sign(int column) const {
-    if (basis_.columns == 1) return 1;
-    const auto bits = philox({static_cast<std::uint32_t>(column) / 32, sample_, 0, 0}, {0x7369676eu, 0});
-    return bits[0] >> (column % 32) & 1 ? 1 : -1;
-  }
-  void square_sums() {
-    for (const int gate : touched_) {
-      const Rgb& sum = sums_[gate];
-      square_ += sum.r * sum.r + sum.g * sum.g + sum.b * sum.b;
-      sums_[gate] = Rgb();
-    }
-    touched_.clear();
-  }
+  double column_sign(int column) const;
+  void square_sums();
 
   const GateSet& gates_;
   const DofLayout layout_;
@@ -140,11 +104,5 @@ class GuideSink {
   double rate_ = 0, square_ = 0;
   std::uint32_t sample_ = 0;
 };
-
-/// Tells a learning sink where contributions came from; others do not ask.
-template <class Sink>
-void note_guide(Sink& sink, int table, double x) {
-  if constexpr (requires { sink.note(table, x); }) sink.note(table, x);
-}
 
 }  // namespace isochron

@@ -10,6 +10,7 @@
 // the picked arc alone.)
 #pragma once
 #include <span>
+#include <vector>
 
 #include "core/geometry/ellipsoid.h"
 #include "core/techniques/target_lengths.h"
@@ -17,72 +18,32 @@
 
 namespace isochron {
 
-/// Complete paths go to the worker's sink.
-struct ToSink {};
+/// Takes the light that EllipsoidalConnections::gather finds.
+class LengthReceiver {
+ public:
+  virtual ~LengthReceiver() = default;
+  /// `target` counts the lengths asked for; `value` is contribution over density from vertex 1 on, per unit of length and
+  /// without the gate. The worker's path is the complete one.
+  virtual void take(int target, int bounces, const Rgb& value) = 0;
+};
 
-/// `Receiver`: ToSink, or what takes the light that `gather` finds.
-template <class Sink, class Receiver = ToSink>
 class EllipsoidalConnections {
  public:
-  EllipsoidalConnections(Worker<Sink>& worker, const GatePass& pass, Receiver receiver = {})
+  /// Complete paths go to the receiver, or without one to the worker's sink.
+  EllipsoidalConnections(Worker& worker, const GatePass& pass, LengthReceiver* receiver = nullptr)
       : worker_(worker), scene_(worker.scene), pass_(pass), receiver_(receiver) {}
 
   /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`.
-  void sample_from_camera(double scale, Rng& rng) {
-    worker_.start_at_camera(worker_.path);
-    draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
-    for (const TargetLength& target : targets_) {
-      if (scene_.camera_sees_emitters) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
-      if (worker_.options.max_bounces >= 1) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
-    }
-  }
+  void sample_from_camera(double scale, Rng& rng);
 
   /// One camera path through `pixel` with connections at its other vertices; contributions are scaled by `scale`.
-  void sample_walk(int pixel, double scale, Rng& rng) {
-    const int max_bounces = worker_.options.max_bounces;
-    draw_targets(pass_, worker_.gates, worker_.pick, pixel, rng, targets_);
-    if (targets_.empty() || max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
-    connect_along(pixel, scale, max_bounces, rng);
-  }
+  void sample_walk(int pixel, double scale, Rng& rng);
 
   /// Walks on from vertex 1 of the worker's path, which vertex 0 looks at, by up to `max_bounces` scattering vertices.
-  /// Hands complete paths of the given lengths to receiver.take(i, bounces, value): i counts the lengths, value is
-  /// contribution over density from vertex 1 on, per unit of length and without the gate. Leaves the path grown.
-  void gather(std::span<const double> lengths, int max_bounces, Rng& rng) {
-    targets_.clear();
-    for (std::size_t i = 0; i < lengths.size(); ++i) {
-      if (!(lengths[i] > 0)) continue;
-      TargetLength t;
-      t.tau[0] = lengths[i];
-      t.present[0] = true;
-      t.index = static_cast<int>(i);
-      t.scale = 1;
-      targets_.push_back(t);
-    }
-    connect_along(-1, 1, max_bounces, rng);
-  }
+  /// Hands complete paths of the given lengths to the receiver, which there must be. Leaves the path grown.
+  void gather(std::span<const double> lengths, int max_bounces, Rng& rng);
 
  private:
-  static constexpr bool kGathers = !std::is_same_v<Receiver, ToSink>;
-
-  /// Connections at the path's last vertex and at those of a walk from there.
-  void connect_along(int pixel, double scale, int max_bounces, Rng& rng) {
-    Path& path = worker_.path;
-    Rgb throughput(1.0);
-    for (int bounce = 1; bounce <= max_bounces; ++bounce) {
-      const double needed = path.length.back() + scene_.distance_to_emitters(path.back().p);
-      bool reachable = false;
-      for (const TargetLength& target : targets_) {
-        if (!(needed < target.longest())) continue;
-        reachable = true;
-        connect_emitter(target, pixel, throughput * scale, rng);
-        if (bounce < max_bounces) connect_surface(target, pixel, throughput * scale, rng);
-      }
-      if (!reachable || bounce == max_bounces || !survives(throughput, bounce, rng)) return;
-      if (!extend(worker_, path, throughput, rng)) return;
-    }
-  }
-
   /// One sampled point on an arc, before its visibility is known.
   struct ArcPoint {
     SurfacePoint point;
@@ -95,260 +56,46 @@ class EllipsoidalConnections {
     double weight() const { return side[0].value.max() + side[1].value.max(); }
   };
 
-  /// Whether connecting to emitter point y can only matter through the connecting vertex itself.
-  bool ends_are_static(int emitter_triangle) const {
-    if constexpr (!Sink::kDifferential || kGathers) return false;
-    return !can_move(scene_, worker_.path, worker_.path.size() - 1, emitter_triangle);
-  }
+  /// Connections at the path's last vertex and at those of a walk from there.
+  void connect_along(int pixel, double scale, int max_bounces, Rng& rng);
 
-  void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
-    const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-    const double along = rng.uniform();
-    const double pick = rng.uniform(), thinning = rng.uniform();
-    double pdf_y;
-    const SurfacePoint y = scene_.sample_emitter(u0, u1, u2, pdf_y);
-    const Path& path = worker_.path;
-    const SurfacePoint& x = path.back();
-    const double before = path.length.back();
-    const double high = target.longest() - before, low = target.shortest() - before;
+  /// Whether a connection of the worker's path to an emitter's triangle may contribute whatever the arc's point in between.
+  /// If not (a derivative of what is static at both ends), it does so through vertices between that can move alone.
+  bool any_arc_contributes(int emitter_triangle) const;
 
-    const Foci foci(x.p, y.p);
-    if (!(high > foci.distance)) return;
-    const Ellipsoid ellipsoids[2] = {{foci, target.tau[0] - before}, {foci, target.tau[1] - before}};
-    const EllipsoidBvh& bvh = ends_are_static(y.triangle) ? scene_.moving_triangles : scene_.all_triangles;
-    find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
-
-    const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
-    ArcPair chosen;
-    const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
-      const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
-      const bool two_sided = scene_.material_of(t).two_sided;
-      if (!((side_x > 0 && side_y > 0) || (two_sided && side_x < 0 && side_y < 0))) return;
-      for (int i = 0; i < 2; ++i)
-        if (target.present[i] && ellipsoids[i].valid())
-          surface_arc_point(ellipsoids[i], t, y, along, pixel, factor, arcs.side[i]);
-    });
-    if (inverse_probability == 0) return;
-    for (int i = 0; i < 2; ++i) {
-      const ArcPoint& q = chosen.side[i];
-      if (q.value.is_black()) continue;
-      const bool seen = path.size() == 1 ? worker_.visible_from_camera(q.point) : worker_.visible(x, q.point);
-      if (!seen || !worker_.visible(q.point, y)) continue;
-      worker_.path.push(scene_, q.point);
-      worker_.path.push(scene_, y);
-      deliver(target, i, q, inverse_probability, &ArcDensities::surface);
-      worker_.path.pop();
-      worker_.path.pop();
-    }
-  }
+  void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
+  void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
 
   /// Candidates for arcs between the path's last vertex and another focus: all triangles that may hold one, or some of
   /// the many of a fine mesh.
   void find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low, double high,
-                       double thinning) {
-    worker_.candidates.clear();
-    worker_.inverse_probability.clear();
-    if (worker_.options.pick == ArcPick::uniform)
-      bvh.query_surfaces(worker_.path.back().p, other.p, low, high, worker_.candidates);
-    else
-      bvh.sample_surfaces(focus(), other, low, high, thinning, worker_.candidates, worker_.inverse_probability);
-    for (const int t : worker_.candidates) scene_.prefetch(t);
-    worker_.arcs += 1 + worker_.candidates.size();
-  }
+                       double thinning);
   /// The path's last vertex with the half space that it scatters into; the camera with its field of view.
-  EllipsoidBvh::Focus focus() const {
-    const Path& path = worker_.path;
-    const SurfacePoint& x = path.back();
-    if (path.size() == 1) {
-      const double cosine = scene_.camera.cos_corner;
-      return {x.p, scene_.camera.forward, cosine, std::sqrt(1 - cosine * cosine), false};
-    }
-    const Vec3& before = path.vertex[path.size() - 2].p;
-    const bool back = scene_.material_of(x.triangle).two_sided && dot(x.n, before - x.p) < 0;
-    return {x.p, back ? -x.n : x.n, 0, 1, true};
-  }
-
-  void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
-    const double along = rng.uniform();
-    const double pick = rng.uniform(), thinning = rng.uniform();
-    const Path& path = worker_.path;
-    const SurfacePoint& x = path.back();
-    const double before = path.length.back();
-    const double high = 2 * (target.longest() - before), low = 2 * (target.shortest() - before);
-    if (!(high > 0)) return;
-    const EllipsoidBvh::Focus anywhere{x.p, {0, 0, 0}, 0, 1, false};
-    find_candidates(scene_.emitter_triangles, anywhere, low, high, thinning);
-
-    const Foci foci(x.p, x.p);
-    const Ellipsoid spheres[2] = {{foci, 2 * (target.tau[0] - before)}, {foci, 2 * (target.tau[1] - before)}};
-    ArcPair chosen;
-    const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
-      if (!(scene_.height_over(t, x.p) > 0) || ends_are_static(t)) return;
-      for (int i = 0; i < 2; ++i)
-        if (target.present[i] && spheres[i].valid())
-          emitter_arc_point(spheres[i], t, along, pixel, throughput, arcs.side[i]);
-    });
-    if (inverse_probability == 0) return;
-    for (int i = 0; i < 2; ++i) {
-      const ArcPoint& y = chosen.side[i];
-      if (y.value.is_black()) continue;
-      if (!(path.size() == 1 ? worker_.visible_from_camera(y.point) : worker_.visible(x, y.point))) continue;
-      worker_.path.push(scene_, y.point);
-      deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
-      worker_.path.pop();
-    }
-  }
+  EllipsoidBvh::Focus focus() const;
 
   /// Picks one of the candidates' arcs, which sample(triangle, arcs) fills in: uniformly, or in proportion to the
   /// unshadowed contribution (a weighted reservoir that re-uses one number). Returns one over the probability (times
   /// what the candidates themselves were chosen with), 0 where nothing is carried.
   template <class F>
-  double choose(double pick, ArcPair& chosen, F&& sample) const {
-    const std::vector<int>& candidates = worker_.candidates;
-    if (candidates.empty()) return 0;
-    if (worker_.options.pick == ArcPick::uniform) {
-      const int count = static_cast<int>(candidates.size());
-      sample(candidates[std::min(static_cast<int>(pick * count), count - 1)], chosen);
-      return chosen.weight() > 0 ? count : 0;
-    }
-    double total = 0;
-    const std::vector<double>& inverse_probability = worker_.inverse_probability;
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      ArcPair arcs;
-      sample(candidates[i], arcs);
-      const double weight = arcs.weight() * inverse_probability[i];
-      if (!(weight > 0)) continue;
-      total += weight;
-      const double share = weight / total;
-      if (pick < share) {
-        chosen = arcs;
-        pick /= share;
-      } else {
-        pick = (pick - share) / (1 - share);
-      }
-    }
-    return total > 0 ? total / chosen.weight() : 0;
-  }
+  double choose(double pick, ArcPair& chosen, F&& sample) const;
 
   /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.
   void surface_arc_point(const Ellipsoid& ellipsoid, int t, const SurfacePoint& y, double along, int pixel,
-                         const Rgb& factor, ArcPoint& out) const {
-    EllipseArcs arcs;
-    if (!scene_.clip(ellipsoid, t, arcs)) return;
-    const SurfacePoint q{arcs.point_at(along), scene_.normal(t), t};
-    const Path& path = worker_.path;
-    const SurfacePoint& x = path.back();
-    if (!scene_.outside(x, q)) return;
-    const Scattering s(x.p, q, y.p);
-    const double cos_y = -dot(y.n, s.w_i);
-    if (!(cos_y > 0)) return;
-    const Material& material = scene_.material_of(t);
-    double carried = s.lobe(material) * std::abs(s.cos_i * s.cos_o) * cos_y /
-                     (s.distance_i * s.distance_i * s.distance_o * s.distance_o);
-    Rgb albedo = material.albedo;
-    out.pixel = pixel;
-    if (path.size() == 1) {
-      out.pixel = scene_.camera.project(q.p);
-      if (out.pixel < 0) return;
-      carried *= scene_.camera.image_area_per_solid_angle(-s.w_o);
-    } else {
-      const Scattering at_x(path.vertex[path.size() - 2].p, x, q.p);
-      const Material& material_x = scene_.material_of(x.triangle);
-      carried *= at_x.lobe(material_x) * std::abs(at_x.cos_i);
-      albedo *= material_x.albedo;
-    }
-    if (!(carried > 0)) return;
-    const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n);
-    out.pdf = 1 / area;
-    out.value = factor * albedo * (carried * area);
-    out.point = q;
-  }
-
+                         const Rgb& factor, ArcPoint& out) const;
   void emitter_arc_point(const Ellipsoid& sphere, int t, double along, int pixel, const Rgb& throughput,
-                         ArcPoint& out) const {
-    EllipseArcs arcs;
-    if (!scene_.clip(sphere, t, arcs)) return;
-    const SurfacePoint y{arcs.point_at(along), scene_.normal(t), t};
-    const Path& path = worker_.path;
-    const SurfacePoint& x = path.back();
-    if (!scene_.outside(x, y)) return;
-    const double distance = 0.5 * sphere.tau;
-    const Vec3 w = (y.p - x.p) / distance;
-    const double cos_y = -dot(y.n, w);
-    if (!(cos_y > 0)) return;
-    double carried = cos_y / (distance * distance);
-    Rgb albedo(1.0);
-    out.pixel = pixel;
-    if (path.size() == 1) {
-      out.pixel = scene_.camera.project(y.p);
-      if (out.pixel < 0) return;
-      carried *= scene_.camera.image_area_per_solid_angle(w);
-    } else {
-      const Scattering at_x(path.vertex[path.size() - 2].p, x, y.p);
-      const Material& material = scene_.material_of(x.triangle);
-      carried *= at_x.lobe(material) * std::abs(at_x.cos_i);
-      albedo = material.albedo;
-    }
-    if (!(carried > 0)) return;
-    // About the foot of x in the plane, dA = r dr dphi with r the distance.
-    const double area = arcs.total_span * distance;
-    out.pdf = 1 / area;
-    out.value = throughput * albedo * scene_.shape_of(t).emission * (carried * area);
-    out.point = y;
-  }
+                         ArcPoint& out) const;
 
   /// Share of a contribution found by `technique`, over the connections' share of the samples.
-  double mis_weight(const TargetLength& target, int i, const ArcPoint& found, double ArcDensities::*technique) const {
-    // No other technique finds lengths at a jump, and these serve one gate.
-    const bool jump = target.jump[i];
-    const Path& path = worker_.path;
-    const GatePick& pick = worker_.pick;
-    const int pixel = found.pixel;
-    // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
-    // densities of the length differ between the two techniques.
-    const bool same_length_pdf = pick.uniform() || path.size() != 3;
-    const ConnectionRates& rates = worker_.rates;
-    const double camera_rate = target.pair ? rates.camera_pairs : rates.camera_lengths;
-    const ArcDensities d = worker_.techniques.arcs(path, technique, found.pdf, kGathers, [&](int from) {
-      if (kGathers) return 1.0;
-      const double rate = from == 0 ? camera_rate : rates.walk;
-      if (same_length_pdf) return rate;
-      const int served = from == 0 ? GatePick::kImage : pixel;
-      return rate * (from == 0 ? 1 : pick.rate(pixel)) *
-             (jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]));
-    });
-    const double sum = d.surface + d.emitter;
-    if (!(sum > 0)) return 0;
-    if constexpr (kGathers) return d.*technique / sum;
-    const double share = worker_.ellipsoidal_share;
-    const double gain = target.pair ? worker_.pair_gain : 1;
-    const double ours = jump || share == 1 ? 1 : worker_.techniques.ellipsoidal_weight(path, pixel, share, gain);
-    return ours / share * (d.*technique / sum);
-  }
+  double mis_weight(const TargetLength& target, int i, const ArcPoint& found, double ArcDensities::*technique) const;
 
   /// The worker's path is complete, by the point `found`, and as long as side i of the target says.
   void deliver(const TargetLength& target, int i, const ArcPoint& found, double inverse_probability,
-               double ArcDensities::*technique) {
-    if constexpr (!kGathers)
-      if (!worker_.matters(worker_.path)) return;
-    const Rgb value = found.value * (inverse_probability * mis_weight(target, i, found, technique) * target.scale);
-    if constexpr (kGathers) {
-      receiver_.take(target.index, worker_.path.size() - 2, value);
-    } else if (!target.pair) {
-      worker_.emit(worker_.path, found.pixel, value, target.tau[0], pass_.use);
-    } else if constexpr (Sink::kDifferential) {
-      note_path(worker_.sink, worker_.path);
-      differentiate_path(scene_, worker_.path.vertex.data(), worker_.path.size(), true, worker_.differential);
-      if (worker_.differential.empty()) return;
-      worker_.sink.bind(worker_.differential);
-      worker_.sink.add_length_rate(found.pixel, target.gate, i == 0 ? value : value * -1.0);
-    }
-  }
+               double ArcDensities::*technique);
 
-  Worker<Sink>& worker_;
+  Worker& worker_;
   const PreparedScene& scene_;
   const GatePass pass_;
-  [[no_unique_address]] Receiver receiver_;
+  LengthReceiver* const receiver_;
   std::vector<TargetLength> targets_;
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/techniques/standard_walk.h"
@@ -18,11 +19,32 @@ struct RecordedRay {
   bool occlusion() const { return far == 1.0f; }
 };
 
-/// Stands in for the renderer's Worker and keeps every ray that a standard walk traces.
-struct RayRecorder {
-  const PreparedScene& scene;
+/// Takes nothing.
+class NoSink final : public Sink {
+ public:
+  bool differential() const override { return false; }
+  void add(int, const Rgb&, double, GateWeights) override {}
+};
+
+/// Keeps the rays of standard walks along a path.
+class RayRecorder {
+ public:
+  RayRecorder(const PreparedScene& scene, const Path& path) : scene_(scene), path_(path) {}
+
+  void closest_hit(const Vec3& from, const Vec3& direction) {
+    record(from, direction, std::numeric_limits<float>::infinity());
+  }
+  /// From the path's last vertex.
+  void closest_hit(const Vec3& direction) { closest_hit(scene_.offset_ray_origin(path_.back(), direction), direction); }
+  /// Between the path's last two vertices.
+  void occlusion() {
+    const SurfacePoint &x = path_.vertex[path_.size() - 2], &y = path_.back();
+    const Vec3 d = y.p - x.p, from = scene_.offset_ray_origin(x, d);
+    record(from, scene_.offset_ray_origin(y, -d) - from, 1.0f);
+  }
   std::vector<RecordedRay> rays;
 
+ private:
   void record(const Vec3& from, const Vec3& d, float far) {
     RecordedRay ray{.origin = {}, .direction = {}, .far = far};
     for (int axis = 0; axis < 3; ++axis) {
@@ -31,46 +53,59 @@ struct RayRecorder {
     }
     rays.push_back(ray);
   }
-  bool visible(const SurfacePoint& x, const SurfacePoint& y) {
-    const Vec3 d = y.p - x.p, from = scene.leave(x, d);
-    record(from, scene.leave(y, -d) - from, 1.0f);
-    return scene.visible(x, y);
-  }
-  int cast(const SurfacePoint& x, const Vec3& w) {
-    record(scene.leave(x, w), w, std::numeric_limits<float>::infinity());
-    return scene.cast(x, w);
-  }
+
+  const PreparedScene& scene_;
+  const Path& path_;
 };
 
 /// The rays of `samples` standard samples of every pixel, in the order of a rendering.
 inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const GateSet& gates, int max_bounces,
                                             int samples) {
+  const GatePick every_gate(gates);
+  const EstimatorOptions options{.max_bounces = max_bounces};
+  NoSink sink;
+  Worker worker(scene, gates, options, every_gate, sink);
+  Path path(max_bounces);
+  RayRecorder recorder(scene, path);
+  bool next_event = false;
+  // The walk asks what it visits: in next-event estimation, before it traces the ray to the emitter.
   struct Visitor {
-    bool wants() const { return true; }
+    RayRecorder& recorder;
+    const bool& next_event;
+    bool wants() const {
+      if (next_event) recorder.occlusion();
+      return true;
+    }
     void take(const Rgb&) const {}
   };
-  RayRecorder recorder{scene, {}};
-  Path path(max_bounces);
   for (int i = 0; i < scene.camera.pixels() * samples; ++i) {
     const int pixel = i / samples;
     Rng rng(Stream{.seed = 3}, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(i % samples));
-    const double u = pixel % scene.camera.width + rng.uniform(), v = pixel / scene.camera.width + rng.uniform();
-    const Vec3 direction = scene.camera.direction(u, v);
-    recorder.record(scene.camera.position, direction, std::numeric_limits<float>::infinity());
+    const Vec3 direction = worker.direction_through(pixel, rng);
+    recorder.closest_hit(scene.camera.position, direction);
     const auto hit = scene.trace_camera(direction);
     if (!hit) continue;
-    SurfacePoint eye;
-    eye.p = scene.camera.position;
-    path.start(eye, 0);
+    worker.start_at_camera(path);
     path.push(scene, *hit);
-    walk_standard(recorder, path, max_bounces, {gates.lower(), gates.upper()}, rng, Visitor{});
+    StandardWalk<Visitor> walk(worker, path, max_bounces, {gates.lower(), gates.upper()}, {recorder, next_event});
+    walk.begin(rng);
+    for (bool goes_on = max_bounces > 0; goes_on;) {
+      const std::size_t recorded = recorder.rays.size();
+      const long long traced = worker.rays;
+      next_event = true;
+      goes_on = walk.next_event_and_sample(rng);
+      next_event = false;
+      const auto occlusions = static_cast<long long>(recorder.rays.size() - recorded);
+      if (worker.rays - traced > occlusions) recorder.closest_hit(walk.direction());
+      goes_on = goes_on && walk.intersect(rng);
+    }
   }
-  return recorder.rays;
+  return std::move(recorder.rays);
 }
 
-/// Hands the rays to Embree one by one; returns how many met something.
+/// Hands the rays to Embree one by one; returns how many hit something.
 inline long long trace_bare(RTCScene scene, std::span<const RecordedRay> rays) {
-  long long met = 0;
+  long long hits = 0;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   for (const RecordedRay& r : rays) {
@@ -89,15 +124,15 @@ inline long long trace_bare(RTCScene scene, std::span<const RecordedRay> rays) {
                  .flags = 0};
     if (r.occlusion()) {
       rtcOccluded1(scene, &context, &query.ray);
-      met += query.ray.tfar < 0;
+      hits += query.ray.tfar < 0;
     } else {
       query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
       query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
       rtcIntersect1(scene, &context, &query);
-      met += query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+      hits += query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     }
   }
-  return met;
+  return hits;
 }
 
 }  // namespace isochron::benchmarks

@@ -51,23 +51,16 @@ void BM_RayCaster(benchmark::State& state, Kind kind) {
   for (const RecordedRay& r : rays_of(prepared, kind))
     rays.push_back({{r.origin[0], r.origin[1], r.origin[2]}, {r.direction[0], r.direction[1], r.direction[2]}});
   for (auto _ : state) {
-    int met = 0;
+    int hits = 0;
     for (const Ray& r : rays)
-      met += kind == Kind::occluded ? prepared.caster.occluded(r.origin, r.origin + r.direction)
-                                    : prepared.caster.first_triangle(r.origin, r.direction) >= 0;
-    benchmark::DoNotOptimize(met);
+      hits += kind == Kind::occluded ? prepared.caster.occluded(r.origin, r.origin + r.direction)
+                                     : prepared.caster.closest_hit(r.origin, r.direction) >= 0;
+    benchmark::DoNotOptimize(hits);
   }
   rays_per_second(state, rays.size());
 }
 BENCHMARK_CAPTURE(BM_RayCaster, intersect, Kind::intersect)->ArgName("large")->Arg(0)->Arg(1);
 BENCHMARK_CAPTURE(BM_RayCaster, occluded, Kind::occluded)->ArgName("large")->Arg(0)->Arg(1);
-
-/// Traces without counting or recording.
-struct Tracer {
-  const PreparedScene& scene;
-  bool visible(const SurfacePoint& x, const SurfacePoint& y) { return scene.visible(x, y); }
-  int cast(const SurfacePoint& x, const Vec3& w) { return scene.cast(x, w); }
-};
 
 /// Point seen by every pixel's centre; leaves out pixels that see nothing.
 std::vector<SurfacePoint> first_points(const PreparedScene& prepared) {
@@ -89,7 +82,11 @@ void BM_PathStep(benchmark::State& state) {
     bool wants() const { return true; }
     void take(const Rgb& value) const { sum += value.r; }
   };
-  Tracer tracer{prepared};
+  const GateSet gates(GateShape::steady(), {0.0});
+  const GatePick every_gate(gates);
+  const EstimatorOptions options{.max_bounces = 1};
+  NoSink sink;
+  Worker worker(prepared, gates, options, every_gate, sink);
   Path path(1);
   SurfacePoint eye;
   eye.p = prepared.camera.position;
@@ -100,7 +97,7 @@ void BM_PathStep(benchmark::State& state) {
     Rng rng = base.with_sample(sample);
     path.start(eye, 0);
     path.push(prepared, points[sample++ % points.size()]);
-    walk_standard(tracer, path, 1, {0, 1e30}, rng, Visitor{sum});
+    walk_standard(worker, path, 1, {0, 1e30}, rng, Visitor{sum});
   }
   benchmark::DoNotOptimize(sum);
 }

@@ -194,21 +194,21 @@ TEST(DielectricSampling, FollowsItsDensityAndLosesNothingElse) {
 TEST(DielectricSampling, WeightAndDensityAgreeWithTheLobe) {
   Rng rng({24, 0, 0}, 0, 0);
   int refractions = 0;
-  for (const Walk walk : {Walk::towards_light, Walk::towards_camera})
+  for (const TransportMode mode : {TransportMode::radiance, TransportMode::importance})
     for (const double alpha : {0.01, 0.1, 0.8})
       for (const double ior : {1.5, 0.7})
         for (int k = 0; k < 1000; ++k) {
           const Material m = glass(alpha, ior);
           const Vec3 given = direction(kPi * rng.uniform(), 0.9);
           const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-          const auto sample = sample_direction(m, {0, 0, 1}, given, u0, u1, u2, walk);
+          const auto sample = sample_direction(m, {0, 0, 1}, given, u0, u1, u2, mode);
           if (!sample) continue;
           const Vec3& drawn = sample->direction;
           refractions += drawn.z * given.z < 0;
           EXPECT_NEAR(length(drawn), 1, 1e-14);
           const double c = dot(given, drawn);
           EXPECT_NEAR(sample->pdf / direction_pdf(m, drawn.z, given.z, c), 1, 1e-8);
-          const bool light = walk == Walk::towards_light;
+          const bool light = mode == TransportMode::radiance;
           const double f = lobe(m, light ? drawn.z : given.z, light ? given.z : drawn.z, c);
           EXPECT_NEAR(sample->weight * sample->pdf / (f * std::abs(drawn.z)), 1, 1e-8);
         }
@@ -242,7 +242,7 @@ TEST(DielectricSampling, ConservesEnergy) {
         Rng rng({25, 0, 0}, 0, 0);
         for (int k = 0; k < kSamples; ++k) {
           const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-          const auto sample = sample_direction(m, {0, 0, 1}, given, u0, u1, u2, Walk::towards_camera);
+          const auto sample = sample_direction(m, {0, 0, 1}, given, u0, u1, u2, TransportMode::importance);
           const double w = sample ? sample->weight : 0;
           EXPECT_LE(w, 1 + 1e-12);
           sum += w;

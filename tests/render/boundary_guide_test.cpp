@@ -130,7 +130,7 @@ TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
       sink.add(3, Rgb(-0.5, 0, 0), 5, kValueOnly);
       sink.add(3, Rgb(0, 4, 0), 7, kValueOnly);
       sink.add(4, Rgb(0, 0, -2), 5, kValueOnly);
-      sink.note(BoundaryGuide::primary, 0.5);
+      sink.note_guide(BoundaryGuide::primary, 0.5);
     }
     double mean = 0;
     for (const GuideRecord& r : sink.records) mean += r.square / samples;

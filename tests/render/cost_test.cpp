@@ -56,7 +56,7 @@ class Cost : public ::testing::TestWithParam<Sampling> {
   Cost() { set_thread_count(1); }
   ~Cost() override { set_thread_count(0); }
   /// Ellipses cross hundreds of triangles of the field: fewer samples take as long. Enough of them, in
-  /// any case, that clearing and merging the strands' gradients (about 3 ms a pass here, more where memory is
+  /// any case, that clearing and merging the partitions' gradients (about 3 ms a pass here, more where memory is
   /// slow) is a small share.
   static int samples(Term term) {
     const bool ellipses = term == Term::path_length || (term == Term::interior && GetParam() == Sampling::ellipsoidal);
@@ -162,7 +162,8 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
   const auto rays = [&](bool from_camera) {
     const PreparedScene prepared(scene, &basis);
     const BoundaryEdges edges(prepared);
-    Worker worker(prepared, gates, options, every_gate, GuideSink(gates, prepared.layout, basis));
+    GuideSink sink(gates, prepared.layout, basis);
+    Worker worker(prepared, gates, options, every_gate, sink);
     SecondaryBoundary boundary(worker, edges, unguided, false);
     constexpr int kSearches = 4096;
     for (int i = 0; i < kSearches; ++i) {

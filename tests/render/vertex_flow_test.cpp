@@ -459,19 +459,18 @@ TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
 }
 
 /// Takes the velocities of boundary segments, everything being moved along (0.3, 1, 0.5).
-struct VelocitySink {
-  static constexpr bool kDifferential = true;
+struct VelocitySink final : Sink {
   double velocity = 0, largest = 0;
   int segments = 0;
-  void bind(const LocalDifferential& differential) {
+  bool differential() const override { return true; }
+  void bind(const LocalDifferential& differential) override {
     velocity = 0;
     for (const VertexGradient& g : differential.vertices) velocity += dot(g.log_f, Vec3{0.3, 1, 0.5});
   }
-  void add(int, const Rgb&, double, GateWeights) {
+  void add(int, const Rgb&, double, GateWeights) override {
     largest = std::max(largest, std::abs(velocity));
     ++segments;
   }
-  void add_length_rate(int, int, const Rgb&) {}
 };
 
 /// Where all move alike and x1 follows entirely, no edge moves relative to the light that grazes it.
@@ -487,18 +486,19 @@ TEST(CameraFlow, ShadowsMoveWithEverything) {
     const PreparedScene prepared(scene, &basis, {radius, 0});
     const BoundaryEdges edges(prepared);
     const GatePick pick(gates);
-    Worker worker(prepared, gates, options, pick, VelocitySink());
+    VelocitySink sink;
+    Worker worker(prepared, gates, options, pick, sink);
     SecondaryBoundary boundary(worker, edges, unguided, false);
     for (int i = 0; i < 2000; ++i) {
       Rng rng(Stream{9, 0, 0}, i, 0);
       boundary.sample_from_edge(1, rng);
       boundary.sample_from_camera(i % 64, 1, rng);
     }
-    EXPECT_GT(worker.sink.segments, 100);
+    EXPECT_GT(sink.segments, 100);
     if (radius > 0) {
-      EXPECT_LT(worker.sink.largest, 1e-9);
+      EXPECT_LT(sink.largest, 1e-9);
     } else {
-      EXPECT_GT(worker.sink.largest, 0.1) << "on its pixel ray x1 does not move along";
+      EXPECT_GT(sink.largest, 0.1) << "on its pixel ray x1 does not move along";
     }
   }
 }

@@ -149,7 +149,7 @@ LobeDerivative dielectric_lobe_derivative(const Material& material, double cos_i
 }
 
 std::optional<DirectionSample> dielectric_sample(const Material& material, const Vec3& n, const Vec3& given,
-                                                 const Vec3& h, double u, Walk walk) {
+                                                 const Vec3& h, double u, TransportMode mode) {
   const double facing = dot(n, given), x = dot(given, h);
   const Fresnel fresnel(material.ior, facing > 0);
   const bool reflects = u < fresnel.reflectance(x);
@@ -167,7 +167,7 @@ std::optional<DirectionSample> dielectric_sample(const Material& material, const
   // G1 of the drawn direction. Radiance changes with the squared index of its medium, from the drawn side to the
   // given one; importance, which goes the other way, does not.
   result.weight = 2 * std::abs(cosine) / Masking(material.roughness, cosine).denominator;
-  if (!reflects && walk == Walk::towards_light) result.weight /= fresnel.m2;
+  if (!reflects && mode == TransportMode::radiance) result.weight /= fresnel.m2;
   return result;
 }
 

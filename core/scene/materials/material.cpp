@@ -61,7 +61,7 @@ LobeDerivative lobe_derivative(const Material& material, double cos_i, double co
 }
 
 std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& given, double u0,
-                                                double u1, double u2, Walk walk) {
+                                                double u1, double u2, TransportMode mode) {
   const double facing = dot(n, given);
   const bool two_sided = material.two_sided || material.type == MaterialType::rough_dielectric;
   if (facing == 0 || (facing < 0 && !two_sided)) return std::nullopt;
@@ -73,7 +73,7 @@ std::optional<DirectionSample> sample_direction(const Material& material, const 
   } else {
     const Vec3 h = frame.to_world(sample_visible_normal(material.roughness, frame.to_local(given), u0, u1));
     if (material.type == MaterialType::rough_dielectric)
-      return detail::dielectric_sample(material, n, given, h, u2, walk);
+      return detail::dielectric_sample(material, n, given, h, u2, mode);
     result.direction = 2 * dot(given, h) * h - given;
   }
   const double cos_i = dot(frame.n, result.direction), cos_o = std::abs(facing);

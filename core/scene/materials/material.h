@@ -39,10 +39,10 @@ struct LobeDerivative {
   double d_ior = 0;                                                ///< of ln(value)
 };
 
-/// Which way a walk goes, and so which of the two directions is drawn given the other.
-enum class Walk {
-  towards_light,  ///< w_i is drawn, w_o given
-  towards_camera  ///< w_o is drawn, w_i given
+/// What a path that is traced vertex by vertex transports, and so which of the two directions is drawn given the other.
+enum class TransportMode {
+  radiance,   ///< traced from the camera towards the light: w_i is drawn, w_o given
+  importance  ///< traced towards the camera: w_o is drawn, w_i given
 };
 
 struct DirectionSample {
@@ -87,7 +87,7 @@ LobeDerivative dielectric_lobe_derivative(const Material& material, double cos_i
 double dielectric_pdf(const Material& material, double cos_i, double cos_o, double cos_io);
 /// Reflects or refracts the unit vector `given` at a microfacet with unit normal h on its side.
 std::optional<DirectionSample> dielectric_sample(const Material& material, const Vec3& n, const Vec3& given,
-                                                 const Vec3& h, double u, Walk walk);
+                                                 const Vec3& h, double u, TransportMode mode);
 
 }  // namespace detail
 
@@ -124,6 +124,6 @@ inline double direction_pdf(const Material& material, double cos_i, double cos_o
 /// dielectrics; a dielectric reflects or refracts, by `u2` and in proportion to Fresnel's reflectance. Empty when
 /// nothing is scattered. A two-sided material seen from behind scatters to the side of the given direction.
 std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& given, double u0,
-                                                double u1, double u2 = 0.5, Walk walk = Walk::towards_light);
+                                                double u1, double u2 = 0.5, TransportMode mode = TransportMode::radiance);
 
 }  // namespace isochron

@@ -1,0 +1,92 @@
+#include "core/films/sinks.h"
+
+namespace isochron {
+
+void PrimalSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
+  const Rgb weighted = value * use.value;
+  gates_.for_each_value(length, [&](int g, double w) {
+    double* out = film_.at(pixel, g);
+    for (int c = 0; c < film_.channels(); ++c) out[c] += w * weighted[c];
+  });
+}
+
+void ColumnRates::bind(const LocalDifferential& differential) {
+  for (int column : touched_) rates_[column] = {};
+  touched_.clear();
+  for (const VertexGradient& v : differential.vertices)
+    for (int axis = 0; axis < 3; ++axis)
+      for_each_column(layout_.vertex(v.vertex, axis), [&](Rates& rates, double velocity) {
+        for (double& f : rates.log_f) f += v.log_f[axis] * velocity;
+        rates.length += v.length[axis] * velocity;
+      });
+  for (const ScalarGradient& s : differential.scalars)
+    for_each_column(s.dof, [&](Rates& rates, double velocity) {
+      for (int c = 0; c < 3; ++c)
+        if (s.channel < 0 || s.channel == c) rates.log_f[c] += s.log_f * velocity;
+      rates.length += s.length * velocity;
+    });
+}
+
+template <class F>
+void ColumnRates::for_each_column(int dof, F&& f) {
+  for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i) {
+    const auto [column, coefficient] = basis_.entries[i];
+    if (!rates_[column].touched) {
+      rates_[column].touched = true;
+      touched_.push_back(column);
+    }
+    f(rates_[column], coefficient);
+  }
+}
+
+void TangentSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
+  gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+    for (int column : rates_.touched())
+      splat(column, pixel, g, value, w * use.value, slope * use.slope * rates_[column].length);
+  });
+}
+
+void TangentSink::add_length_rate(int pixel, int gate, const Rgb& value) {
+  for (int column : rates_.touched()) splat(column, pixel, gate, value, 0, rates_[column].length);
+}
+
+void TangentSink::splat(int column, int pixel, int gate, const Rgb& value, double w, double length_part) {
+  const Film& film = films_[column];
+  double* out = film.at(pixel, gate);
+  for (int c = 0; c < film.channels(); ++c) out[c] += value[c] * (w * rates_[column].log_f[c] + length_part);
+}
+
+void AdjointSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
+  // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
+  Rgb weight;
+  double slope_weight = 0;
+  gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+    const double* a = &adjoint_.data[adjoint_.index(pixel, g)];
+    for (int c = 0; c < adjoint_.channels; ++c) {
+      weight[c] += a[c] * w * value[c];
+      slope_weight += a[c] * slope * value[c];
+    }
+  });
+  scatter(weight * use.value, slope_weight * use.slope);
+}
+
+void AdjointSink::add_length_rate(int pixel, int gate, const Rgb& value) {
+  const double* a = &adjoint_.data[adjoint_.index(pixel, gate)];
+  double slope_weight = 0;
+  for (int c = 0; c < adjoint_.channels; ++c) slope_weight += a[c] * value[c];
+  scatter({}, slope_weight);
+}
+
+void AdjointSink::scatter(const Rgb& weight, double slope_weight) {
+  const double sum = weight.r + weight.g + weight.b;
+  if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
+  for (const VertexGradient& v : differential_->vertices)
+    for (int axis = 0; axis < 3; ++axis)
+      if (const int dof = layout_.vertex(v.vertex, axis); basis_.moves(dof))
+        gradient_.add(dof, sum * v.log_f[axis] + slope_weight * v.length[axis]);
+  for (const ScalarGradient& s : differential_->scalars)
+    if (basis_.moves(s.dof))
+      gradient_.add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
+}
+
+}  // namespace isochron

@@ -1,0 +1,204 @@
+#include "core/render/passes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/base/partition_sum.h"
+#include "core/base/progress.h"
+#include "core/techniques/ellipsoidal.h"
+#include "core/techniques/primary_boundary.h"
+#include "core/techniques/sample_points.h"
+#include "core/techniques/secondary_boundary.h"
+#include "core/techniques/standard_paths.h"
+
+namespace isochron {
+namespace {
+
+constexpr int kPixelsPerBlock = 8;
+
+/// The learning pass has random numbers of its own; with fewer searches by each technique it would teach noise.
+constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
+constexpr long long kFewestLearningRounds = 64;
+
+}  // namespace
+
+Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator,
+               const TangentBasis* tangent)
+    : gates(gate_set),
+      options(estimator),
+      basis(tangent),
+      scene(source, tangent, {estimator.follow_radius, estimator.follow}),
+      mix(sampling_mix(estimator, gate_set)),
+      every_gate(gate_set) {
+  // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
+  // (measured on the cube and the box, 0.1 % to 10 %).
+  if (options.antithetic) pair_gain_ = 1 + 0.1 / gates.relative_width();
+}
+
+int Passes::partitions_for(SampleRange range, std::size_t values) const {
+  return partition_count(double{1} * scene.camera.pixels() * range.count(), values);
+}
+
+bool Passes::has(Term term) const {
+  if (!scene.moving.any || scene.emitters.empty()) return false;
+  if (term == Term::interior) return true;
+  if (term == Term::visibility) return scene.moving.geometry;
+  return scene.moving.lengths && gates.shape().pair_mass(PairPart::atoms) > 0;
+}
+
+void Passes::prepare(Term term) const {
+  if (term == Term::visibility) std::call_once(learned_, [this] { learn(); });
+}
+
+void Passes::run_images(const Pass& pass, Partition partition, Sink& sink) const {
+  Worker worker(scene, gates, options, every_gate, sink);
+  GatePass lengths;
+  lengths.value = true;
+  run_paths(worker, mix.image, {}, lengths, pass, partition);
+  count(worker);
+}
+
+void Passes::run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const {
+  Worker worker(scene, gates, options, pick, sink);
+  GatePass lengths;
+  if (term == Term::interior) {
+    lengths.value = true;
+    lengths.pairs = interior_pairs();
+    if (lengths.pairs) lengths.use = kValueOnly;
+    run_paths(worker, mix.interior, mix.interior_rates, lengths, pass, partition);
+  } else if (term == Term::path_length) {
+    lengths.pairs = true;
+    lengths.part = PairPart::atoms;
+    lengths.coupled = options.antithetic;
+    run_paths(worker, 1, mix.path_length_rates, lengths, pass, partition);
+  } else {
+    run_visibility(worker, pass, partition);
+  }
+  count(worker);
+}
+
+bool Passes::interior_pairs() const {
+  return mix.interior > 0 && options.antithetic && scene.moving.lengths;
+}
+
+void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths,
+                       const Pass& pass, Partition partition) const {
+  const double scale = 1.0 / pass.range.count(), splat_scale = scale / scene.camera.pixels();
+  const ConnectionRates& used = worker.rates = share == 1 ? rates : ConnectionRates{};
+  worker.ellipsoidal_share = share;
+  worker.pair_gain = pair_gain_;
+  GatePass single_lengths = lengths, pairs = lengths;
+  single_lengths.pairs = false;
+  pairs.value = false;
+  EllipsoidalConnections connections(worker, lengths), camera_lengths(worker, single_lengths),
+      camera_pairs(worker, pairs);
+  StandardPaths standard(worker, lengths.pairs);
+  const SamplePoints points(pass.stream, pass.range, options.numbers);
+  const PointSet of_lengths = points.of_image(Technique::camera_lengths);
+  const PointSet of_pairs = points.of_image(Technique::camera_pairs);
+  for_each_pixel(partition, [&](int pixel) {
+    if (lengths.value)
+      points.in_image(of_lengths, pixel, share * used.camera_lengths,
+                      [&](Rng& rng) { camera_lengths.sample_from_camera(splat_scale / used.camera_lengths, rng); });
+    if (lengths.pairs)
+      points.in_image(of_pairs, pixel, share * used.camera_pairs,
+                      [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale / used.camera_pairs, rng); });
+    const double rate = worker.pick.rate(pixel), walks = rate * used.walk;
+    points.in_pixel(Technique::walk, pixel, walks * share,
+                    [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
+    points.in_pixel(Technique::standard, pixel, rate * (1 - share),
+                    [&](Rng& rng) { standard.start(pixel, scale / rate, rng); });
+  });
+  standard.finish();
+}
+
+void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
+  const double scale = 1.0 / pass.range.count(), splat_scale = scale / scene.camera.pixels();
+  PrimaryBoundary primary(worker, *edges_, *guide_, mix.interior == 1);
+  SecondaryBoundary secondary(worker, *edges_, *guide_, mix.interior == 1);
+  const double edges_rate = guide_->rate(BoundaryGuide::primary),
+               borders_rate = guide_->rate(BoundaryGuide::pixel_border),
+               from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
+               from_camera_rate = guide_->rate(BoundaryGuide::from_camera);
+  const SamplePoints points(pass.stream, pass.range, options.numbers);
+  const PointSet of_edges = points.of_image(Technique::primary_edge);
+  const PointSet of_borders = points.of_image(Technique::pixel_border);
+  const PointSet of_segments = points.of_image(Technique::from_edge);
+  for_each_pixel(partition, [&](int pixel) {
+    points.in_image(of_edges, pixel, edges_rate, [&](Rng& rng) { primary.sample(splat_scale / edges_rate, rng); });
+    points.in_image(of_borders, pixel, borders_rate,
+                    [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
+    points.in_image(of_segments, pixel, from_edge_rate,
+                    [&](Rng& rng) { secondary.sample_from_edge(splat_scale / from_edge_rate, rng); });
+    const double rate = from_camera_rate * worker.pick.rate(pixel);
+    points.in_pixel(Technique::from_camera, pixel, rate,
+                    [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / rate, rng); });
+  });
+}
+
+void Passes::learn() const {
+  using Guide = BoundaryGuide;
+  edges_.emplace(scene, options.boundary.wedge);
+  Guide::Each<bool> possible;
+  possible[Guide::primary] = edges_->has_primary();
+  possible[Guide::pixel_border] = scene.flows.camera_possible();
+  possible[Guide::from_edge] = edges_->has_secondary();
+  possible[Guide::from_camera] = edges_->has_secondary() && options.boundary.from_camera;
+  const Guide& unguided = guide_.emplace(possible);
+  const auto searches = std::count(possible.begin(), possible.end(), true);
+  if (searches == 0) return;
+  const long long rounds =
+      std::llround(options.guiding_samples * scene.camera.pixels() / static_cast<double>(searches));
+  if (rounds < kFewestLearningRounds) return;
+  constexpr int kPartitions = kMostPartitions;  // their sums are few records
+  std::vector<std::vector<GuideRecord>> records(kPartitions);
+  std::vector<Guide::Each<double>> costs(kPartitions);
+  parallel(kPartitions, [&](int partition) {
+    GuideSink sink(gates, scene.layout, *basis);
+    Worker worker(scene, gates, options, every_gate, sink);
+    auto& cost = costs[partition];
+    cost.fill(0);
+    const auto run = [&](Guide::Technique technique, auto&& search) {
+      if (!possible[technique]) return;
+      const double before = worker.work();
+      search();
+      cost[technique] += worker.work() - before;
+    };
+    PrimaryBoundary primary(worker, *edges_, unguided, mix.interior == 1);
+    SecondaryBoundary secondary(worker, *edges_, unguided, mix.interior == 1);
+    const double splat_scale = 1.0 / scene.camera.pixels();
+    for (long long i = partition; i < rounds; i += kPartitions) {
+      throw_if_stopped();
+      const int pixel = static_cast<int>(i * scene.camera.pixels() / rounds) % scene.camera.pixels();
+      Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
+      run(Guide::primary, [&] { primary.sample(splat_scale, rng); });
+      run(Guide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
+      run(Guide::from_edge, [&] { secondary.sample_from_edge(splat_scale, rng); });
+      run(Guide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
+    }
+    records[partition] = std::move(sink.records);
+    count(worker);
+  });
+  std::vector<GuideRecord> all;
+  Guide::Each<double> cost{};
+  for (int partition = 0; partition < kPartitions; ++partition) {
+    all.insert(all.end(), records[partition].begin(), records[partition].end());
+    for (int t = 0; t < Guide::kTechniques; ++t) cost[t] += costs[partition][t];
+  }
+  guide_.emplace(possible, all, cost);
+}
+
+template <class F>
+void Passes::for_each_pixel(Partition partition, F&& f) const {
+  const int pixels = scene.camera.pixels(), stride = partition.count * kPixelsPerBlock;
+  for (int block = partition.index * kPixelsPerBlock; block < pixels; block += stride)
+    for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) f(pixel);
+}
+
+void Passes::count(const Worker& worker) const {
+  rays_ += worker.rays;
+  arcs_ += worker.arcs;
+}
+
+}  // namespace isochron

@@ -1,0 +1,93 @@
+// Passes over the samples: how the techniques share the samples of images and of each term of the derivative. What they
+// find goes to a sink.
+#pragma once
+#include <atomic>
+#include <mutex>
+#include <optional>
+
+#include "core/base/random.h"
+#include "core/films/sinks.h"
+#include "core/paths/options.h"
+#include "core/techniques/boundary_edges.h"
+#include "core/techniques/boundary_guide.h"
+#include "core/techniques/gate_pick.h"
+#include "core/techniques/target_lengths.h"
+#include "core/techniques/worker.h"
+
+namespace isochron {
+
+/// One of `count` partitions of the work of a pass: every partition takes its turn at the blocks of pixels.
+struct Partition {
+  int index, count;
+};
+
+/// A pass over samples [range) of every pixel.
+struct Pass {
+  const Stream& stream;
+  SampleRange range;
+};
+
+/// The passes of a scene made ready for rendering. Safe to share between threads.
+class Passes {
+ public:
+  /// `basis` says what moves; null or empty: nothing does. What this refers to must outlive it.
+  Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent);
+
+  /// Number of partitions of a pass where each partition has so many sums of its own.
+  int partitions_for(SampleRange range, std::size_t values) const;
+
+  /// Whether the term can be other than zero, so that a pass over it is worth while.
+  bool has(Term term) const;
+  /// Whether every sample of images or of the term adds to its own pixel alone, and has no numbers in common with those of
+  /// others.
+  bool stays_in_pixels() const { return mix.image == 0; }
+  bool stays_in_pixels(Term term) const { return term == Term::interior && mix.interior == 0; }
+
+  /// To be called before a term is run: the visibility term needs its edges, and its guiding learns. What is learned depends
+  /// on scene, gates, basis and options alone.
+  void prepare(Term term) const;
+
+  /// One partition of the images. `sink` is not differential.
+  void run_images(const Pass& pass, Partition partition, Sink& sink) const;
+  /// One partition of a term of the derivative, which was prepared; gates and pixels by `pick`. `sink` is differential.
+  void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
+
+  const GateSet& gates;
+  const EstimatorOptions options;
+  const TangentBasis* const basis;
+  const PreparedScene scene;
+  const SamplingMix mix;      ///< what the options resolve to
+  const GatePick every_gate;  ///< all gates and pixels alike
+
+  /// Rays traced so far.
+  long long rays() const { return rays_; }
+  /// Work done so far, in rays.
+  double work() const { return isochron::work(rays_, arcs_); }
+
+ private:
+  /// Whether the interior term takes the continuous part of dW in pairs.
+  bool interior_pairs() const;
+
+  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling. `rates` hold where
+  /// there are no others.
+  void run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths, const Pass& pass,
+                 Partition partition) const;
+  void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
+
+  void learn() const;
+
+  /// Runs f(pixel) for the pixels of one partition, in a fixed order.
+  template <class F>
+  void for_each_pixel(Partition partition, F&& f) const;
+
+  /// Adds the rays and arcs of a worker that has done its work.
+  void count(const Worker& worker) const;
+
+  double pair_gain_ = 1;
+  mutable std::atomic<long long> rays_{0}, arcs_{0};
+  mutable std::once_flag learned_;
+  mutable std::optional<BoundaryEdges> edges_;  ///< of the visibility term alone
+  mutable std::optional<BoundaryGuide> guide_;  ///< likewise
+};
+
+}  // namespace isochron

@@ -1,0 +1,350 @@
+#include "core/techniques/secondary_boundary.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isochron {
+namespace {
+
+constexpr double kTowardsCamera = 32;  // rays within 1 / 32 of a touched surface miss it
+
+/// Where the line from D through an edge meets an emitter's plane: D + p (height / -(n.p)), p = a + s c.
+struct ShadowLine {
+  Vec3 n, a, c;
+  double height;  ///< of D above the plane
+  ShadowLine(const PreparedScene& scene, const Vec3& d, const BoundaryEdge& edge, int emitter)
+      : n(scene.normal(emitter)),
+        a(edge.origin - d),
+        c(edge.end - edge.origin),
+        height(scene.height_over(emitter, d)) {}
+  /// The edge lies between D and the plane.
+  bool casts(double s) const {
+    const double towards = -dot(n, a + c * s);
+    return towards > 0 && towards < height;
+  }
+  /// |d (distance from D to the plane) / ds|
+  double distance_rate(double s) const {
+    const Vec3 p = a + c * s;
+    const double towards = -dot(n, p), norm = length(p);
+    return std::abs(height * (dot(p, c) / (norm * towards) + norm * dot(n, c) / (towards * towards)));
+  }
+};
+
+}  // namespace
+
+SecondaryBoundary::SecondaryBoundary(Worker& worker, const BoundaryEdges& edges, const BoundaryGuide& guide,
+                                     bool narrow_gates)
+    : worker_(worker),
+      scene_(worker.scene),
+      edges_(edges),
+      guide_(guide),
+      techniques_(worker.options.boundary),
+      at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
+      camera_over_edge_rate_(guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)),
+      aimed_share_(techniques_.aimed ? 0.5 : 0),
+      light_side_(worker, narrow_gates && techniques_.light_arcs) {}
+
+bool SecondaryBoundary::Segment::orient() {
+  const Vec3 normal = cross(y.tangent, w);
+  sine = length(normal);
+  if (!(sine > 0)) return false;
+  n_b = normal / sine;
+  side = BoundaryEdges::occluder_side(*y.edge, n_b);
+  return side != 0;
+}
+
+Vec3 SecondaryBoundary::Segment::offset_ray_origin(double offset) const {
+  return y.y - n_b * (side * offset) - w * (kTowardsCamera * offset);
+}
+
+void SecondaryBoundary::sample_from_edge(double scale, Rng& rng) {
+  Segment g;
+  const double x = edge_warp().sample(rng.uniform());
+  g.y = edges_.sample_secondary(x);
+  const double pick = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+  int aimed_at = -1;
+  if (pick < aimed_share_) {
+    double pdf;
+    const SurfacePoint target = scene_.sample_emitter(u0, u1, u2, pdf);
+    g.w = normalize(target.p - g.y.y);
+    aimed_at = target.triangle;
+  } else {
+    g.w = direction_in_wedge(g.y, u0, u1);
+  }
+  if (!g.orient()) return;
+  const bool may_end_flowing = g.y.edge->moves || may_meet_flowing(g, -g.w);
+  if (!(may_end_flowing || may_meet_flowing(g, g.w)) || !find_light_end(g)) return;
+  if (aimed_at >= 0 && g.light.triangle != aimed_at) return;
+  if (!(may_end_flowing || may_flow(g.light))) return;
+  ++worker_.rays;
+  const int t = scene_.caster.closest_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
+  if (t < 0 || !faces(t, g.w)) return;
+  g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
+  g.r_d = length(g.camera_end.p - g.y.y);
+  if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return;
+
+  connections_.clear();
+  walk_to_camera(g, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
+  finish(g, Found::from_edge, rng);
+  worker_.sink.note_guide(BoundaryGuide::table(BoundaryGuide::from_edge), x);
+}
+
+void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
+  // Each edge is drawn before the ray is traced to where it is wanted, so that it comes from memory meanwhile.
+  BoundaryEdges::Place place = place_from_camera(pixel, 1, rng);
+  if (!worker_.start_camera_path(pixel, rng)) return;
+  Path& path = worker_.path;
+  Rgb throughput(1.0);
+  double tau = 0;
+  if (at_length_) {
+    const double pick = rng.uniform(), u = rng.uniform();
+    tau = worker_.pick.sample_length(pixel, pick, u).value_or(0);
+  }
+  for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
+    if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
+    connect_edge(pixel, throughput * scale, place, rng);
+    if (at_length_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
+    if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
+    place = place_from_camera(pixel, bounce + 1, rng);
+    if (!append_vertex(worker_, path, throughput, rng)) return;
+  }
+}
+
+bool SecondaryBoundary::faces(int triangle, const Vec3& w) const {
+  return dot(scene_.normal(triangle), w) > 0 || scene_.material_of(triangle).two_sided ||
+         scene_.is_dielectric(triangle);
+}
+
+Vec3 SecondaryBoundary::direction_in_wedge(const BoundaryEdges::Sample& y, double u0, double u1) {
+  const BoundaryEdge& edge = *y.edge;
+  const Vec3& f0 = edge.inward[0];
+  Vec3 across = cross(y.tangent, f0);
+  if (edge.faces() == 2 && dot(across, edge.inward[1]) < 0) across = -across;
+  const double half = u0 < 0.5 ? 0 : 1;
+  const double beta = kPi - edge.azimuths + (2 * u0 - half) * edge.azimuths + half * kPi;
+  const double cosine = 2 * u1 - 1, sine = std::sqrt(1 - cosine * cosine);
+  return y.tangent * cosine + (f0 * std::cos(beta) + across * std::sin(beta)) * sine;
+}
+
+double SecondaryBoundary::direction_pdf(const Segment& g) const {
+  const double wedge = 1 / (4 * g.y.edge->azimuths);
+  double aimed = 0;
+  if (scene_.emits(g.light.triangle) && dot(g.light.n, g.w) < 0)
+    aimed = scene_.emitter_pdf(g.light.triangle) * g.r_s * g.r_s / -dot(g.light.n, g.w);
+  return (1 - aimed_share_) * wedge + aimed_share_ * aimed;
+}
+
+bool SecondaryBoundary::find_light_end(Segment& g) {
+  ++worker_.rays;
+  const Vec3 start = g.offset_ray_origin(scene_.caster.offset());
+  const int t = scene_.caster.closest_hit(start, g.w);
+  if (t < 0 || !faces(t, -g.w)) return false;
+  g.light = scene_.point_on_triangle(t, start, g.w);  // beside the occluder even where it touches the surface
+  g.r_s = length(g.light.p - g.y.y);
+  return true;
+}
+
+bool SecondaryBoundary::differentiate(const Segment& g) {
+  const Vec3 b = g.n_b * g.side;
+  LocalDifferential& common = camera_flow_;
+  common.clear();
+  BoundaryEdges::add_velocity(scene_, g.y, b, common);
+  const double whole = g.r_s + g.r_d;
+  add_material_flow(scene_, g.light, b * (-g.r_d / whole), common);
+  material_flow_ = common;
+  add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), camera_flow_);
+  add_material_flow(scene_, g.camera_end, b * (-g.r_s / whole), material_flow_);
+  return !camera_flow_.empty() || !material_flow_.empty();
+}
+
+const LocalDifferential& SecondaryBoundary::with_following(const Segment& g, const Connection& c,
+                                                           const SurfacePoint& next) {
+  const int k = c.bounces;
+  const bool has_before = c.before.triangle >= 0, has_next = next.triangle >= 0;
+  const VertexFlows& flows = scene_.flows;
+  const LocalDifferential& base = k == 1 ? camera_flow_ : material_flow_;
+  const auto along = flows.pair(scene_, g.camera_end, g.light, k);
+  const auto before = has_before ? flows.pair(scene_, c.before, g.camera_end, k - 1) : VertexFlows::Pair{};
+  const auto after = has_next ? flows.pair(scene_, g.light, next, k + 1) : VertexFlows::Pair{};
+  const VertexFlow of_d = VertexFlows::at(before, along, k), of_s = VertexFlows::at(along, after, k + 1);
+  if (!of_d.follows() && !of_s.follows()) return base;
+  following_ = base;
+  const Vec3 b = g.n_b * (g.side / (g.r_s + g.r_d));
+  add_following_flow(scene_, of_d, &c.before, g.camera_end, &g.light, k, b * -g.r_s, following_);
+  add_following_flow(scene_, of_s, &g.camera_end, g.light, &next, k + 1, b * -g.r_d, following_);
+  return following_;
+}
+
+double SecondaryBoundary::camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k, int pixel) const {
+  if (!techniques_.from_camera) return 0;
+  double ratio = camera_over_edge_rate_ * worker_.pick.rate(pixel) * camera_warp(pixel, k).density(g.y.x()) /
+                 edge_warp().density(g.y.x());
+  ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) * solid_angle_to_area(x[0].p, x[1]) /
+           scene_.camera.pixels();
+  for (int j = 1; j < k; ++j)
+    ratio *= Scattering(x[j - 1].p, x[j], x[j + 1].p).pdf_towards_light(scene_.material_of(x[j].triangle)) *
+             solid_angle_to_area(x[j].p, x[j + 1]);
+  double from_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, x[k]);
+  for (int j = k; j > 1; --j) {
+    const Vec3& after = j == k ? g.y.y : x[j + 1].p;
+    from_edge *= Scattering(x[j - 1].p, x[j], after).pdf_towards_camera(scene_.material_of(x[j].triangle)) *
+                 solid_angle_to_area(x[j].p, x[j - 1]);
+  }
+  // Within round-off of the next vertex a path may seem impossible both ways.
+  return ratio > 0 ? ratio / from_edge : 0;
+}
+
+void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng) {
+  const CameraModel& camera = scene_.camera;
+  SurfacePoint eye;
+  eye.p = camera.position;
+  Rgb throughput(1.0);
+  walk_.assign(1, g.camera_end);
+  Vec3 from = g.w;  // unit, towards where the light comes from
+  double walked = 0;
+  for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
+    const SurfacePoint x = walk_.back();
+    const Material& material = scene_.material_of(x.triangle);
+    const Vec3 to_camera = camera.position - x.p;
+    const double distance = length(to_camera);
+    if (const int pixel = camera.project(x.p); pixel >= 0) {
+      const Vec3 w_o = to_camera / distance;
+      const double scattered = lobe(material, dot(x.n, from), dot(x.n, w_o), dot(from, w_o));
+      // Zero for a face seen edge-on, which has no flow along the pixel's ray either.
+      const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
+      if (scattered > 0 && importance > 0 && worker_.visible_from_camera(x)) {
+        camera_side_.assign(1, eye);
+        camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
+        connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
+                                walked + distance * scene_.index_between(x, eye),
+                                camera_over_edge(g, camera_side_, bounce, pixel),
+                                bounce > 1 ? walk_[1] : SurfacePoint{}});
+      }
+    }
+    if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
+    const auto next = trace_next_vertex(worker_, x, from, throughput, rng, TransportMode::importance);
+    if (!next) return;
+    from = -next->direction;
+    walked += length(next->point.p - x.p) * scene_.index_between(x, next->point);
+    const double others = g.r_d + g.r_s + length(next->point.p - camera.position);
+    if (walked + others * scene_.least_index() > worker_.gates.upper()) return;
+    walk_.push_back(next->point);
+  }
+}
+
+BoundaryEdges::Place SecondaryBoundary::place_from_camera(int pixel, int bounces, Rng& rng) const {
+  return edges_.place_secondary(camera_warp(pixel, bounces).sample(rng.uniform()));
+}
+
+void SecondaryBoundary::connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Place& place, Rng& rng) {
+  Segment g;
+  g.y = BoundaryEdges::Sample(place);
+  if (join_camera_path(g, pixel, throughput)) finish(g, Found::from_camera, rng);
+  worker_.sink.note_guide(camera_table(pixel, worker_.path.size() - 1), place.x());
+}
+
+void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng) {
+  const double u_edge = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+  double pdf_area;
+  const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
+  Segment g;
+  const int table = camera_table(pixel, worker_.path.size() - 1);
+  g.y = edges_.sample_secondary(guide_.warp(table).sample(u_edge));
+  const double left = tau - worker_.path.length.back();
+  const ShadowLine line(scene_, worker_.path.back().p, *g.y.edge, emitter);
+  if (!(left > 0) || !(line.height > 0)) return;
+  // height^2 |p|^2 = left^2 (n.p)^2 with p = a + s c.
+  const double h2 = line.height * line.height, l2 = left * left;
+  const double an = dot(line.a, line.n), cn = dot(line.c, line.n);
+  const double q2 = h2 * dot(line.c, line.c) - l2 * cn * cn, q1 = h2 * dot(line.a, line.c) - l2 * an * cn,
+               q0 = h2 * dot(line.a, line.a) - l2 * an * an;
+  const double discriminant = q1 * q1 - q0 * q2;
+  if (!(discriminant >= 0)) return;
+  const double q = -(q1 + std::copysign(std::sqrt(discriminant), q1));
+  for (const double s : {q / q2, q0 / q}) {
+    if (!(s > 0 && s < 1) || !line.casts(s)) continue;
+    g.y.s = s;
+    g.y.y = g.y.edge->point(s);
+    if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) continue;
+    const Connection& c = connections_[0];
+    const double rate = length_over_random(g, c);
+    const Rgb radiance = scene_.emitted(g.light, -g.w);
+    if (!(rate > 0) || radiance.is_black()) continue;
+    const LocalDifferential& differential = with_following(g, c, {});
+    if (differential.empty()) continue;
+    worker_.sink.bind(differential);
+    worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
+    // The balance heuristic cancels this technique's own rate.
+    worker_.sink.add(pixel, c.value * radiance * (1 / (1 / c.camera_over_edge + 1 + rate)), tau, kValueOnly);
+    worker_.sink.note_guide(table, g.y.x());
+  }
+}
+
+double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c) const {
+  if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
+  const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
+  const int t = g.light.triangle;
+  const Warp& warp = camera_warp(c.pixel, c.bounces);
+  const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
+  return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area(t) *
+         worker_.pick.length_pdf(c.pixel, c.length + g.r_d + g.r_s) * line.distance_rate(g.y.s);
+}
+
+bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throughput) {
+  const Path& path = worker_.path;
+  g.camera_end = path.back();
+  const Vec3 d = g.y.y - g.camera_end.p;
+  g.r_d = length(d);
+  if (!(g.r_d > 0)) return false;
+  g.w = d / g.r_d;
+  const int k = path.size() - 1;
+  const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
+  const Material& material = scene_.material_of(g.camera_end.triangle);
+  const double scattered = s.lobe(material);
+  if (!(scattered > 0) || !g.orient()) return false;
+  if (!(g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
+  if (!find_light_end(g)) return false;
+  if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return false;
+  ++worker_.rays;
+  if (scene_.caster.occluded(scene_.offset_ray_origin(g.camera_end, g.w), g.offset_ray_origin(scene_.caster.offset())))
+    return false;
+  const double factor =
+      g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x())) * scattered;
+  connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back(),
+                          camera_over_edge(g, path.vertex, k, pixel), k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
+  return true;
+}
+
+void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
+  if (connections_.empty()) return;
+  int fewest = connections_[0].bounces;
+  before_.clear();
+  const double length = (g.r_d + g.r_s) * scene_.index_between(g.camera_end, g.light);
+  for (const Connection& c : connections_) {
+    fewest = std::min(fewest, c.bounces);
+    before_.push_back({c.pixel, c.length + length});
+  }
+  const auto& lights = light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng);
+  const bool may_follow = scene_.flows.possible_at(g.camera_end.p) || scene_.flows.possible_at(g.light.p) ||
+                          scene_.flows.camera_possible_at(g.camera_end.p);
+  const LocalDifferential* bound = nullptr;
+  for (std::size_t i = 0; i < connections_.size(); ++i) {
+    const Connection& c = connections_[i];
+    const LocalDifferential* differential = c.bounces == 1 ? &camera_flow_ : &material_flow_;
+    if (!may_follow && differential->empty()) continue;
+    const double ratio = c.camera_over_edge;
+    for (const GatheredLight& e : lights) {
+      if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
+      if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
+      if (may_follow) differential = &with_following(g, c, e.next);
+      if (differential->empty()) continue;
+      if (may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
+      const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
+      const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
+      worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0]);
+      worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i].length + e.length, kValueOnly);
+    }
+  }
+}
+
+}  // namespace isochron
