@@ -1,7 +1,5 @@
 #include "core/techniques/worker.h"
 
-#include <algorithm>
-
 namespace isochron {
 
 Worker::Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator,
@@ -14,12 +12,6 @@ Worker::Worker(const PreparedScene& prepared, const GateSet& gate_set, const Est
       sink(target),
       differential_sink(target.differential()),
       path(estimator.max_bounces) {}
-
-Vec3 Worker::direction_through(int pixel, Rng& rng) const {
-  const CameraModel& camera = scene.camera;
-  const double u = pixel % camera.width + rng.uniform(), v = pixel / camera.width + rng.uniform();
-  return camera.direction(u, v);
-}
 
 void Worker::start_at_camera(Path& camera_path) const {
   SurfacePoint eye;
@@ -52,18 +44,6 @@ void Worker::emit_length_rate(const Path& p, int pixel, int gate, const Rgb& val
   sink.add_length_rate(pixel, gate, value);
 }
 
-std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back,
-                                      Rgb& throughput, Rng& rng, TransportMode mode) {
-  const Material& material = scene.material_of(x.triangle);
-  const double u0 = rng.uniform(), u1 = rng.uniform();
-  const double u2 = material.type == MaterialType::rough_dielectric ? rng.uniform() : 0;
-  const auto next = sample_direction(material, x.n, w_back, u0, u1, u2, mode);
-  if (!next) return std::nullopt;
-  throughput *= material.albedo * next->weight;
-  if (throughput.is_black()) return std::nullopt;
-  return BsdfSample{next->direction, next->pdf};
-}
-
 std::optional<NextVertex> trace_next_vertex(Worker& worker, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput,
                                             Rng& rng, TransportMode mode) {
   const auto next = sample_bsdf(worker.scene, x, w_back, throughput, rng, mode);
@@ -79,14 +59,6 @@ bool append_vertex(Worker& worker, Path& path, Rgb& throughput, Rng& rng) {
   const auto next = trace_next_vertex(worker, x, w_back, throughput, rng);
   if (next) path.push(worker.scene, next->point);
   return next.has_value();
-}
-
-bool russian_roulette(Rgb& throughput, int bounce, Rng& rng) {
-  if (bounce < kRouletteBounce) return true;
-  const double survival = std::min(throughput.max(), 0.95);
-  if (!(rng.uniform() < survival)) return false;
-  throughput *= 1 / survival;
-  return true;
 }
 
 }  // namespace isochron

@@ -1,6 +1,7 @@
 // What one partition of the work carries from sample to sample, the vertices that paths are built of, and how complete
-// paths reach the sink.
+// paths reach the sink. What takes random numbers on every bounce is inline, so that their state stays in registers.
 #pragma once
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -65,7 +66,11 @@ struct Worker {
   }
 
   /// Of a ray from the camera through a random point of the pixel; unit.
-  Vec3 direction_through(int pixel, Rng& rng) const;
+  Vec3 direction_through(int pixel, Rng& rng) const {
+    const CameraModel& camera = scene.camera;
+    const double u = pixel % camera.width + rng.uniform(), v = pixel / camera.width + rng.uniform();
+    return camera.direction(u, v);
+  }
   /// Starts `camera_path` with the camera.
   void start_at_camera(Path& camera_path) const;
   /// Starts `path` with the camera and the surface point seen through a random point of the pixel.
@@ -90,8 +95,17 @@ struct BsdfSample {
 
 /// Samples the direction in which a path goes on from x, which looks back along the unit vector w_back. `throughput` gets
 /// the BSDF's weight. Empty where the path ends.
-std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back,
-                                      Rgb& throughput, Rng& rng, TransportMode mode = TransportMode::radiance);
+inline std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back,
+                                             Rgb& throughput, Rng& rng, TransportMode mode = TransportMode::radiance) {
+  const Material& material = scene.material_of(x.triangle);
+  const double u0 = rng.uniform(), u1 = rng.uniform();
+  const double u2 = material.type == MaterialType::rough_dielectric ? rng.uniform() : 0;
+  const auto next = sample_direction(material, x.n, w_back, u0, u1, u2, mode);
+  if (!next) return std::nullopt;
+  throughput *= material.albedo * next->weight;
+  if (throughput.is_black()) return std::nullopt;
+  return BsdfSample{next->direction, next->pdf};
+}
 
 struct NextVertex {
   SurfacePoint point;
@@ -110,6 +124,12 @@ bool append_vertex(Worker& worker, Path& path, Rgb& throughput, Rng& rng);
 inline constexpr int kRouletteBounce = 3;
 
 /// Russian roulette on `throughput`, which started at one: true to go on, with the throughput raised accordingly.
-bool russian_roulette(Rgb& throughput, int bounce, Rng& rng);
+inline bool russian_roulette(Rgb& throughput, int bounce, Rng& rng) {
+  if (bounce < kRouletteBounce) return true;
+  const double survival = std::min(throughput.max(), 0.95);
+  if (!(rng.uniform() < survival)) return false;
+  throughput *= 1 / survival;
+  return true;
+}
 
 }  // namespace isochron
