@@ -126,8 +126,8 @@ class PreparedScene {
     pdf = emitter_pdf(t);
     return point_on_emitter(t, u1, u2);
   }
-  /// The same in steps, so that what each reads is on its way from memory while something else is done; the first may be
-  /// left out.
+  /// The same in three steps, each of which prefetches what the next one reads, so that other work can be done meanwhile;
+  /// the first is optional.
   void prefetch_light(double u) const {
     const int i = emitter_distribution_.expect(u);
     __builtin_prefetch(&emitters[i]);
@@ -172,17 +172,17 @@ class PreparedScene {
     return {origin + direction * distance, r.normal, triangle};
   }
 
-  /// The triangle that the ray from `x` (offset off its surface) along the unit direction w meets first, or -1. Its record is
-  /// on its way from memory: who has other things to do meanwhile does not wait for it.
+  /// The triangle that the ray from `x` (offset off its surface) along the unit direction w hits first, or -1. Its record is
+  /// prefetched: a caller that has other work to do first does not wait for it.
   int closest_hit(const SurfacePoint& x, const Vec3& w) const { return prefetched_hit(offset_ray_origin(x, w), w); }
-  /// The same of what is not farther away than `distance`, or a little more.
+  /// The same up to `distance`, or a little more; without the prefetch.
   int closest_hit_within(const SurfacePoint& x, const Vec3& w, double distance) const {
     const Vec3 start = offset_ray_origin(x, w);
     return caster.closest_hit(start, w, static_cast<float>(distance + 4 * caster.offset()));
   }
   /// The same of a ray from the camera.
   int closest_camera_hit(const Vec3& direction) const { return prefetched_hit(camera.position, direction); }
-  /// Where the ray from `origin` along w, which meets `triangle` (-1: none), ends; empty also for a face along which it runs.
+  /// Where the ray from `origin` along w, which hits `triangle` (-1: none), ends; empty also for a face along which it runs.
   std::optional<SurfacePoint> end_point(int triangle, const Vec3& origin, const Vec3& w) const {
     if (triangle < 0 || dot(records_[triangle].normal, w) == 0) return std::nullopt;
     return point_on_triangle(triangle, origin, w);

@@ -31,7 +31,7 @@ class BoundaryEdges {
   /// `wedge`: pick edges and azimuths by the wedge of grazing directions (see BoundaryTechniques).
   explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true);
 
-  /// Which edge, and where on it. The edge itself is on its way from memory.
+  /// Which edge, and where on it. The edge itself is prefetched.
   struct Place {
     const BoundaryEdge* edge = nullptr;
     double s = 0;                 ///< fraction along the edge
@@ -55,7 +55,7 @@ class BoundaryEdges {
   /// where what lies behind or before them moves) get equal shares.
   bool has_secondary() const { return !secondary_.distribution.empty(); }
   Sample sample_secondary(double u) const { return Sample(place_secondary(u)); }
-  /// The same in two steps, for who has something else to do before the edge is there.
+  /// The same in two steps, for callers with other work to do while the edge is read from memory.
   Place place_secondary(double u) const { return secondary_.place(u); }
 
   /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on

@@ -59,8 +59,8 @@ class EllipsoidalConnections {
   /// Connections at the path's last vertex and at those of a walk from there.
   void connect_along(int pixel, double scale, int max_bounces, Rng& rng);
 
-  /// Whether a connection of the worker's path to an emitter's triangle may contribute whatever the arc's point in between.
-  /// If not (a derivative of what is static at both ends), it does so through vertices between that can move alone.
+  /// Whether a connection of the worker's path to an emitter's triangle may contribute by whatever point on an arc. If not,
+  /// for neither the path nor the emitter has a gradient, it does so only by points on triangles that move.
   bool any_arc_contributes(int emitter_triangle) const;
 
   void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);

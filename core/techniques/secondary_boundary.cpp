@@ -90,7 +90,7 @@ void SecondaryBoundary::sample_from_edge(double scale, Rng& rng) {
 }
 
 void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
-  // Each edge is drawn before the ray is traced to where it is wanted, so that it comes from memory meanwhile.
+  // Each edge is drawn, and so prefetched, before the ray is traced to the vertex that needs it.
   BoundaryEdges::Place place = place_from_camera(pixel, 1, rng);
   if (!worker_.start_camera_path(pixel, rng)) return;
   Path& path = worker_.path;

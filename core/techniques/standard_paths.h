@@ -20,7 +20,7 @@ class StandardPaths {
   void finish();
 
  private:
-  /// At most one path under way.
+  /// Holds the path under way, if any.
   class Slot {
    public:
     Slot(Worker& worker, bool pairs) : worker_(worker), path_(worker.options.max_bounces), pairs_(pairs) {}

@@ -124,6 +124,7 @@ inline double direction_pdf(const Material& material, double cos_i, double cos_o
 /// dielectrics; a dielectric reflects or refracts, by `u2` and in proportion to Fresnel's reflectance. Empty when
 /// nothing is scattered. A two-sided material seen from behind scatters to the side of the given direction.
 std::optional<DirectionSample> sample_direction(const Material& material, const Vec3& n, const Vec3& given, double u0,
-                                                double u1, double u2 = 0.5, TransportMode mode = TransportMode::radiance);
+                                                double u1, double u2 = 0.5,
+                                                TransportMode mode = TransportMode::radiance);
 
 }  // namespace isochron
