@@ -63,11 +63,6 @@ std::vector<GradientCost> measure_all(const Problem& problem, const std::vector<
 
 }  // namespace
 
-const char* name(Sampling sampling) {
-  constexpr const char* kNames[] = {"auto", "standard", "ellipsoidal"};
-  return kNames[static_cast<int>(sampling)];
-}
-
 void choose_samples(Advice& advice, double pixels) {
   // Points count alike: each by its variance relative to that of the present setting.
   std::vector<double> weights;

@@ -3,33 +3,58 @@
 #include <algorithm>
 
 #include "core/base/error.h"
-#include "optim/experiment/experiment_reader.h"
-#include "optim/experiment/number_file.h"
+#include "optim/experiment/choices.h"
+#include "optim/experiment/description.h"
 
 namespace isochron {
 namespace {
 
 constexpr double kSpeedOfLight = 299792458;  // m/s
 constexpr int kMostGates = 100000;
-const std::vector<std::string> kGateKinds = {"steady", "gaussian", "boxcar", "truncated_gaussian", "tabulated"};
 
-std::vector<double> read_centers(const YamlValue& value) {
-  std::vector<double> centers;
-  if (value.is_map()) {
-    YamlMap map = value.map();
-    const double start = map.require("start").number(NumberRange::non_negative());
-    const YamlValue stop_value = map.require("stop");
-    const double stop = stop_value.number(NumberRange::non_negative());
-    const int count = static_cast<int>(map.require("count").integer(1, kMostGates));
-    map.reject_unknown();
-    if (stop < start) stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
-    for (int i = 0; i < count; ++i) centers.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
-    return centers;
-  }
-  if (!value.is_list()) value.fail("is neither", "a list of numbers, or {start, stop, count}");
-  centers = value.numbers(NumberRange::non_negative());
-  if (centers.empty()) value.fail("holds no gate", "at least one number");
-  return centers;
+/// A list of numbers, or {start, stop, count}.
+Field centers(std::vector<double>& variable) {
+  const auto read = [&variable](const YamlValue& value) {
+    if (value.is_map()) {
+      double start = 0, stop = 0;
+      int count = 0;
+      const auto check = [&](const YamlValue& place) {
+        if (stop < start) place.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
+      };
+      read_keys(value, [&](Keys& keys) {
+        keys.value("start", field::non_negative(start), "", {.required = true});
+        keys.value("stop", field::checked(field::non_negative(stop), check), "", {.required = true});
+        keys.value("count", field::integer(count, 1, kMostGates), "", {.required = true});
+      });
+      variable.clear();
+      for (int i = 0; i < count; ++i) variable.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
+      return;
+    }
+    if (!value.is_list()) value.fail("is neither", "a list of numbers, or {start, stop, count}");
+    variable = value.numbers(NumberRange::non_negative());
+    if (variable.empty()) value.fail("holds no gate", "at least one number");
+  };
+  return {"list of numbers, or {start, stop, count}", "at least 0", read, [&variable] { return yaml_list(variable); }};
+}
+
+/// Rows of an offset and a value.
+Field table(GateSpec& gates, ExperimentFolder& folder) {
+  const auto read = [&](const YamlValue& value) {
+    for (const auto& row : folder.read_numbers(value, 2)) {
+      gates.offsets.push_back(row[0]);
+      gates.values.push_back(row[1]);
+    }
+  };
+  return {"text file", "rows of an offset and a value", read, [] { return std::string(); }};
+}
+
+void check_table(const GateSpec& gates, const YamlValue& value) {
+  const bool sorted = std::is_sorted(gates.offsets.begin(), gates.offsets.end());
+  const bool positive = std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
+                        std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
+  if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive)
+    value.fail("the table is no gate",
+               "two rows or more, offsets in rising order, values at least 0 and one of them above");
 }
 
 /// Path lengths are sums of doubles, each rounded to 1e-16 of itself, over thousands of segments at most: narrower gates
@@ -46,70 +71,8 @@ void require_resolved(const GateSet& gates, const YamlValue& value) {
   if (!(width <= kMostWidth)) value.fail(fmt::format("gates are {:.3g} scene units wide", width), "at most 1e100");
 }
 
-/// A misplaced key gets its kind named.
-void explain_keys_of_other_kinds(GateKind kind, YamlMap& map) {
-  const std::string name = kGateKinds[static_cast<int>(kind)];
-  map.explain("sigma", "belongs to gaussian and truncated_gaussian, not to " + name);
-  map.explain("width", "belongs to boxcar, not to " + name);
-  map.explain("half_width", "belongs to truncated_gaussian, not to " + name);
-  for (const char* key : {"file", "offsets", "values"}) map.explain(key, "belongs to tabulated, not to " + name);
-  map.explain("centers", "belongs to every kind but steady");
-}
-
-}  // namespace
-
-std::string existing_file(const YamlValue& value, const InputFolder& folder) {
-  const std::string text = value.text();
-  std::error_code none;  // such as of names that are too long
-  const std::filesystem::path path = std::filesystem::weakly_canonical(folder.path / text, none);
-  if (none || !std::filesystem::is_regular_file(path, none))
-    value.fail("there is no file " + quote(text), "a path relative to the experiment file");
-  return path.string();
-}
-
-std::vector<std::vector<double>> read_numbers(const YamlValue& value, InputFolder& folder, int columns) {
-  folder.number_files.push_back(existing_file(value, folder));
-  return read_number_file(folder.number_files.back(), columns);
-}
-
-GateSpec read_gates(const YamlValue& value, InputFolder& folder) {
-  YamlMap map = value.map();
-  GateSpec gates;
-  gates.kind = static_cast<GateKind>(map.require("kind").choice(kGateKinds));
-  if (const auto unit = map.find("unit")) gates.unit = static_cast<LengthUnit>(unit->choice({"scene", "ns", "ps"}));
-  if (gates.unit != LengthUnit::scene)
-    gates.scene_unit_m = map.require("scene_unit_m").number(NumberRange::positive());
-  else if (const auto metres = map.find("scene_unit_m"))
-    gates.scene_unit_m = metres->number(NumberRange::positive());
-  if (gates.kind != GateKind::steady) gates.centers = read_centers(map.require("centers"));
-  const auto positive = [&](const char* key) { return map.require(key).number(NumberRange::positive()); };
-  if (gates.kind == GateKind::gaussian || gates.kind == GateKind::truncated_gaussian) gates.sigma = positive("sigma");
-  if (gates.kind == GateKind::boxcar) gates.width = positive("width");
-  if (gates.kind == GateKind::truncated_gaussian) gates.half_width = positive("half_width");
-  if (gates.kind == GateKind::tabulated) {
-    if (const auto file = map.find("file")) {
-      for (const auto& row : read_numbers(*file, folder, 2)) {
-        gates.offsets.push_back(row[0]);
-        gates.values.push_back(row[1]);
-      }
-    } else {
-      gates.offsets = map.require("offsets").numbers();
-      const YamlValue values = map.require("values");
-      gates.values = values.numbers();
-      if (gates.values.size() != gates.offsets.size())
-        values.fail(fmt::format("{} values are given", gates.values.size()),
-                    fmt::format("one for each of the {} offsets", gates.offsets.size()));
-    }
-    const bool sorted = std::is_sorted(gates.offsets.begin(), gates.offsets.end());
-    const bool positive_values =
-        std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
-        std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
-    if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive_values)
-      value.fail("the table is no gate",
-                 "two rows or more, offsets in rising order, values at least 0 and one of them above");
-  }
-  explain_keys_of_other_kinds(gates.kind, map);
-  map.reject_unknown();
+void check_gates(const GateSpec& gates, const YamlValue& value) {
+  if (gates.kind == GateKind::tabulated) check_table(gates, value);
   try {
     require_resolved(make_gates(gates), value);
   } catch (const InputError&) {
@@ -117,7 +80,44 @@ GateSpec read_gates(const YamlValue& value, InputFolder& folder) {
   } catch (const std::exception& error) {
     value.fail(error.what());
   }
-  return gates;
+}
+
+}  // namespace
+
+void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
+  using enum GateKind;
+  const auto of = [&](std::initializer_list<GateKind> kinds) { return only(gates.kind, kinds); };
+  const char* const own_unit = "`unit`";
+  keys.value("kind", field::choice(gates.kind), "path-length importance: how much light of a length counts",
+             {.required = true});
+  keys.value("unit", field::choice(gates.unit), "of all lengths here; of a time, how far light travels in it");
+  keys.value("scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
+             {.required = gates.unit != LengthUnit::scene,
+              .unit = "metres",
+              .unset = gates.scene_unit_m == 0,
+              .otherwise = "required for ns and ps"});
+  keys.value("centers", centers(gates.centers),
+             "one per gate: lengths of whole paths, camera and light segments included",
+             {.required = true, .only = {gates.kind != steady, "every kind but steady"}, .unit = own_unit});
+  keys.value("sigma", field::positive(gates.sigma), "standard deviation",
+             {.required = true, .only = of({gaussian, truncated_gaussian}), .unit = own_unit});
+  keys.value("width", field::positive(gates.width), "from end to end",
+             {.required = true, .only = of({boxcar}), .unit = own_unit});
+  keys.value("half_width", field::positive(gates.half_width), "from the centre to either end",
+             {.required = true, .only = of({truncated_gaussian}), .unit = own_unit});
+  const bool from_file = keys.value("file", table(gates, folder), "in place of `offsets` and `values`",
+                                    {.only = of({tabulated}), .unit = own_unit, .unset = true});
+  const Only in_line = from_file ? Only{false, "tables without a file"} : of({tabulated});
+  keys.value("offsets", field::numbers(gates.offsets), "from the centre, rising; an offset given twice is a jump",
+             {.required = true, .only = in_line, .unit = own_unit});
+  const auto same_count = [&](const YamlValue& value) {
+    if (gates.values.size() != gates.offsets.size())
+      value.fail(fmt::format("{} values are given", gates.values.size()),
+                 fmt::format("one for each of the {} offsets", gates.offsets.size()));
+  };
+  keys.value("values", field::checked(field::numbers(gates.values), same_count),
+             "one per offset, at least 0; scaled to an integral of 1", {.required = true, .only = in_line});
+  keys.check([&](const YamlValue& value) { check_gates(gates, value); });
 }
 
 double length_unit(const GateSpec& spec) {
