@@ -55,6 +55,15 @@ Field numbers(std::vector<double>& variable) {
           [&variable] { return yaml_list(variable); }};
 }
 
+Field color(Rgb& variable, const NumberRange& range, bool& grey) {
+  const auto read = [&variable, &grey, range](const YamlValue& value) { variable = value.color(range, grey); };
+  const auto write = [&variable] {
+    return variable == Rgb(variable.r) ? fmt::format("{}", variable.r)
+                                       : yaml_vector({variable.r, variable.g, variable.b});
+  };
+  return {"number or [r, g, b]", range.describe(), read, write};
+}
+
 Field choice(const std::vector<std::pair<std::string, std::string>>& names_and_meanings, std::function<void(int)> set,
              std::function<std::string()> write) {
   std::vector<std::string> names;
@@ -116,6 +125,14 @@ class Reader final : public Keys {
   void map(const std::string& name, const Describe& describe, const std::string&, const KeyOptions& options) override {
     if (const auto found = find(name, options)) read_keys(*found, describe);
   }
+  void named(const std::string& name, const std::vector<std::string>&, const DescribeNamed& describe,
+             const std::string&, const KeyOptions& options) override {
+    const auto found = find(name, options);
+    if (!found) return;
+    YamlMap all = found->map();
+    for (const auto& [key, entry] : all.entries())
+      read_keys(entry, [&, &own = key](Keys& keys) { describe(keys, own); });
+  }
   void remember(Places& places) override {
     places_ = &places;
     places.emplace("", value_);
@@ -165,6 +182,15 @@ class Writer final : public Keys {
     Writer inner(keys_, path_ + name + ".", lead_ + "  ");
     describe(inner);
   }
+  void named(const std::string& name, const std::vector<std::string>& names, const DescribeNamed& describe,
+             const std::string& meaning, const KeyOptions& options) override {
+    const auto all = [&](Keys& keys) {
+      for (const std::string& own : names)
+        keys.map(
+            own, [&](Keys& inner) { describe(inner, own); }, "");
+    };
+    map(name, all, meaning, options);
+  }
 
  private:
   void entries(const std::string& name, std::size_t count, const DescribeEntry& describe, const std::string&,
@@ -202,6 +228,11 @@ class Page final : public Keys {
   void map(const std::string& name, const Describe& describe, const std::string& meaning,
            const KeyOptions& options) override {
     nested(name, "map", describe, meaning, options);
+  }
+  void named(const std::string& name, const std::vector<std::string>&, const DescribeNamed& describe,
+             const std::string& meaning, const KeyOptions& options) override {
+    nested(
+        name, "map of maps, by name", [&](Keys& keys) { describe(keys, "NAME"); }, meaning, options);
   }
 
  private:

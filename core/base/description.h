@@ -29,9 +29,11 @@ struct Choice {
   const char* meaning;
 };
 
-/// The table of an enumeration that files hold: an array of Choice<E>, by specialisation.
+/// The table of an enumeration that files hold: an array of Choice<E>, by specialisation; others have none.
 template <class E>
-inline constexpr std::array<Choice<E>, 0> kChoices;
+struct NoTable;
+template <class E>
+inline constexpr NoTable<E> kChoices{};
 
 /// The name of a value in files.
 template <class E>
@@ -70,6 +72,7 @@ Field text(std::string& variable);
 Field vec3(Vec3& variable);
 Field direction(Vec3& variable);  ///< see YamlValue::direction
 Field numbers(std::vector<double>& variable);
+Field color(Rgb& variable, const NumberRange& range, bool& grey);  ///< see YamlValue::color
 Field choice(const std::vector<std::pair<std::string, std::string>>& names_and_meanings, std::function<void(int)> set,
              std::function<std::string()> write);
 template <class E>
@@ -127,6 +130,7 @@ struct KeyOptions {
 class Keys {
  public:
   using Describe = std::function<void(Keys&)>;
+  using DescribeNamed = std::function<void(Keys&, const std::string& name)>;
   using Places = std::map<std::string, YamlValue>;
   virtual ~Keys() = default;
 
@@ -145,6 +149,9 @@ class Keys {
     };
     entries(name, items.size(), entry, meaning, options);
   }
+  /// A map of maps, each under a name of the user's; `names` are those to be written.
+  virtual void named(const std::string& name, const std::vector<std::string>& names, const DescribeNamed& describe,
+                     const std::string& meaning, const KeyOptions& options = {}) = 0;
   /// From here on, where each key stands that the file has; under "", the map.
   virtual void remember(Places&) {}
   /// Checks of several keys together, on the map that they stand in. To be called when all its keys have been named.
@@ -164,6 +171,7 @@ struct WrittenKey {
   std::string path;  ///< such as "parameters[0].name"
   std::string lead;  ///< what the line begins with: blanks, and a dash where an entry of a list begins
   std::string name, value;
+  bool operator==(const WrittenKey&) const = default;
 };
 std::vector<WrittenKey> written_keys(const Keys::Describe& describe);
 /// Those of the paths, with what is in them and what they are in.

@@ -18,14 +18,14 @@ inline constexpr auto kChoices<LengthUnit> = std::to_array<Choice<LengthUnit>>(
     {{LengthUnit::scene, "scene", "scene units"}, {LengthUnit::ns, "ns", ""}, {LengthUnit::ps, "ps", ""}});
 
 template <>
-inline constexpr auto kChoices<ParameterType> =
-    std::to_array<Choice<ParameterType>>({{ParameterType::translation, "translation", ""},
-                                          {ParameterType::rotation, "rotation", "degrees"},
-                                          {ParameterType::vertices, "vertices", ""},
-                                          {ParameterType::albedo, "albedo", ""},
-                                          {ParameterType::roughness, "roughness", ""},
-                                          {ParameterType::ior, "ior", ""},
-                                          {ParameterType::emission, "emission", ""}});
+inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterType>>(
+    {{ParameterType::translation, "translation", "along `direction`, scene units"},
+     {ParameterType::rotation, "rotation", "about `axis`, degrees"},
+     {ParameterType::vertices, "vertices", "each on its own, along `direction`, scene units"},
+     {ParameterType::albedo, "albedo", "of a material; of a conductor its reflectance"},
+     {ParameterType::roughness, "roughness", "of a material"},
+     {ParameterType::ior, "ior", "of a rough_dielectric"},
+     {ParameterType::emission, "emission", "radiance of a shape that emits"}});
 
 template <>
 inline constexpr auto kChoices<VertexDirection> =
@@ -50,12 +50,12 @@ inline constexpr auto kChoices<Numbers> = std::to_array<Choice<Numbers>>(
 
 template <>
 inline constexpr auto kChoices<GradientMethod> = std::to_array<Choice<GradientMethod>>(
-    {{GradientMethod::analytic, "analytic", ""},
+    {{GradientMethod::analytic, "analytic", "derivatives of the renderer, term by term"},
      {GradientMethod::finite_difference, "finite_difference", "two images per unknown"}});
 
 template <>
 inline constexpr auto kChoices<LossKind> = std::to_array<Choice<LossKind>>(
-    {{LossKind::squared, "squared", ""},
+    {{LossKind::squared, "squared", "its square"},
      {LossKind::huber, "huber", "beyond `scale`, residuals pull like their size, not its square"},
      {LossKind::cauchy, "cauchy", "large residuals hardly pull"}});
 

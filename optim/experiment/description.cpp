@@ -44,14 +44,14 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
   keys.map("noise", noise, "Poisson noise of the rendered target", {.only = rendered, .unset = target.photons == 0});
 }
 
-void describe(Keys& keys, SampleSpec& samples) {
-  keys.value("primal", field::integer(samples.primal, 1, kMostSamples), "the images, for the loss");
-  keys.value("interior", field::integer(samples.interior, 0, kMostSamples),
-             "derivative: what moves within lit surfaces, and the gates' slopes; 0 leaves it out");
-  keys.value("visibility", field::integer(samples.visibility, 0, kMostSamples),
-             "derivative: moving silhouettes and shadow edges; a sample looks for one of them; 0 leaves it out");
-  keys.value("path_length", field::integer(samples.path_length, 0, kMostSamples),
-             "derivative: jumps of the gates; 0 leaves it out");
+void describe(Keys& keys, SampleSpec& s) {
+  keys.value("primal", field::integer(s.primal, 1, kMostSamples), "the images, for the loss");
+  keys.value("interior", field::integer(s.interior, 0, kMostSamples),
+             "derivative: what moves within lit surfaces, and the gates' slopes; 0: left out");
+  keys.value("visibility", field::integer(s.visibility, 0, kMostSamples),
+             "derivative: moving silhouettes and shadow edges; a sample looks for one of them; 0: left out");
+  keys.value("path_length", field::integer(s.path_length, 0, kMostSamples),
+             "derivative: jumps of the gates; 0: left out");
 }
 
 void describe_estimator(Keys& keys, EstimatorOptions& options, bool& guiding) {
@@ -62,11 +62,9 @@ void describe_estimator(Keys& keys, EstimatorOptions& options, bool& guiding) {
   keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
   keys.value("guiding", field::boolean(guiding),
              "visibility: learn where boundaries matter from a small share of the samples");
-  keys.value(
-      "follow", field::non_negative(options.follow),
-      "how far path vertices follow what is close to them on another body and moves otherwise; 0: not at all. Needed "
-      "where objects touch",
-      {.unit = "radii of the smaller body"});
+  keys.value("follow", field::non_negative(options.follow),
+             "how far path vertices follow what moves close to them (needed where objects touch); 0: not at all",
+             {.unit = "radii of the smaller body"});
   keys.value("follow_radius", field::non_negative(options.follow_radius), "the same of what the camera sees",
              {.unit = "widths of a pixel"});
 }
@@ -83,7 +81,7 @@ void describe(Keys& keys, GradientSpec& gradient) {
 }
 
 void describe(Keys& keys, LossSpec& loss) {
-  keys.value("kind", field::choice(loss.kind), "of what pixels differ by", {.required = true});
+  keys.value("kind", field::choice(loss.kind), "what counts of a pixel's residual", {.required = true});
   keys.value("scale", field::positive(loss.scale), "residuals beyond it count for less",
              {.only = only(loss.kind, {LossKind::huber, LossKind::cauchy}), .unit = "RMS of the target"});
 }
@@ -91,11 +89,9 @@ void describe(Keys& keys, LossSpec& loss) {
 void describe(Keys& keys, OptimizerSpec& optimizer) {
   const auto of = [&](OptimizerMethod method) { return only(optimizer.method, {method}); };
   keys.value("method", field::choice(optimizer.method), "how the unknowns are found");
-  keys.value(
-      "learning_rate", field::positive(optimizer.learning_rate),
-      "adam: largest step of an iteration, about; lbfgs: first trial step; levenberg_marquardt does not use it. Halved "
-      "whenever the loss rises",
-      {.unit = "the parameter's `scale`"});
+  keys.value("learning_rate", field::positive(optimizer.learning_rate),
+             "adam: largest step of an iteration, about; lbfgs: first trial step; halved whenever the loss rises",
+             {.unit = "the parameter's `scale`"});
   keys.value("iterations", field::integer(optimizer.iterations, 0, kMostIterations), "at most");
   keys.value("tolerance", field::non_negative(optimizer.tolerance),
              "converged once the images' RMSE is at most this; 0: never", {.unit = "RMS of the target"});
@@ -105,9 +101,7 @@ void describe(Keys& keys, OptimizerSpec& optimizer) {
                 {.required = true});
   };
   keys.map("stop", stop,
-           "converged once the mean loss of a window falls by less than its standard error; the result is then the "
-           "mean over "
-           "the last window",
+           "converged once the loss falls by less than its standard error; the result is the mean over the last window",
            {.unset = optimizer.stop_window == 0});
   RateDecay& decay = optimizer.decay;
   const auto halving = [&](Keys& inner) {
@@ -124,12 +118,7 @@ void describe(Keys& keys, OptimizerSpec& optimizer) {
 void describe(Keys& keys, OutputSpec& output) {
   keys.value("geometry", field::choice(output.geometry),
              "format of the meshes of the shapes that move: initial, final and, where known, target");
-  keys.value("every", field::integer(output.every, 0), "and those of every so many iterations; 0: none");
-}
-
-Field resolution(std::array<int, 2>& size) {
-  return {"[width, height]", "1 to 32768 each", [&size](const YamlValue& value) { size = read_resolution(value); },
-          [&size] { return fmt::format("[{}, {}]", size[0], size[1]); }};
+  keys.value("every", field::integer(output.every, 0), "and those of every so many; 0: none", {.unit = "iterations"});
 }
 
 void check_parameters(const Experiment& experiment) {
@@ -184,7 +173,7 @@ Field file_name(std::string& variable) {
 void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
   keys.value("name", file_name(e.name), "names the default output folder, `runs/NAME`", {.required = true});
   keys.value("scene", folder.file(e.scene), "the scene", {.required = true});
-  keys.value("resolution", resolution(e.resolution),
+  keys.value("resolution", resolution_field(e.resolution[0], e.resolution[1]),
              "in place of the scene's; the field of view stays across the width",
              {.unit = "pixels", .unset = e.resolution[0] == 0, .otherwise = "the camera's"});
   keys.map("gates", [&](Keys& inner) { describe(inner, e.gates, folder); }, "when the camera sees", {.required = true});

@@ -16,16 +16,13 @@ constexpr int kMostGates = 100000;
 Field centers(std::vector<double>& variable) {
   const auto read = [&variable](const YamlValue& value) {
     if (value.is_map()) {
-      double start = 0, stop = 0;
-      int count = 0;
-      const auto check = [&](const YamlValue& place) {
-        if (stop < start) place.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
-      };
-      read_keys(value, [&](Keys& keys) {
-        keys.value("start", field::non_negative(start), "", {.required = true});
-        keys.value("stop", field::checked(field::non_negative(stop), check), "", {.required = true});
-        keys.value("count", field::integer(count, 1, kMostGates), "", {.required = true});
-      });
+      YamlMap map = value.map();
+      const double start = map.require("start").number(NumberRange::non_negative());
+      const YamlValue stop_value = map.require("stop");
+      const double stop = stop_value.number(NumberRange::non_negative());
+      const int count = static_cast<int>(map.require("count").integer(1, kMostGates));
+      map.reject_unknown();
+      if (stop < start) stop_value.fail(fmt::format("{} lies before start", stop), fmt::format("at least {}", start));
       variable.clear();
       for (int i = 0; i < count; ++i) variable.push_back(count == 1 ? start : start + (stop - start) * i / (count - 1));
       return;
@@ -73,13 +70,14 @@ void require_resolved(const GateSet& gates, const YamlValue& value) {
 
 void check_gates(const GateSpec& gates, const YamlValue& value) {
   if (gates.kind == GateKind::tabulated) check_table(gates, value);
-  try {
-    require_resolved(make_gates(gates), value);
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::exception& error) {
-    value.fail(error.what());
-  }
+  const GateSet set = [&] {
+    try {
+      return make_gates(gates);
+    } catch (const std::exception& error) {
+      value.fail(error.what());
+    }
+  }();
+  require_resolved(set, value);
 }
 
 }  // namespace
@@ -87,29 +85,27 @@ void check_gates(const GateSpec& gates, const YamlValue& value) {
 void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
   using enum GateKind;
   const auto of = [&](std::initializer_list<GateKind> kinds) { return only(gates.kind, kinds); };
-  const char* const own_unit = "`unit`";
   keys.value("kind", field::choice(gates.kind), "path-length importance: how much light of a length counts",
              {.required = true});
   keys.value("unit", field::choice(gates.unit), "of all lengths here; of a time, how far light travels in it");
-  keys.value("scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
-             {.required = gates.unit != LengthUnit::scene,
-              .unit = "metres",
-              .unset = gates.scene_unit_m == 0,
-              .otherwise = "required for ns and ps"});
+  const bool timed = gates.unit != LengthUnit::scene;
+  keys.value(
+      "scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
+      {.required = timed, .unit = "metres", .unset = gates.scene_unit_m == 0, .otherwise = "required for ns, ps"});
   keys.value("centers", centers(gates.centers),
              "one per gate: lengths of whole paths, camera and light segments included",
-             {.required = true, .only = {gates.kind != steady, "every kind but steady"}, .unit = own_unit});
+             {.required = true, .only = {gates.kind != steady, "every kind but steady"}, .unit = "`unit`"});
   keys.value("sigma", field::positive(gates.sigma), "standard deviation",
-             {.required = true, .only = of({gaussian, truncated_gaussian}), .unit = own_unit});
+             {.required = true, .only = of({gaussian, truncated_gaussian}), .unit = "`unit`"});
   keys.value("width", field::positive(gates.width), "from end to end",
-             {.required = true, .only = of({boxcar}), .unit = own_unit});
+             {.required = true, .only = of({boxcar}), .unit = "`unit`"});
   keys.value("half_width", field::positive(gates.half_width), "from the centre to either end",
-             {.required = true, .only = of({truncated_gaussian}), .unit = own_unit});
+             {.required = true, .only = of({truncated_gaussian}), .unit = "`unit`"});
   const bool from_file = keys.value("file", table(gates, folder), "in place of `offsets` and `values`",
-                                    {.only = of({tabulated}), .unit = own_unit, .unset = true});
+                                    {.only = of({tabulated}), .unit = "`unit`", .unset = true});
   const Only in_line = from_file ? Only{false, "tables without a file"} : of({tabulated});
   keys.value("offsets", field::numbers(gates.offsets), "from the centre, rising; an offset given twice is a jump",
-             {.required = true, .only = in_line, .unit = own_unit});
+             {.required = true, .only = in_line, .unit = "`unit`"});
   const auto same_count = [&](const YamlValue& value) {
     if (gates.values.size() != gates.offsets.size())
       value.fail(fmt::format("{} values are given", gates.values.size()),

@@ -19,13 +19,11 @@ Field selection(Selection& variable) {
     }
     if (!value.is_map()) value.fail("is neither", "a list of vertex indices, or {box: {min, max}}");
     variable.kind = Selection::Kind::box;
-    read_keys(value, [&](Keys& keys) {
-      const auto box = [&](Keys& inner) {
-        inner.value("min", field::vec3(variable.min), "", {.required = true});
-        inner.value("max", field::vec3(variable.max), "", {.required = true});
-      };
-      keys.map("box", box, "", {.required = true});
-    });
+    YamlMap map = value.map(), box = map.require("box").map();
+    variable.min = box.require("min").vec3();
+    variable.max = box.require("max").vec3();
+    box.reject_unknown();
+    map.reject_unknown();
   };
   const auto write = [&variable] {
     if (variable.kind == Selection::Kind::list) return fmt::format("[{}]", fmt::join(variable.indices, ", "));
@@ -48,13 +46,6 @@ Field direction(ParameterSpec& spec) {
   };
   const Field words = field::choice(spec.direction_kind);
   return {"[x, y, z]; vertices: or a word", "not all zero; " + words.allowed, read, write, words.names};
-}
-
-Field axis(Vec3& variable) {
-  return field::checked(field::direction(variable), [&variable](const YamlValue& value) {
-    if (!std::isnormal(length_squared(variable)))
-      value.fail("is too long or too short", "a length whose square a double can hold");
-  });
 }
 
 Field pivot(ParameterSpec& spec) {
@@ -90,10 +81,10 @@ void check_name(const YamlValue& value) {
 void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool target_required) {
   using enum ParameterType;
   const auto of = [&](std::initializer_list<ParameterType> types) { return only(spec.type, types); };
-  const char* const own_unit = "the parameter's";
+  const char* const own = "the parameter's";
   keys.remember(spec.where);
   keys.value("name", field::checked(file_name(spec.name), check_name), "names columns and files", {.required = true});
-  keys.value("type", field::choice(spec.type), "what changes", {.required = true});
+  keys.value("type", field::choice(spec.type), "what changes, in which unit", {.required = true});
   keys.value("shape", field::text(spec.shape), "whose vertices or emission changes",
              {.required = true, .only = of({translation, rotation, vertices, emission})});
   keys.value("material", field::text(spec.material), "which changes",
@@ -104,7 +95,12 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
               .otherwise = "all"});
   keys.value("direction", direction(spec), "by the parameter times this, as long as it is given",
              {.required = true, .only = of({translation, vertices}), .unit = "scene units"});
-  keys.value("axis", axis(spec.axis), "turned about by the right-hand rule; its length does not matter",
+  const auto check_axis = [&](const YamlValue& value) {
+    if (!std::isnormal(length_squared(spec.axis)))
+      value.fail("is too long or too short", "a length whose square a double can hold");
+  };
+  keys.value("axis", field::checked(field::direction(spec.axis), check_axis),
+             "turned about by the right-hand rule; its length does not matter",
              {.required = true, .only = of({rotation})});
   keys.value("pivot", pivot(spec), "what the axis goes through", {.only = of({rotation}), .unit = "scene units"});
   const auto smoothing = [&](Keys& inner) {
@@ -117,18 +113,16 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
            {.only = of({vertices}), .unset = spec.diffusion == 0 && spec.slopes == 0});
   keys.value("initial", folder.values(spec.initial),
              "where the optimisation starts; of what moves, offsets from the scene file",
-             {.required = true, .unit = "degrees, or scene units, or the scene file's"});
-  keys.value("target", folder.values(spec.target), "where the target is rendered, or known to be",
-             {.required = target_required,
-              .unit = own_unit,
-              .unset = spec.target.empty(),
-              .otherwise = "required for rendered targets"});
-  keys.value("lower", folder.values(spec.lower), "bound", {.unit = own_unit, .unset = spec.lower.empty()});
-  keys.value("upper", folder.values(spec.upper), "bound", {.unit = own_unit, .unset = spec.upper.empty()});
-  keys.value("scale", field::positive(spec.scale), "what counts as one unit where parameters are compared",
-             {.unit = own_unit,
-              .unset = spec.scale == 0,
-              .otherwise = "1; of rotation 180/pi; of emission its largest initial component"});
+             {.required = true, .unit = own});
+  keys.value(
+      "target", folder.values(spec.target), "where the target is rendered, or known to be",
+      {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
+  keys.value("lower", folder.values(spec.lower), "bound", {.unit = own, .unset = spec.lower.empty()});
+  keys.value("upper", folder.values(spec.upper), "bound", {.unit = own, .unset = spec.upper.empty()});
+  keys.value("scale", field::positive(spec.scale),
+             "what counts as one unit where parameters are compared. Default: 1; of a "
+             "rotation 180 / pi; of an emission its largest initial component",
+             {.unit = own, .unset = spec.scale == 0, .otherwise = "by `type`"});
 }
 
 }  // namespace isochron

@@ -8,18 +8,6 @@
 
 namespace isochron {
 
-const char* name(ParameterType type) {
-  return name_of(type);
-}
-
-const char* name(OptimizerMethod method) {
-  return name_of(method);
-}
-
-const char* name(Sampling sampling) {
-  return name_of(sampling);
-}
-
 const char* name(LengthUnit unit) {
   return unit == LengthUnit::scene ? "scene units" : name_of(unit);
 }

@@ -49,7 +49,6 @@ enum class VertexDirection { fixed, normal, free };
 /// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
 /// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
 enum class PivotKind { fixed, center, follow };
-const char* name(ParameterType type);
 /// Whether it is a material's, else a shape's.
 inline bool is_of_material(ParameterType type) {
   return type == ParameterType::albedo || type == ParameterType::roughness || type == ParameterType::ior;
@@ -125,8 +124,6 @@ struct LossSpec {
 };
 
 enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
-const char* name(OptimizerMethod method);
-const char* name(Sampling sampling);
 
 /// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
 struct RateDecay {
