@@ -10,6 +10,7 @@
 #include "app/progress.h"
 #include "core/base/error.h"
 #include "optim/analysis/advice.h"
+#include "optim/experiment/choices.h"
 #include "optim/experiment/experiment_edit.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/gate_columns.h"
@@ -139,28 +140,10 @@ void print_advice(const Problem& problem, const Inspection& inspection) {
   fmt::print("  {:<30} {:<28} {:>9.4f}\n", "now", numbers(advice.before.samples), advice.seconds_before);
   for (const SamplingTrial& trial : advice.trials)
     fmt::print(
-        "  {:<30} {:<28} {:>9.4f}{}\n", fmt::format("advised, {} sampling", name(trial.sampling)),
+        "  {:<30} {:<28} {:>9.4f}{}\n", fmt::format("advised, {} sampling", name_of(trial.sampling)),
         numbers(trial.samples), trial.seconds,
         trial.effective_count < kFewestDeviations ? "  (a few rare samples make the variance: not to be trusted)" : "");
   fmt::print("\n{}", advice_yaml(problem.experiment(), advice.after));
-}
-
-std::vector<Edit> edits(const Experiment& before, const Experiment& after) {
-  std::vector<Edit> list;
-  const auto number = [&](std::vector<std::string> key, int old, int now) {
-    if (old != now) list.push_back({std::move(key), std::to_string(now)});
-  };
-  number({"max_bounces"}, before.estimator.max_bounces, after.estimator.max_bounces);
-  // Where the file does not give the target's, it follows max_bounces.
-  if (after.target.images.empty() && after.target.max_bounces != after.estimator.max_bounces)
-    list.push_back({{"target", "max_bounces"}, std::to_string(after.target.max_bounces)});
-  number({"samples", "primal"}, before.samples.primal, after.samples.primal);
-  number({"samples", "interior"}, before.samples.interior, after.samples.interior);
-  number({"samples", "visibility"}, before.samples.visibility, after.samples.visibility);
-  number({"samples", "path_length"}, before.samples.path_length, after.samples.path_length);
-  if (before.estimator.sampling != after.estimator.sampling)
-    list.push_back({{"estimator", "sampling"}, name(after.estimator.sampling)});
-  return list;
 }
 
 int inspect_experiment(const InspectCommand& command) {
@@ -189,7 +172,7 @@ int inspect_experiment(const InspectCommand& command) {
   if (!command.apply) return 0;
   const Experiment before = load_experiment(command.common.file);
   const Experiment after = advised(before, inspection.advice.after);
-  const std::vector<Edit> list = edits(before, after);
+  const std::vector<Edit> list = changes(before, after);
   if (list.empty()) {
     spdlog::info("{}: nothing to change", command.common.file);
     return 0;

@@ -12,6 +12,13 @@
 #include "core/scene/mesh.h"
 
 namespace isochron {
+
+template <>
+inline constexpr auto kChoices<MaterialType> = std::to_array<Choice<MaterialType>>(
+    {{MaterialType::diffuse, "diffuse", ""},
+     {MaterialType::rough_conductor, "rough_conductor", "GGX, alpha = `roughness`"},
+     {MaterialType::rough_dielectric, "rough_dielectric", "a solid behind a closed mesh; GGX"}});
+
 namespace {
 
 constexpr int kLargestResolution = 32768;  // so that the number of pixels fits an int
@@ -23,21 +30,8 @@ Vec3 unit(const Vec3& v) {
   return normalize(v / std::max({std::abs(v.x), std::abs(v.y), std::abs(v.z)}));
 }
 
-Camera read_camera(const YamlValue& value) {
-  YamlMap map = value.map();
-  Camera camera;
-  const YamlValue position = map.require("position");
-  camera.position = position.vec3();
-  const YamlValue look_at = map.require("look_at");
-  camera.look_at = look_at.vec3();
-  const std::optional<YamlValue> up = map.find("up");
-  if (up) camera.up = unit(up->direction());
-  camera.fov = map.require("fov").number({.low = 0, .high = 180, .low_open = true, .high_open = true});
-  const auto [width, height] = read_resolution(map.require("resolution"));
-  camera.width = width;
-  camera.height = height;
-  map.reject_unknown();
-
+void check_camera(const Camera& camera, const Keys::Places& places) {
+  const YamlValue &position = places.at("position"), &look_at = places.at("look_at");
   if (!coordinates_fit(camera.position)) position.fail("lies too far away", kCoordinates);
   if (camera.look_at == camera.position) look_at.fail("is the camera's position", "a point away from it");
   if (!std::isnormal(length_squared(camera.look_at - camera.position)))
@@ -46,61 +40,76 @@ Camera read_camera(const YamlValue& value) {
   constexpr double kParallel = 16 * std::numeric_limits<double>::epsilon();
   const Vec3 forward = unit(camera.look_at - camera.position);
   if (length(cross(forward, unit(camera.up))) <= kParallel)
-    (up ? *up : look_at).fail("up is parallel to the line of sight", "any other direction");
-  return camera;
+    (places.contains("up") ? places.at("up") : look_at)
+        .fail("up is parallel to the line of sight", "any other direction");
 }
 
-Material read_material(const std::string& name, const YamlValue& value, bool& grey) {
-  const NumberRange unit = NumberRange::closed(0, 1);
-  YamlMap map = value.map();
-  Material material;
-  material.name = name;
-  const YamlValue type = map.require("type");
-  material.type = static_cast<MaterialType>(type.choice({"diffuse", "rough_conductor", "rough_dielectric"}));
-  if (material.type == MaterialType::diffuse) material.albedo = map.require("albedo").color(unit, grey);
-  if (material.type == MaterialType::rough_conductor) material.albedo = map.require("reflectance").color(unit, grey);
-  if (material.type != MaterialType::diffuse)
-    material.roughness = map.require("roughness").number({.low = 0, .high = 1, .low_open = true});
-  if (material.type == MaterialType::rough_dielectric) {
-    material.albedo = Rgb(1);
-    const YamlValue ior = map.require("ior");
-    material.ior = ior.number(NumberRange::positive());
-    if (material.ior == 1) ior.fail("1 is no boundary", "a number above 0 other than 1");
-  } else if (const auto two_sided = map.find("two_sided")) {
-    material.two_sided = two_sided->boolean();
-  }
-  map.reject_unknown();
-  return material;
+/// A direction, which becomes a unit vector.
+Field unit_direction(Vec3& variable) {
+  return field::checked(field::direction(variable), [&variable](const YamlValue&) { variable = unit(variable); });
 }
 
-std::vector<Material> read_materials(const YamlValue& value, bool& grey) {
-  std::vector<Material> materials;
-  YamlMap map = value.map();
-  for (const auto& [name, entry] : map.entries()) materials.push_back(read_material(name, entry, grey));
-  if (materials.empty()) value.fail("has no material", "at least one");
-  return materials;
+void describe(Keys& keys, Camera& camera) {
+  Keys::Places places;
+  keys.remember(places);
+  keys.value("position", field::vec3(camera.position), "the pinhole", {.required = true, .unit = "scene units"});
+  keys.value("look_at", field::vec3(camera.look_at), "the point in the middle of the image",
+             {.required = true, .unit = "scene units"});
+  keys.value("up", unit_direction(camera.up), "the direction that is up in the image");
+  keys.value("fov", field::number(camera.fov, {.low = 0, .high = 180, .low_open = true, .high_open = true}),
+             "field of view, across the image's width", {.required = true, .unit = "degrees"});
+  keys.value("resolution", resolution_field(camera.width, camera.height), "of the images",
+             {.required = true, .unit = "pixels"});
+  keys.check([&](const YamlValue&) { check_camera(camera, places); });
+}
+
+void describe(Keys& keys, Material& material, bool& grey) {
+  using enum MaterialType;
+  const auto of = [&](std::initializer_list<MaterialType> types) { return only(material.type, types); };
+  const NumberRange fraction = NumberRange::closed(0, 1);
+  const auto check_ior = [&](const YamlValue& value) {
+    if (material.ior == 1) value.fail("1 is no boundary", "a number above 0 other than 1");
+  };
+  keys.value("type", field::choice(material.type), "how it scatters light", {.required = true});
+  keys.value("albedo", field::color(material.albedo, fraction, grey), "share of the light that is reflected",
+             {.required = true, .only = of({diffuse})});
+  keys.value("reflectance", field::color(material.albedo, fraction, grey), "of each of its facets, at any angle",
+             {.required = true, .only = of({rough_conductor})});
+  keys.value("roughness", field::number(material.roughness, {.low = 0, .high = 1, .low_open = true}), "alpha of GGX",
+             {.required = true, .only = of({rough_conductor, rough_dielectric})});
+  keys.value("ior", field::checked(field::positive(material.ior), check_ior), "index of refraction, other than 1",
+             {.required = true, .only = of({rough_dielectric})});
+  keys.value("two_sided", field::boolean(material.two_sided), "whether the back reflects, too",
+             {.only = of({diffuse, rough_conductor})});
+  keys.check([&](const YamlValue&) {
+    if (material.type == rough_dielectric) material.albedo = Rgb(1);
+  });
 }
 
 /// Scale, then rotation, then translation.
-void transform_mesh(const YamlValue& value, Mesh& mesh) {
-  YamlMap map = value.map();
-  double scale = 1, angle = 0;
+struct Transform {
+  double scale = 1, degrees = 0;
   Vec3 axis{0, 0, 1}, translation;
-  if (const auto factor = map.find("scale")) scale = factor->number(NumberRange::positive());
-  if (const auto rotate = map.find("rotate")) {
-    YamlMap rotation = rotate->map();
-    axis = unit(rotation.require("axis").direction());
-    angle = rotation.require("degrees").number() * kPi / 180;
-    rotation.reject_unknown();
-  }
-  if (const auto translate = map.find("translate")) translation = translate->vec3();
-  map.reject_unknown();
+};
 
+void describe(Keys& keys, Transform& transform) {
+  keys.value("scale", field::positive(transform.scale), "first, about the origin");
+  const auto rotation = [&](Keys& inner) {
+    inner.value("axis", unit_direction(transform.axis), "by the right-hand rule", {.required = true});
+    inner.value("degrees", field::number(transform.degrees), "", {.required = true, .unit = "degrees"});
+  };
+  keys.map("rotate", rotation, "second, about the origin", {.otherwise = "none"});
+  keys.value("translate", field::vec3(transform.translation), "last", {.unit = "scene units"});
+}
+
+void transform_mesh(const Transform& transform, Mesh& mesh) {
+  const double angle = transform.degrees * kPi / 180;
   const double cosine = std::cos(angle), sine = std::sin(angle);
+  const Vec3& axis = transform.axis;
   for (Vec3& p : mesh.positions) {
-    const Vec3 q = p * scale;
+    const Vec3 q = p * transform.scale;
     const Vec3 rotated = angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
-    p = rotated + translation;
+    p = rotated + transform.translation;
   }
 }
 
@@ -136,9 +145,17 @@ void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
   }
 }
 
-Mesh read_shape_mesh(const YamlValue& file, const std::string& path, const std::optional<YamlValue>& transform,
-                     bool solid, std::vector<Edge>& edges) {
+/// A shape of the file, before its mesh is read.
+struct ShapeKeys {
+  Shape shape;
+  Transform transform;
+  Keys::Places places;
+};
+
+Mesh read_shape_mesh(const ShapeKeys& keys, bool solid, std::vector<Edge>& edges) {
   Mesh mesh;
+  const std::string& path = keys.shape.file;
+  const YamlValue& file = keys.places.at("file");
   try {
     const Mesh raw = read_mesh(path);
     try {
@@ -151,39 +168,24 @@ Mesh read_shape_mesh(const YamlValue& file, const std::string& path, const std::
   } catch (const InputError& error) {
     file.fail(error.what());
   }
-  if (transform) transform_mesh(*transform, mesh);
-  const YamlValue& cause = transform ? *transform : file;
+  const bool transformed = keys.places.contains("transform");
+  if (transformed) transform_mesh(keys.transform, mesh);
+  const YamlValue& cause = transformed ? keys.places.at("transform") : file;
   check_areas(cause, mesh);
   for (const Vec3& p : mesh.positions)
     if (!coordinates_fit(p)) cause.fail("puts a vertex too far away", kCoordinates);
   return mesh;
 }
 
-void read_shape(const YamlValue& value, Scene& scene) {
-  YamlMap map = value.map();
-  Shape shape;
-  const YamlValue name = map.require("name");
-  shape.name = name.text();
-  if (scene.find_shape(shape.name) >= 0) name.fail("'" + shape.name + "' is an earlier shape's name", "names differ");
-
-  const YamlValue file = map.require("file");
-  shape.file = (std::filesystem::path(value.file()).parent_path() / file.text()).lexically_normal().string();
-
-  const YamlValue material = map.require("material");
-  std::vector<std::string> known;
-  for (const Material& m : scene.materials) known.push_back(m.name);
-  shape.material = material.choice(known);
-
-  if (const auto emission = map.find("emission"))
-    shape.emission = emission->color(NumberRange::non_negative(), scene.grey);
+/// The shape with its mesh becomes part of the scene.
+void add_shape(const ShapeKeys& keys, Scene& scene) {
+  Shape shape = keys.shape;
   const bool dielectric = scene.materials[shape.material].type == MaterialType::rough_dielectric;
   if (dielectric && !shape.emission.is_black())
-    map.find("emission")->fail("a shape of rough_dielectric emits nothing", "leave it out");
-  const std::optional<YamlValue> transform = map.find("transform");
-  map.reject_unknown();
-
+    keys.places.at("emission").fail("a shape of rough_dielectric emits nothing", "leave it out");
+  const YamlValue& file = keys.places.at("file");
   std::vector<Edge> edges;
-  const Mesh mesh = read_shape_mesh(file, shape.file, transform, dielectric, edges);
+  const Mesh mesh = read_shape_mesh(keys, dielectric, edges);
   constexpr std::size_t kMost = std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
   if (scene.positions.size() + mesh.positions.size() > kMost || scene.triangles.size() + mesh.faces.size() > kMost)
     file.fail("the scene has too many vertices or triangles", fmt::format("at most {} of each", kMost));
@@ -203,29 +205,83 @@ void read_shape(const YamlValue& value, Scene& scene) {
   scene.shapes.push_back(std::move(shape));
 }
 
+/// The name of one of the scene's materials.
+Field material_name(const Scene& scene, int& index) {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const Material& material : scene.materials) names.emplace_back(material.name, "");
+  Field name = field::choice(
+      names, [&index](int i) { index = i; }, [&scene, &index] { return yaml_text(scene.materials[index].name); });
+  name.allowed = "a name of `materials`";
+  return name;
+}
+
+void describe(Keys& keys, ShapeKeys& entry, Scene& scene) {
+  Shape& shape = entry.shape;
+  const auto check_name = [&](const YamlValue& value) {
+    if (scene.find_shape(shape.name) >= 0)
+      value.fail("'" + shape.name + "' is an earlier shape's name", "names differ");
+  };
+  const auto find_file = [&](const YamlValue& value) {
+    shape.file = (std::filesystem::path(value.file()).parent_path() / shape.file).lexically_normal().string();
+  };
+  keys.remember(entry.places);
+  keys.value("name", field::checked(field::text(shape.name), check_name), "of its own", {.required = true});
+  keys.value("file", field::checked(field::text(shape.file), find_file),
+             "mesh (OBJ, PLY, OFF, STL), relative to the scene file", {.required = true});
+  keys.value("material", material_name(scene, shape.material), "of all its faces", {.required = true});
+  keys.value("emission", field::color(shape.emission, NumberRange::non_negative(), scene.grey),
+             "radiance, on the normal's side");
+  keys.map("transform", [&](Keys& inner) { describe(inner, entry.transform); }, "of the mesh", {.otherwise = "none"});
+  keys.check([&](const YamlValue&) { add_shape(entry, scene); });
+}
+
+void describe(Keys& keys, Scene& scene) {
+  Keys::Places places;
+  keys.remember(places);
+  keys.map("camera", [&](Keys& inner) { describe(inner, scene.camera); }, "where the images are taken",
+           {.required = true});
+  const auto material = [&](Keys& inner, const std::string& name) {
+    Material& added = scene.materials.emplace_back();
+    added.name = name;
+    describe(inner, added, scene.grey);
+  };
+  keys.named("materials", {}, material, "what shapes are made of", {.required = true});
+  if (places.contains("materials") && scene.materials.empty())
+    places.at("materials").fail("has no material", "at least one");
+  std::vector<ShapeKeys> shapes;
+  keys.list("shapes", shapes, [&](Keys& inner, ShapeKeys& shape) { describe(inner, shape, scene); },
+            "what the camera sees and what lights it", {.required = true});
+  keys.check([&](const YamlValue&) {
+    const YamlValue& value = places.at("shapes");
+    if (scene.shapes.empty()) value.fail("has no shape", "at least one");
+    const bool lit = std::any_of(scene.shapes.begin(), scene.shapes.end(),
+                                 [](const Shape& shape) { return !shape.emission.is_black(); });
+    if (!lit) value.fail("no shape emits light", "emission above 0 on at least one");
+  });
+}
+
 }  // namespace
 
-std::array<int, 2> read_resolution(const YamlValue& value) {
-  const std::vector<YamlValue> sizes = value.list();
-  if (sizes.size() != 2) value.fail(fmt::format("a list of {}", sizes.size()), "[width, height]");
-  const auto size = [&](int i) { return static_cast<int>(sizes[i].integer(1, kLargestResolution)); };
-  return {size(0), size(1)};
+Field resolution_field(int& width, int& height) {
+  const auto read = [&](const YamlValue& value) {
+    const std::vector<YamlValue> sizes = value.list();
+    if (sizes.size() != 2) value.fail(fmt::format("a list of {}", sizes.size()), "[width, height]");
+    width = static_cast<int>(sizes[0].integer(1, kLargestResolution));
+    height = static_cast<int>(sizes[1].integer(1, kLargestResolution));
+  };
+  return {"[width, height]", fmt::format("1 to {} each", kLargestResolution), read,
+          [&] { return fmt::format("[{}, {}]", width, height); }};
 }
 
 Scene load_scene(const std::string& file) {
   Scene scene;
-  YamlMap map = open_yaml(file).map();
-  scene.camera = read_camera(map.require("camera"));
-  scene.materials = read_materials(map.require("materials"), scene.grey);
-  const YamlValue shapes = map.require("shapes");
-  const std::vector<YamlValue> entries = shapes.list();
-  map.reject_unknown();
-  if (entries.empty()) shapes.fail("has no shape", "at least one");
-  for (const YamlValue& entry : entries) read_shape(entry, scene);
-  const bool lit = std::any_of(scene.shapes.begin(), scene.shapes.end(),
-                               [](const Shape& shape) { return !shape.emission.is_black(); });
-  if (!lit) shapes.fail("no shape emits light", "emission above 0 on at least one");
+  read_keys(open_yaml(file), [&](Keys& keys) { describe(keys, scene); });
   return scene;
+}
+
+std::string scene_reference() {
+  Scene scene;
+  return reference_tables([&](Keys& keys) { describe(keys, scene); });
 }
 
 }  // namespace isochron

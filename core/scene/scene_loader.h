@@ -1,8 +1,7 @@
 #pragma once
-#include <array>
 #include <string>
 
-#include "core/base/yaml_reader.h"
+#include "core/base/description.h"
 #include "core/scene/scene.h"
 
 namespace isochron {
@@ -11,7 +10,10 @@ namespace isochron {
 /// Throws InputError `FILE:LINE:COLUMN: KEY: what is wrong (what is allowed)`, in one line.
 Scene load_scene(const std::string& file);
 
-/// An image's size: [width, height].
-std::array<int, 2> read_resolution(const YamlValue& value);
+/// An image's size.
+Field resolution_field(int& width, int& height);
+
+/// Tables of a scene file's keys, in Markdown.
+std::string scene_reference();
 
 }  // namespace isochron

@@ -63,11 +63,6 @@ std::vector<GradientCost> measure_all(const Problem& problem, const std::vector<
 
 }  // namespace
 
-const char* name(Sampling sampling) {
-  constexpr const char* kNames[] = {"auto", "standard", "ellipsoidal"};
-  return kNames[static_cast<int>(sampling)];
-}
-
 void choose_samples(Advice& advice, double pixels) {
   // Points count alike: each by its variance relative to that of the present setting.
   std::vector<double> weights;
@@ -174,12 +169,9 @@ Experiment advised(Experiment experiment, const Setting& setting) {
 
 std::string advice_yaml(const Experiment& experiment, const Setting& setting) {
   const Experiment after = advised(experiment, setting);
-  std::string text = fmt::format("max_bounces: {}\n", setting.max_bounces);
-  if (after.target.images.empty() && after.target.max_bounces != setting.max_bounces)
-    text += fmt::format("target:\n  max_bounces: {}\n", after.target.max_bounces);
-  text += fmt::format("samples:\n  primal: {}\n  interior: {}\n  visibility: {}\n  path_length: {}\n",
-                      setting.samples[0], setting.samples[1], setting.samples[2], setting.samples[3]);
-  return text + fmt::format("estimator:\n  sampling: {}\n", name(setting.sampling));
+  std::vector<std::string> keys{"max_bounces", "samples", "estimator.sampling"};
+  if (after.target.max_bounces != setting.max_bounces) keys.push_back("target.max_bounces");
+  return yaml(selected(resolved_keys(after, "."), keys));
 }
 
 std::string inspection_csv(const Problem& problem, const Inspection& inspection) {

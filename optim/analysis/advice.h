@@ -15,7 +15,6 @@ struct Setting {
   Sampling sampling = Sampling::automatic;
   std::array<int, kPasses> samples{};  ///< per pixel: primal, then the terms
 };
-const char* name(Sampling sampling);
 
 /// One way to sample the advised model, at the numbers of samples that give the present setting's variance.
 struct SamplingTrial {

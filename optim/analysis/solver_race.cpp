@@ -8,6 +8,7 @@
 #include "core/base/cpu_time.h"
 #include "core/base/error.h"
 #include "optim/analysis/methods.h"
+#include "optim/experiment/choices.h"
 #include "optim/problem/rendered_objective.h"
 #include "optim/problem/vector_math.h"
 #include "optim/run/loop.h"
@@ -31,7 +32,7 @@ RaceRun race(const Problem& problem, const GatedImage& target, double core_secon
       make_optimizer(experiment.optimizer, problem.preconditioner(), parameters.scales());
   const RenderedObjective objective(problem, target, poll);
   problem.estimator();  // its trial is no part of a run
-  RaceRun run{name(experiment.optimizer.method), experiment.seed, {{0, 0, 1}}};
+  RaceRun run{name_of(experiment.optimizer.method), experiment.seed, {{0, 0, 1}}};
   Checkpoint state;
   state.theta = parameters.initial();
   const double before = parameters.distance_to_target(state.theta), start = cpu_seconds();
@@ -65,7 +66,7 @@ Race race_solvers(const Experiment& experiment, const GatedImage& target, const 
   const double each = options.core_seconds / static_cast<double>(std::size(kMethods) * options.seeds);
   ProgressStage stage("racing the optimisers", static_cast<int>(std::size(kMethods)) * options.seeds);
   for (OptimizerMethod method : kMethods) {
-    options.progress(name(method));
+    options.progress(name_of(method));
     for (int s = 0; s < options.seeds; ++s) {
       Experiment own = experiment;
       own.optimizer.method = method;

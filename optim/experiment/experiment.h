@@ -1,18 +1,5 @@
 // The experiment file: what a user writes, checked and with every default filled in.
-//
-// Defaults (the only place where they are listed; a key without one here is required):
-//   max_bounces 8                      parameters: none
-//   gates: unit scene                  parameter: selection all vertices, lower/upper none, pivot [0, 0, 0],
-//     scale by type, see parameters.h
-//   samples: 64 for each of primal, interior, visibility, path_length; what a sample is: Term in core/render/renderer.h
-//   estimator: sampling auto, antithetic true, pick contribution, numbers low_discrepancy, guiding true,
-//     follow 1, follow_radius 4
-//   gradient: method analytic          (finite_difference: step 0.01, in units of the parameter; common_numbers true)
-//   loss: kind squared                (huber, cauchy: scale 1)
-//   optimizer: method adam, learning_rate 0.02, iterations 100, tolerance 0, stop never; adam: decay never (start 0);
-//     lbfgs: inner_iterations 5
-//   target: samples 4096, seed 7, max_bounces as above, noise none     seed 1
-//   resolution: the camera's           output: geometry ply, every 0
+// Its keys, with their defaults, are described in description.h; experiments/README.md has them in tables.
 #pragma once
 #include <array>
 #include <cmath>
@@ -21,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/description.h"
 #include "core/base/yaml_reader.h"
 #include "core/gates/gate.h"
 #include "core/image/image.h"
@@ -29,6 +17,7 @@
 namespace isochron {
 
 enum class LengthUnit { scene, ns, ps };
+const char* name(LengthUnit unit);  ///< "scene units", "ns", "ps"
 
 /// Gates as written. All lengths are in `unit`; a time t is the length c t / scene_unit_m in scene units.
 struct GateSpec {
@@ -60,7 +49,6 @@ enum class VertexDirection { fixed, normal, free };
 /// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
 /// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
 enum class PivotKind { fixed, center, follow };
-const char* name(ParameterType type);
 /// Whether it is a material's, else a shape's.
 inline bool is_of_material(ParameterType type) {
   return type == ParameterType::albedo || type == ParameterType::roughness || type == ParameterType::ior;
@@ -136,7 +124,6 @@ struct LossSpec {
 };
 
 enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
-const char* name(OptimizerMethod method);
 
 /// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
 struct RateDecay {
@@ -197,6 +184,11 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
 /// it lies in `folder`: paths are written relative to it, tables and value files inline, numbers with all
 /// their digits.
 std::string resolved_yaml(const Experiment& experiment, const std::string& folder);
+/// The same key by key, without the program's version.
+std::vector<WrittenKey> resolved_keys(Experiment experiment, const std::string& folder);
+
+/// Tables of all keys, in Markdown.
+std::string experiment_reference();
 
 /// Version of this program, as written into experiment.yaml and checkpoints.
 const char* program_version();

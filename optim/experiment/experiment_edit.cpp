@@ -147,6 +147,22 @@ std::string edited(std::string text, std::span<const Edit> edits) {
   return lines.text();
 }
 
+std::vector<Edit> changes(const Experiment& before, const Experiment& after) {
+  const std::vector<WrittenKey> old = resolved_keys(before, ".");
+  std::vector<Edit> edits;
+  for (const WrittenKey& key : resolved_keys(after, ".")) {
+    const bool stays = std::find(old.begin(), old.end(), key) != old.end();
+    // Where the file does not give the target's, it follows max_bounces.
+    const bool follows =
+        key.path == "target.max_bounces" && before.estimator.max_bounces != after.estimator.max_bounces;
+    if (stays && !follows) continue;
+    const std::size_t dot = key.path.find('.');
+    edits.push_back({{key.path.substr(0, dot)}, key.value});
+    if (dot != kNowhere) edits.back().key.push_back(key.path.substr(dot + 1));
+  }
+  return edits;
+}
+
 void edit_experiment(const std::string& file, std::span<const Edit> edits, const Experiment& wanted) {
   namespace fs = std::filesystem;
   const auto text = read_file(file);

@@ -20,6 +20,9 @@ struct Edit {
 /// edit_experiment.
 std::string edited(std::string text, std::span<const Edit> edits);
 
+/// What makes an experiment file that reads as `before` read as `after`.
+std::vector<Edit> changes(const Experiment& before, const Experiment& after);
+
 /// Edits the file so that it reads as `wanted`, atomically. Throws InputError and leaves the file alone where
 /// the edited text does not.
 void edit_experiment(const std::string& file, std::span<const Edit> edits, const Experiment& wanted);

@@ -94,11 +94,10 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
   if (static_cast<int>(dark.size()) < gates)
     text = fmt::format("no light reaches {} {} of {} of {}", dark.size() == 1 ? "gate" : "gates", ranges(dark), gates,
                        what);
-  constexpr const char* kUnits[] = {"scene units", "ns", "ps"};
   const GateSpec& spec = problem.experiment().gates;
   const double unit = length_unit(spec);
   const auto shown = [&](double low, double high) {
-    return fmt::format("{:.3g} to {:.3g} {}", low / unit, high / unit, kUnits[static_cast<int>(spec.unit)]);
+    return fmt::format("{:.3g} to {:.3g} {}", low / unit, high / unit, name(spec.unit));
   };
   const auto range = path_length_range(problem, theta);
   text += range ? fmt::format("; paths with light are about {} long", shown(range->first, range->second))

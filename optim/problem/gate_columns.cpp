@@ -3,17 +3,8 @@
 #include <fmt/format.h>
 
 namespace isochron {
-namespace {
-
-const char* unit_name(LengthUnit unit) {
-  return unit == LengthUnit::ns ? "ns" : "ps";
-}
-
-}  // namespace
-
 std::string gate_column_names(const GateSpec& spec) {
-  return spec.unit == LengthUnit::scene ? ",gate_center"
-                                        : fmt::format(",gate_center,gate_center_{}", unit_name(spec.unit));
+  return spec.unit == LengthUnit::scene ? ",gate_center" : fmt::format(",gate_center,gate_center_{}", name(spec.unit));
 }
 
 std::string gate_column_values(const Problem& problem, int gate) {
@@ -28,7 +19,7 @@ std::string gate_label(const Problem& problem, int gate) {
   if (problem.gates().shape().is_steady()) return "all";
   const GateSpec& spec = problem.experiment().gates;
   if (spec.unit == LengthUnit::scene) return fmt::format("{:.5g}", problem.gates().center(gate));
-  return fmt::format("{:.5g} {}", spec.centers[gate], unit_name(spec.unit));
+  return fmt::format("{:.5g} {}", spec.centers[gate], name(spec.unit));
 }
 
 }  // namespace isochron

@@ -9,6 +9,7 @@
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
+#include "optim/experiment/choices.h"
 
 namespace isochron {
 namespace {
@@ -114,7 +115,7 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
       const int index = spec.type == ParameterType::emission ? shape : material;
       for (const MaterialValue& other : material_values_)
         if (other.type == spec.type && other.index == index)
-          spec.fail("type", fmt::format("another parameter sets the same {} already", isochron::name(spec.type)));
+          spec.fail("type", fmt::format("another parameter sets the same {} already", name_of(spec.type)));
       material_values_.push_back({spec.type, index, first, count});
     }
     bind_values(spec, count);

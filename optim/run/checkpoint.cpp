@@ -19,8 +19,6 @@ namespace isochron {
 namespace {
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-/// Of the file's keys and what they mean; raised where they change within a version of the program.
-constexpr int kFormat = 2;
 constexpr const char* kChecksumKey = "checksum: ";
 
 std::string list(const std::vector<double>& values) {
@@ -53,19 +51,20 @@ std::vector<std::pair<const char*, std::vector<double>*>> lists_of(DescentState&
           {"theta_sum", &state.theta_sum}};
 }
 
-Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters) {
+/// `note` receives what the user may want to know of the file.
+Checkpoint parse(const std::string& file, const std::string& text, const Parameters& parameters, std::string& note) {
   const std::size_t tail = text.rfind(kChecksumKey);
   if (tail == std::string::npos ||
       text.substr(tail) != kChecksumKey + checksum(std::string_view(text).substr(0, tail)) + "\n")
     throw Damaged("checksum does not match");
   const YAML::Node root = YAML::Load(text);
+  const YAML::Node schema = root["schema"];
   const std::string version = root["version"].as<std::string>();
+  if (!schema || schema.as<int>() != kCheckpointSchema)
+    throw InputError(fmt::format("{}: schema: {}, written by isochron {} (allowed: {})", file,
+                                 schema ? schema.as<std::string>() : "is missing", version, kCheckpointSchema));
   if (version != program_version())
-    throw InputError(fmt::format("{}: version: written by {}; allowed: {}", file, version, program_version()));
-  const int format = root["format"].as<int>(1);
-  if (format != kFormat)
-    throw InputError(
-        fmt::format("{}: format: {} is that of another build of {}; allowed: {}", file, format, version, kFormat));
+    note = fmt::format("{}: written by isochron {}; the result may differ from a run of one version", file, version);
   Checkpoint c;
   c.iteration = root["iteration"].as<int>();
   c.seconds = root["seconds"].as<double>();
@@ -115,12 +114,13 @@ Checkpoint::Checkpoint()
 
 void save_checkpoint(const std::string& folder, const Checkpoint& c, const Parameters& parameters) {
   std::string text = fmt::format(
-      "version: {}\nformat: {}\niteration: {}\nseconds: {}\nloss_initial: {}\nloss_noise_initial: "
+      "schema: {}\nversion: {}\niteration: {}\nseconds: {}\nloss_initial: {}\nloss_noise_initial: "
       "{}\nimage_rmse_initial: "
       "{}\nparam_rmse_initial: {}\n"
       "parameters:{}\n",
-      program_version(), kFormat, c.iteration, scalar(c.seconds), scalar(c.loss_initial), scalar(c.loss_noise_initial),
-      scalar(c.image_rmse_initial), scalar(c.param_rmse_initial), parameters.blocks().empty() ? " []" : "");
+      kCheckpointSchema, program_version(), c.iteration, scalar(c.seconds), scalar(c.loss_initial),
+      scalar(c.loss_noise_initial), scalar(c.image_rmse_initial), scalar(c.param_rmse_initial),
+      parameters.blocks().empty() ? " []" : "");
   auto out = std::back_inserter(text);
   for (const Parameters::Block& block : parameters.blocks()) {
     const auto begin = c.theta.begin() + block.begin;
@@ -154,12 +154,14 @@ std::optional<Checkpoint> load_checkpoint(const std::string& folder, const Param
     const auto text = read_file(file);
     try {
       if (!text) throw Damaged("cannot be read");
-      Checkpoint checkpoint = parse(file, *text, parameters);
+      std::string note;
+      Checkpoint checkpoint = parse(file, *text, parameters, note);
       if (!problems.empty()) {
         // The next save moves the latest over the one before: a damaged file must not replace a whole one.
         std::filesystem::remove(folder + "/checkpoint.yaml");
-        if (warning) *warning = problems + "; going on from " + file;
+        note = problems + "; going on from " + (note.empty() ? file : note);
       }
+      if (warning) *warning = note;
       return checkpoint;
     } catch (const Damaged& error) {
       problems += fmt::format("{}{}: damaged: {}", problems.empty() ? "" : "; ", file, error.what());

@@ -12,6 +12,10 @@
 
 namespace isochron {
 
+/// Of the file's keys and what they mean: to be raised with any change of them. The program's version, which the file
+/// also has, is for the reader of it.
+inline constexpr int kCheckpointSchema = 3;
+
 struct Checkpoint {
   int iteration = 0;   ///< iterations done; the next row of the log has this number
   double seconds = 0;  ///< spent on them
@@ -28,9 +32,9 @@ struct Checkpoint {
 /// Doubles are written with all their digits, a checksum of the text comes last. Throws std::runtime_error.
 void save_checkpoint(const std::string& folder, const Checkpoint& checkpoint, const Parameters& parameters);
 
-/// The latest checkpoint that is whole, or none when there is no checkpoint file. `warning` receives one line
-/// when the latest was damaged (it is removed) and the one before is used. Throws InputError when files exist
-/// but none can be used, or when one was written by another version or for other parameters.
+/// The latest checkpoint that is whole, or none when there is no checkpoint file. `warning` receives one line when the
+/// latest was damaged (it is removed) and the one before is used, or when another version of the program wrote it. Throws
+/// InputError when files exist but none can be used, or when one is of another schema or of other parameters.
 std::optional<Checkpoint> load_checkpoint(const std::string& folder, const Parameters& parameters,
                                           std::string* warning);
 

@@ -1,6 +1,7 @@
 // Edits of experiment files: what changes, and that nothing else does.
 #include "optim/experiment/experiment_edit.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
@@ -63,15 +64,16 @@ class ExperimentEditFile : public testing::Test {
 };
 
 TEST_F(ExperimentEditFile, ReadsAsWanted) {
-  const std::string file = folder_.write("tiny.yaml", tiny_experiment() + "# the end\n");
+  const std::string file = folder_.write("tiny.yaml", fmt::format("{}# the end\n", tiny_experiment()));
   edit(file);
   std::string expected = replaced(tiny_experiment(), "max_bounces: 2", "max_bounces: 1");
   expected = replaced(expected, "seed: 7}", "seed: 7, max_bounces: 2}");
   expected = replaced(expected, "interior: 16", "interior: 5");
-  EXPECT_EQ(folder_.read("tiny.yaml"), expected + "# the end\n");
+  expected += "# the end\n";
+  EXPECT_EQ(folder_.read("tiny.yaml"), expected);
   EXPECT_FALSE(folder_.has(".tiny.yaml.edited"));
   edit(file);  // once more changes nothing
-  EXPECT_EQ(folder_.read("tiny.yaml"), expected + "# the end\n");
+  EXPECT_EQ(folder_.read("tiny.yaml"), expected);
 }
 
 TEST_F(ExperimentEditFile, LeavesAloneWhatItDoesNotUnderstand) {

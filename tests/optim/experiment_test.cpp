@@ -20,6 +20,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
   write_tiny_scene(folder);
   folder.write("table.txt", "-1 0\n0, 1 # peak\n\n1 x\n");
   folder.write("wide.txt", "-1 0 3\n");
+  folder.write("good.txt", "-1 0\n0 1\n");
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
   const Case cases[] = {
       {"name: tiny", "nam: tiny", "1:1: name: is missing, is 'nam' a misspelling of it?"},
@@ -62,6 +63,8 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "4:65: gates.values: 1 values are given (one for each of the 2 offsets)"},
       {gates, "{kind: tabulated, centers: [1], offsets: [1, 0], values: [1, 1]}",
        "4:8: gates: the table is no gate (two rows or more, offsets in rising order, values at least 0"},
+      {gates, "{kind: tabulated, centers: [1], file: good.txt, offsets: [0, 1]}",
+       "4:56: gates.offsets: belongs to tables without a file (allowed: kind, unit, scene_unit_m, centers, file)"},
       {gates, "{kind: tabulated, centers: [1], file: gone.txt}", "4:46: gates.file: there is no file 'gone.txt'"},
       {"name: height", "name: target", "6:12: parameters[0].name: 'target' is the name of another output"},
       {"name: power", "name: height", "7:12: parameters[1].name: 'height' stands here twice"},
@@ -84,7 +87,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"samples: 64,", "samples: 0,", "8:19: target.samples: 0 is out of range (an integer from 1 to 1073741824)"},
       {"{samples: 64, seed: 7}", "{images: gone.exr}", "8:18: target.images: there is no file 'gone.exr'"},
       {"{samples: 64, seed: 7}", "{images: scene.yaml, seed: 7}",
-       "8:30: target.seed: is not a known key (allowed: images)"},
+       "8:30: target.seed: belongs to rendered targets, not to images (allowed: images)"},
       {"primal: 16", "primal: 0", "9:19: samples.primal: 0 is out of range"},
       {"interior: 16", "interior: -2", "9:33: samples.interior: -2 is out of range"},
       {"path_length", "pathlength", "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},

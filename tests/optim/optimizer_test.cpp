@@ -1,5 +1,6 @@
 #include "optim/solvers/optimizer.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -8,11 +9,12 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "optim/experiment/files.h"
 #include "optim/run/checkpoint.h"
 #include "optim/run/log.h"
 #include "optim/solvers/adam.h"
 #include "tests/optim/synthetic_objective.h"
-#include "tests/optim/temporary_folder.h"
+#include "tests/optim/tiny_scene.h"
 
 namespace isochron {
 namespace {
@@ -149,7 +151,7 @@ TEST(Checkpoint, FallsBackToTheOneBefore) {
   EXPECT_THROW(load_checkpoint(folder.path(), parameters, nullptr), InputError);
 }
 
-TEST(Checkpoint, IsOfOneVersionAndOneSetOfParameters) {
+TEST(Checkpoint, IsOfOneSetOfParameters) {
   const Bound bound;
   const TemporaryFolder folder;
   const Parameters parameters(bound.scene, bound.specs);
@@ -159,6 +161,40 @@ TEST(Checkpoint, IsOfOneVersionAndOneSetOfParameters) {
   fewer.pop_back();
   EXPECT_THROW(load_checkpoint(folder.path(), Parameters(bound.scene, renamed), nullptr), InputError);
   EXPECT_THROW(load_checkpoint(folder.path(), Parameters(bound.scene, fewer), nullptr), InputError);
+}
+
+TEST(Checkpoint, IsOfOneSchemaWhateverTheVersion) {
+  const Bound bound;
+  const TemporaryFolder folder;
+  const Parameters parameters(bound.scene, bound.specs);
+  save_checkpoint(folder.path(), awkward_checkpoint(), parameters);
+  const std::string text = folder.read("checkpoint.yaml");
+  const auto rewrite = [&](const std::string& from, const std::string& to) {
+    std::string changed = replaced(text, from, to);
+    changed.resize(changed.rfind("checksum: "));
+    folder.write("checkpoint.yaml", changed + "checksum: " + checksum(changed) + "\n");
+  };
+  const std::string ours = fmt::format("schema: {}\n", kCheckpointSchema);
+  const std::string version = fmt::format("version: {}\n", program_version());
+  std::string warning;
+  EXPECT_EQ(load_checkpoint(folder.path(), parameters, &warning)->iteration, 17);
+  EXPECT_EQ(warning, "");
+  rewrite(version, "version: 9.9.9\n");
+  EXPECT_EQ(load_checkpoint(folder.path(), parameters, &warning)->iteration, 17);
+  EXPECT_EQ(warning, folder.file("checkpoint.yaml") +
+                         ": written by isochron 9.9.9; the result may differ from a run of one version");
+  // As before there were schemas; as some other program writes it.
+  for (const auto& [schema, found] : {std::pair("format: 2\n", "is missing"), std::pair("schema: 99\n", "99")}) {
+    rewrite(ours, schema);
+    try {
+      load_checkpoint(folder.path(), parameters, nullptr);
+      ADD_FAILURE() << "accepted: " << schema;
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.what(), fmt::format("{}: schema: {}, written by isochron {} (allowed: {})",
+                                          folder.file("checkpoint.yaml"), found, program_version(), kCheckpointSchema));
+    }
+    EXPECT_TRUE(folder.has("checkpoint.yaml"));
+  }
 }
 
 TEST(Checkpoint, KeepsWhatIsKnownOfTheDescent) {

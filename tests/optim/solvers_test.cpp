@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 
+#include "optim/experiment/choices.h"
 #include "optim/run/loop.h"
 #include "optim/solvers/quadratic_model.h"
 #include "tests/optim/synthetic_objective.h"
@@ -42,7 +43,7 @@ class Solvers : public testing::TestWithParam<OptimizerMethod> {
 INSTANTIATE_TEST_SUITE_P(Methods, Solvers,
                          testing::Values(OptimizerMethod::adam, OptimizerMethod::lbfgs,
                                          OptimizerMethod::levenberg_marquardt),
-                         [](const auto& method) { return std::string(name(method.param)); });
+                         [](const auto& method) { return std::string(name_of(method.param)); });
 
 TEST_P(Solvers, ReachTheTargetOfAnExactProblem) {
   const ExponentialFit fit;

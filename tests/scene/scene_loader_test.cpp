@@ -130,8 +130,10 @@ TEST_F(SceneLoader, Glass) {
             "scene.yaml:9:56: materials.glass.ior: 1 is no boundary (a number above 0 other than 1)");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: -1.5")),
             "scene.yaml:9:56: materials.glass.ior: -1.5 is out of range (a number above 0)");
-  EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
-            "scene.yaml:9:61: materials.glass.two_sided: is not a known key (allowed: type, roughness, ior)");
+  EXPECT_EQ(
+      error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
+      "scene.yaml:9:61: materials.glass.two_sided: belongs to diffuse and rough_conductor, not to rough_dielectric "
+      "(allowed: type, roughness, ior)");
 }
 
 TEST_F(SceneLoader, GlassIsSolid) {
@@ -264,8 +266,10 @@ TEST_F(SceneLoader, MaterialErrors) {
   EXPECT_EQ(error("type: diffuse", "type: difuse"),
             "scene.yaml:8:17: materials.white.type: 'difuse' is not known, did you mean 'diffuse'? "
             "(allowed: diffuse, rough_conductor, rough_dielectric)");
-  EXPECT_EQ(error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
-            "scene.yaml:8:39: materials.white.roughness: is not a known key (allowed: type, albedo, two_sided)");
+  EXPECT_EQ(
+      error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
+      "scene.yaml:8:39: materials.white.roughness: belongs to rough_conductor and rough_dielectric, not to diffuse "
+      "(allowed: type, albedo, two_sided)");
   EXPECT_EQ(error("  metal:", "  white:"), "scene.yaml:9:3: materials.white: stands here twice, first on line 8");
 }
 

@@ -1,0 +1,74 @@
+// The words that experiment files hold, see core/base/description.h.
+#pragma once
+#include "core/base/description.h"
+#include "optim/experiment/experiment.h"
+
+namespace isochron {
+
+template <>
+inline constexpr auto kChoices<GateKind> = std::to_array<Choice<GateKind>>(
+    {{GateKind::steady, "steady", "all light, whatever its length"},
+     {GateKind::gaussian, "gaussian", "a normal density of path length"},
+     {GateKind::boxcar, "boxcar", "constant within its width"},
+     {GateKind::truncated_gaussian, "truncated_gaussian", "zero beyond `half_width` from its centre"},
+     {GateKind::tabulated, "tabulated", "lines between the rows of a table"}});
+
+template <>
+inline constexpr auto kChoices<LengthUnit> = std::to_array<Choice<LengthUnit>>(
+    {{LengthUnit::scene, "scene", "scene units"}, {LengthUnit::ns, "ns", ""}, {LengthUnit::ps, "ps", ""}});
+
+template <>
+inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterType>>(
+    {{ParameterType::translation, "translation", "along `direction`, scene units"},
+     {ParameterType::rotation, "rotation", "about `axis`, degrees"},
+     {ParameterType::vertices, "vertices", "each on its own, along `direction`, scene units"},
+     {ParameterType::albedo, "albedo", "of a material; of a conductor its reflectance"},
+     {ParameterType::roughness, "roughness", "of a material"},
+     {ParameterType::ior, "ior", "of a rough_dielectric"},
+     {ParameterType::emission, "emission", "radiance of a shape that emits"}});
+
+template <>
+inline constexpr auto kChoices<VertexDirection> =
+    std::to_array<Choice<VertexDirection>>({{VertexDirection::normal, "normal", "each along its normal, as loaded"},
+                                            {VertexDirection::free, "free", "three unknowns per vertex"}});
+
+template <>
+inline constexpr auto kChoices<Sampling> = std::to_array<Choice<Sampling>>(
+    {{Sampling::automatic, "auto", "whichever suits the gates' width, or both combined"},
+     {Sampling::standard, "standard", "paths of any length"},
+     {Sampling::ellipsoidal, "ellipsoidal", "paths of the lengths that the gates let through"}});
+
+template <>
+inline constexpr auto kChoices<ArcPick> = std::to_array<Choice<ArcPick>>(
+    {{ArcPick::contribution, "contribution", "in proportion to what each arc would carry if nothing stood in the way"},
+     {ArcPick::uniform, "uniform", "the paper's way, noisier"}});
+
+template <>
+inline constexpr auto kChoices<Numbers> = std::to_array<Choice<Numbers>>(
+    {{Numbers::low_discrepancy, "low_discrepancy", "samples cover evenly what they are taken from"},
+     {Numbers::independent, "independent", "none knows of another"}});
+
+template <>
+inline constexpr auto kChoices<GradientMethod> = std::to_array<Choice<GradientMethod>>(
+    {{GradientMethod::analytic, "analytic", "derivatives of the renderer, term by term"},
+     {GradientMethod::finite_difference, "finite_difference", "two images per unknown"}});
+
+template <>
+inline constexpr auto kChoices<LossKind> = std::to_array<Choice<LossKind>>(
+    {{LossKind::squared, "squared", "its square"},
+     {LossKind::huber, "huber", "beyond `scale`, residuals pull like their size, not its square"},
+     {LossKind::cauchy, "cauchy", "large residuals hardly pull"}});
+
+template <>
+inline constexpr auto kChoices<OptimizerMethod> = std::to_array<Choice<OptimizerMethod>>(
+    {{OptimizerMethod::adam, "adam", "for many unknowns, few samples, long runs"},
+     {OptimizerMethod::lbfgs, "lbfgs", "for smooth problems of some hundred unknowns"},
+     {OptimizerMethod::levenberg_marquardt, "levenberg_marquardt", "for few unknowns"}});
+
+template <>
+inline constexpr auto kChoices<GeometryFormat> =
+    std::to_array<Choice<GeometryFormat>>({{GeometryFormat::ply, "ply", "binary"},
+                                           {GeometryFormat::obj, "obj", ""},
+                                           {GeometryFormat::none, "none", "no meshes"}});
+
+}  // namespace isochron

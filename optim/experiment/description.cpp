@@ -1,0 +1,207 @@
+#include "optim/experiment/description.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <set>
+
+#include "core/base/error.h"
+#include "core/scene/scene_loader.h"
+#include "optim/experiment/choices.h"
+#include "optim/experiment/number_file.h"
+
+namespace isochron {
+namespace {
+
+constexpr int kMostSamples = 1 << 30;
+constexpr int kMostBounces = 10000;
+constexpr int kMostIterations = std::numeric_limits<int>::max() - 2;
+
+std::string existing_file(const YamlValue& value, const std::filesystem::path& folder) {
+  const std::string text = value.text();
+  std::error_code none;  // such as of names that are too long
+  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text, none);
+  if (none || !std::filesystem::is_regular_file(path, none))
+    value.fail("there is no file " + quote(text), "a path relative to the experiment file");
+  return path.string();
+}
+
+void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
+  keys.value("images", folder.file(target.images),
+             "EXR file of measured images, one channel or three per gate; without it the target is rendered",
+             {.unset = target.images.empty()});
+  const Only rendered{target.images.empty(), "rendered targets", "images"};
+  keys.value("samples", field::integer(target.samples, 1, kMostSamples), "per pixel", {.only = rendered});
+  keys.value("seed", field::seed(target.seed), "of its random numbers", {.only = rendered});
+  keys.value("max_bounces", field::integer(target.max_bounces, 0, kMostBounces), "of its light",
+             {.only = rendered, .otherwise = "the experiment's"});
+  const auto noise = [&](Keys& inner) {
+    // So many that their noise, a millionth, no longer matters.
+    inner.value("photons", field::number(target.photons, {.low = 0, .high = 1e12, .low_open = true}),
+                "mean count of a pixel and colour in the brightest gate", {.required = true});
+  };
+  keys.map("noise", noise, "Poisson noise of the rendered target", {.only = rendered, .unset = target.photons == 0});
+}
+
+void describe(Keys& keys, SampleSpec& s) {
+  keys.value("primal", field::integer(s.primal, 1, kMostSamples), "the images, for the loss");
+  keys.value("interior", field::integer(s.interior, 0, kMostSamples),
+             "derivative: what moves within lit surfaces, and the gates' slopes; 0: left out");
+  keys.value("visibility", field::integer(s.visibility, 0, kMostSamples),
+             "derivative: moving silhouettes and shadow edges; a sample looks for one of them; 0: left out");
+  keys.value("path_length", field::integer(s.path_length, 0, kMostSamples),
+             "derivative: jumps of the gates; 0: left out");
+}
+
+void describe_estimator(Keys& keys, EstimatorOptions& options, bool& guiding) {
+  keys.value("sampling", field::choice(options.sampling), "how paths are found");
+  keys.value("antithetic", field::boolean(options.antithetic),
+             "coupled pairs for the gates' slopes, under ellipsoidal sampling");
+  keys.value("pick", field::choice(options.pick), "which arc of an ellipsoid a connection takes");
+  keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
+  keys.value("guiding", field::boolean(guiding),
+             "visibility: learn where boundaries matter from a small share of the samples");
+  keys.value("follow", field::non_negative(options.follow),
+             "how far path vertices follow what moves close to them (needed where objects touch); 0: not at all",
+             {.unit = "radii of the smaller body"});
+  keys.value("follow_radius", field::non_negative(options.follow_radius), "the same of what the camera sees",
+             {.unit = "widths of a pixel"});
+}
+
+void describe(Keys& keys, GradientSpec& gradient) {
+  keys.value("method", field::choice(gradient.method), "how the loss is differentiated");
+  // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.
+  const bool idle = gradient.method == GradientMethod::analytic && !gradient.step_given;
+  if (keys.value("step", field::positive(gradient.step), "finite differences: half the distance of the two images",
+                 {.unit = "the parameter's", .unset = idle, .otherwise = fmt::format("`{}`", gradient.step)}))
+    gradient.step_given = true;
+  keys.value("common_numbers", field::boolean(gradient.common_numbers),
+             "finite differences: both images take the same random numbers, so that most of their noise cancels");
+}
+
+void describe(Keys& keys, LossSpec& loss) {
+  keys.value("kind", field::choice(loss.kind), "what counts of a pixel's residual", {.required = true});
+  keys.value("scale", field::positive(loss.scale), "residuals beyond it count for less",
+             {.only = only(loss.kind, {LossKind::huber, LossKind::cauchy}), .unit = "RMS of the target"});
+}
+
+void describe(Keys& keys, OptimizerSpec& optimizer) {
+  const auto of = [&](OptimizerMethod method) { return only(optimizer.method, {method}); };
+  keys.value("method", field::choice(optimizer.method), "how the unknowns are found");
+  keys.value("learning_rate", field::positive(optimizer.learning_rate),
+             "adam: largest step of an iteration, about; lbfgs: first trial step; halved whenever the loss rises",
+             {.unit = "the parameter's `scale`"});
+  keys.value("iterations", field::integer(optimizer.iterations, 0, kMostIterations), "at most");
+  keys.value("tolerance", field::non_negative(optimizer.tolerance),
+             "converged once the images' RMSE is at most this; 0: never", {.unit = "RMS of the target"});
+  const auto stop = [&](Keys& inner) {
+    // Two losses are the least that have a standard error.
+    inner.value("window", field::integer(optimizer.stop_window, 2, 100000), "iterations that are averaged",
+                {.required = true});
+  };
+  keys.map("stop", stop,
+           "converged once the loss falls by less than its standard error; the result is the mean over the last window",
+           {.unset = optimizer.stop_window == 0});
+  RateDecay& decay = optimizer.decay;
+  const auto halving = [&](Keys& inner) {
+    inner.value("half_life", field::positive(decay.half_life), "iterations after which steps are half as long",
+                {.required = true});
+    inner.value("start", field::integer(decay.start, 0, kMostIterations), "the iteration that it begins with");
+  };
+  keys.map("decay", halving, "steps shrink, so that the noise that they carry averages out",
+           {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
+  keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
+             "line searches of an iteration, all on the same random numbers", {.only = of(OptimizerMethod::lbfgs)});
+}
+
+void describe(Keys& keys, OutputSpec& output) {
+  keys.value("geometry", field::choice(output.geometry),
+             "format of the meshes of the shapes that move: initial, final and, where known, target");
+  keys.value("every", field::integer(output.every, 0), "and those of every so many; 0: none", {.unit = "iterations"});
+}
+
+void check_parameters(const Experiment& experiment) {
+  std::set<std::string> names;
+  for (const ParameterSpec& spec : experiment.parameters) {
+    if (!names.insert(spec.name).second) spec.fail("name", fmt::format("'{}' stands here twice", spec.name));
+    if (spec.diffusion > 0 && experiment.optimizer.method != OptimizerMethod::adam)
+      spec.fail("smoothing", "diffusion works with the method adam alone", "slopes for the other methods");
+  }
+}
+
+}  // namespace
+
+Field ExperimentFolder::file(std::string& variable) const {
+  return {"file", "relative to the experiment file",
+          [this, &variable](const YamlValue& value) { variable = existing_file(value, path); },
+          [this, &variable] { return yaml_text(std::filesystem::path(variable).lexically_proximate(path).string()); }};
+}
+
+Field ExperimentFolder::values(std::vector<double>& variable) {
+  const auto read = [this, &variable](const YamlValue& value) {
+    variable.clear();
+    if (value.is_map()) value.fail("is a map", "a number, a list of numbers or a text file");
+    if (value.is_number())
+      variable = {value.number()};
+    else if (value.is_list())
+      variable = value.numbers();
+    else
+      for (const auto& row : read_numbers(value)) variable.insert(variable.end(), row.begin(), row.end());
+    if (variable.empty()) value.fail("holds no number", "at least one");
+  };
+  return {"number, list or text file", "one for all, or one for each component", read,
+          [&variable] { return variable.size() == 1 ? fmt::format("{}", variable[0]) : yaml_list(variable); }};
+}
+
+std::vector<std::vector<double>> ExperimentFolder::read_numbers(const YamlValue& value, int columns) {
+  number_files.push_back(existing_file(value, path));
+  return read_number_file(number_files.back(), columns);
+}
+
+Field file_name(std::string& variable) {
+  Field name = field::checked(field::text(variable), [&variable](const YamlValue& value) {
+    const bool valid = variable[0] != '-' && std::all_of(variable.begin(), variable.end(), [](unsigned char c) {
+                         return (c < 0x80 && std::isalnum(c)) || c == '_' || c == '-';
+                       });
+    if (!valid) value.fail(quote(variable) + " is not a usable name", "letters, digits, _ and -");
+  });
+  name.allowed = "letters, digits, `_` and `-`";
+  return name;
+}
+
+void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
+  keys.value("name", file_name(e.name), "names the default output folder, `runs/NAME`", {.required = true});
+  keys.value("scene", folder.file(e.scene), "the scene", {.required = true});
+  keys.value("resolution", resolution_field(e.resolution[0], e.resolution[1]),
+             "in place of the scene's; the field of view stays across the width",
+             {.unit = "pixels", .unset = e.resolution[0] == 0, .otherwise = "the camera's"});
+  keys.map("gates", [&](Keys& inner) { describe(inner, e.gates, folder); }, "when the camera sees", {.required = true});
+  keys.value("max_bounces", field::integer(e.estimator.max_bounces, 0, kMostBounces),
+             "scattering vertices on a path, at most");
+  keys.map(
+      "target", [&](Keys& inner) { describe(inner, e.target, folder); }, "the images to be matched");
+  keys.list("parameters", e.parameters,
+            [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, e.target.images.empty()); },
+            "the unknowns; those of one shape act in this order", {.otherwise = "none"});
+  keys.map(
+      "samples", [&](Keys& inner) { describe(inner, e.samples); }, "per pixel and iteration");
+  keys.map(
+      "estimator", [&](Keys& inner) { describe_estimator(inner, e.estimator, e.guiding); },
+      "how images and derivatives are sampled");
+  keys.map(
+      "gradient", [&](Keys& inner) { describe(inner, e.gradient); }, "how the loss is differentiated");
+  keys.map(
+      "loss", [&](Keys& inner) { describe(inner, e.loss); }, "what is minimised");
+  keys.map(
+      "optimizer", [&](Keys& inner) { describe(inner, e.optimizer); }, "how it is minimised");
+  keys.map(
+      "output", [&](Keys& inner) { describe(inner, e.output); }, "what a run writes besides images and tables");
+  keys.value("seed", field::seed(e.seed), "of the random numbers");
+  std::string version;
+  keys.value("version", field::text(version), "of the program, in the `experiment.yaml` of a run; without effect",
+             {.unset = true});
+  keys.check([&](const YamlValue&) { check_parameters(e); });
+}
+
+}  // namespace isochron

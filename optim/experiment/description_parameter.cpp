@@ -1,0 +1,128 @@
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+
+#include "optim/experiment/choices.h"
+#include "optim/experiment/description.h"
+
+namespace isochron {
+namespace {
+
+Field selection(Selection& variable) {
+  const auto read = [&variable](const YamlValue& value) {
+    if (value.is_list()) {
+      variable.kind = Selection::Kind::list;
+      for (const YamlValue& entry : value.list())
+        variable.indices.push_back(static_cast<int>(entry.integer(0, std::numeric_limits<int>::max())));
+      return;
+    }
+    if (!value.is_map()) value.fail("is neither", "a list of vertex indices, or {box: {min, max}}");
+    variable.kind = Selection::Kind::box;
+    YamlMap map = value.map(), box = map.require("box").map();
+    variable.min = box.require("min").vec3();
+    variable.max = box.require("max").vec3();
+    box.reject_unknown();
+    map.reject_unknown();
+  };
+  const auto write = [&variable] {
+    if (variable.kind == Selection::Kind::list) return fmt::format("[{}]", fmt::join(variable.indices, ", "));
+    return fmt::format("{{box: {{min: {}, max: {}}}}}", yaml_vector(variable.min), yaml_vector(variable.max));
+  };
+  return {"list of integers, or {box: {min, max}}", "indices from 0, or corners [x, y, z]", read, write};
+}
+
+Field direction(ParameterSpec& spec) {
+  const auto read = [&spec](const YamlValue& value) {
+    if (spec.type == ParameterType::translation || value.is_list())
+      spec.direction = value.direction();
+    else if (value.is_scalar())
+      field::choice(spec.direction_kind).read(value);
+    else
+      value.fail("is neither", "[x, y, z], normal or free");
+  };
+  const auto write = [&spec]() -> std::string {
+    return spec.direction_kind == VertexDirection::fixed ? yaml_vector(spec.direction) : name_of(spec.direction_kind);
+  };
+  const Field words = field::choice(spec.direction_kind);
+  return {"[x, y, z]; vertices: or a word", "not all zero; " + words.allowed, read, write, words.names};
+}
+
+Field pivot(ParameterSpec& spec) {
+  const auto read = [&spec](const YamlValue& value) {
+    if (value.is_list()) {
+      spec.pivot = value.vec3();
+    } else if (value.is_map()) {
+      spec.pivot_kind = PivotKind::follow;
+      read_keys(value, [&](Keys& keys) { keys.value("follow", field::vec3(spec.pivot), "", {.required = true}); });
+    } else {
+      value.choice({"center"});
+      spec.pivot_kind = PivotKind::center;
+    }
+  };
+  const auto write = [&spec]() -> std::string {
+    if (spec.pivot_kind == PivotKind::center) return "center";
+    const std::string point = yaml_vector(spec.pivot);
+    return spec.pivot_kind == PivotKind::follow ? "{follow: " + point + "}" : point;
+  };
+  return {"[x, y, z], a word or {follow: [x, y, z]}", "`center`", read, write,
+          "A list is a point of the world; `center`: the mean of the vertices that turn, as loaded; `follow`: a point "
+          "of the "
+          "shape, where it is in the scene file"};
+}
+
+void check_name(const YamlValue& value) {
+  for (const char* reserved : {"render", "target", "initial", "final"})
+    if (value.text() == reserved) value.fail(fmt::format("'{}' is the name of another output", reserved));
+}
+
+}  // namespace
+
+void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool target_required) {
+  using enum ParameterType;
+  const auto of = [&](std::initializer_list<ParameterType> types) { return only(spec.type, types); };
+  const char* const own = "the parameter's";
+  keys.remember(spec.where);
+  keys.value("name", field::checked(file_name(spec.name), check_name), "names columns and files", {.required = true});
+  keys.value("type", field::choice(spec.type), "what changes, in which unit", {.required = true});
+  keys.value("shape", field::text(spec.shape), "whose vertices or emission changes",
+             {.required = true, .only = of({translation, rotation, vertices, emission})});
+  keys.value("material", field::text(spec.material), "which changes",
+             {.required = true, .only = of({albedo, roughness, ior})});
+  keys.value("selection", selection(spec.selection), "the vertices that move: by number, or inside a box of the world",
+             {.only = of({translation, rotation, vertices}),
+              .unset = spec.selection.kind == Selection::Kind::all,
+              .otherwise = "all"});
+  keys.value("direction", direction(spec), "by the parameter times this, as long as it is given",
+             {.required = true, .only = of({translation, vertices}), .unit = "scene units"});
+  const auto check_axis = [&](const YamlValue& value) {
+    if (!std::isnormal(length_squared(spec.axis)))
+      value.fail("is too long or too short", "a length whose square a double can hold");
+  };
+  keys.value("axis", field::checked(field::direction(spec.axis), check_axis),
+             "turned about by the right-hand rule; its length does not matter",
+             {.required = true, .only = of({rotation})});
+  keys.value("pivot", pivot(spec), "what the axis goes through", {.only = of({rotation}), .unit = "scene units"});
+  const auto smoothing = [&](Keys& inner) {
+    inner.value("diffusion", field::non_negative(spec.diffusion),
+                "adam alone: gradients diffuse over the mesh, over about the root of this many edges; 0: not");
+    inner.value("slopes", field::non_negative(spec.slopes), "weight of a penalty on uneven offsets; 0: none",
+                {.unit = "mean square of the target"});
+  };
+  keys.map("smoothing", smoothing, "so that vertices move in patches",
+           {.only = of({vertices}), .unset = spec.diffusion == 0 && spec.slopes == 0});
+  keys.value("initial", folder.values(spec.initial),
+             "where the optimisation starts; of what moves, offsets from the scene file",
+             {.required = true, .unit = own});
+  keys.value(
+      "target", folder.values(spec.target), "where the target is rendered, or known to be",
+      {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
+  keys.value("lower", folder.values(spec.lower), "bound", {.unit = own, .unset = spec.lower.empty()});
+  keys.value("upper", folder.values(spec.upper), "bound", {.unit = own, .unset = spec.upper.empty()});
+  keys.value("scale", field::positive(spec.scale),
+             "what counts as one unit where parameters are compared. Default: 1; of a "
+             "rotation 180 / pi; of an emission its largest initial component",
+             {.unit = own, .unset = spec.scale == 0, .otherwise = "by `type`"});
+}
+
+}  // namespace isochron
