@@ -51,8 +51,10 @@ struct Field {
   std::string names = {};              ///< of a choice: what each name means
 };
 
+/// Fields of variables, which must outlive what is made of them.
 namespace field {
 
+/// What the page says of a range of integers.
 std::string allowed_integers(long long low, long long high);
 template <class T>
 Field integer(T& variable, long long low, long long high = std::numeric_limits<T>::max()) {
@@ -60,7 +62,7 @@ Field integer(T& variable, long long low, long long high = std::numeric_limits<T
           [&variable, low, high](const YamlValue& value) { variable = static_cast<T>(value.integer(low, high)); },
           [&variable] { return std::to_string(variable); }};
 }
-/// Of an unsigned type: what a signed one holds of it.
+/// Half of what an unsigned integer can be: all that YamlValue reads.
 inline Field seed(std::uint64_t& variable) {
   return integer(variable, 0, std::numeric_limits<long long>::max());
 }
@@ -73,8 +75,10 @@ Field vec3(Vec3& variable);
 Field direction(Vec3& variable);  ///< see YamlValue::direction
 Field numbers(std::vector<double>& variable);
 Field color(Rgb& variable, const NumberRange& range, bool& grey);  ///< see YamlValue::color
+/// One of some words; `set` receives which.
 Field choice(const std::vector<std::pair<std::string, std::string>>& names_and_meanings, std::function<void(int)> set,
              std::function<std::string()> write);
+/// One of an enumeration's names.
 template <class E>
 Field choice(E& variable) {
   std::vector<std::pair<std::string, std::string>> names;
@@ -82,7 +86,7 @@ Field choice(E& variable) {
   return choice(
       names, [&variable](int i) { variable = kChoices<E>[i].value; }, [&variable] { return name_of(variable); });
 }
-/// The field with a check, or whatever else, after it was read.
+/// The field with a check, or whatever else is to be done, after it was read.
 Field checked(Field field, std::function<void(const YamlValue&)> check);
 
 }  // namespace field
@@ -116,6 +120,7 @@ Only only(E present, std::initializer_list<E> kinds) {
   return result;
 }
 
+/// What else there is to say of a key.
 struct KeyOptions {
   bool required = false;
   Only only = {};
@@ -137,6 +142,7 @@ class Keys {
   /// Returns whether the file that is read has the key.
   virtual bool value(const std::string& name, const Field& field, const std::string& meaning,
                      const KeyOptions& options = {}) = 0;
+  /// A map inside the map.
   virtual void map(const std::string& name, const Describe& describe, const std::string& meaning,
                    const KeyOptions& options = {}) = 0;
   /// A list of maps, each of one item: describe(Keys&, T&).
@@ -173,9 +179,11 @@ struct WrittenKey {
   std::string name, value;
   bool operator==(const WrittenKey&) const = default;
 };
+/// What is described, line by line.
 std::vector<WrittenKey> written_keys(const Keys::Describe& describe);
 /// Those of the paths, with what is in them and what they are in.
 std::vector<WrittenKey> selected(const std::vector<WrittenKey>& keys, const std::vector<std::string>& paths);
+/// The lines as text.
 std::string yaml(const std::vector<WrittenKey>& keys);
 
 /// Tables of the keys, in Markdown: those at the top, then those of each map or list there.

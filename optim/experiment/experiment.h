@@ -1,5 +1,6 @@
 // The experiment file: what a user writes, checked and with every default filled in.
-// Its keys, with their defaults, are described in description.h; experiments/README.md has them in tables.
+// Its keys are described in description.cpp, their defaults are those of the structs below; experiments/README.md has both in
+// tables.
 #pragma once
 #include <array>
 #include <cmath>
