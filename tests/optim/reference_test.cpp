@@ -31,11 +31,11 @@ std::vector<std::string> examples() {
   return all;
 }
 
-TEST(Reference, ExperimentKeysAreThoseOfTheProgram) {
+TEST(ReferencePage, ExperimentKeysAreThoseOfTheProgram) {
   EXPECT_EQ(with_tables(page(), experiment_reference()), page()) << "scripts/reference rewrites the tables";
 }
 
-TEST(Reference, ExamplesCanBeRead) {
+TEST(ReferencePage, ExamplesCanBeRead) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   ASSERT_GT(examples().size(), 10u);
@@ -49,7 +49,7 @@ TEST(Reference, ExamplesCanBeRead) {
   }
 }
 
-TEST(Reference, ExamplesHaveEveryKey) {
+TEST(ReferencePage, ExamplesHaveEveryKey) {
   std::string all;
   for (const std::string& example : examples()) all += example;
   const std::string tables = experiment_reference();
