@@ -48,16 +48,15 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
   for (const Shape& shape : scene.shapes) shapes_.push_back({&scene.materials[shape.material]});
   const std::size_t count = scene.triangles.size();
   records_.resize(count);
-  std::vector<EllipsoidBvh::Input> all, moved, emitting;
-  all.reserve(count);
   std::vector<double> power;
   for (std::size_t i = 0; i < count; ++i) {
     const int t = static_cast<int>(i);
     const auto& v = scene.triangles[t].vertex;
-    const EllipsoidBvh::Input input{{scene.positions[v[0]], scene.positions[v[1]], scene.positions[v[2]]}, t};
+    const Vec3 &a = scene.positions[v[0]], &b = scene.positions[v[1]], &c = scene.positions[v[2]];
     TriangleRecord& record = records_[t];
-    record.origin = input.vertex[0];
-    for (int k = 0; k < 2; ++k) record.edge[k] = input.vertex[k + 1] - record.origin;
+    record.origin = a;
+    record.edge[0] = b - a;
+    record.edge[1] = c - a;
     const Vec3 normal = cross(record.edge[0], record.edge[1]);
     const double doubled = length(normal);
     record.area = 0.5 * doubled;
@@ -71,21 +70,13 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
     record.moves = record.moving_corners || moving.scatters[t];
     // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
     if (doubled > 0) record.normal = normal / doubled;
-    all.push_back(input);
-    if (record.moves) moved.push_back(input);
     if (!shape_of(t).emission.is_black() && record.area > 0) {
       record.emits = true;
       emitters.push_back(t);
-      emitting.push_back(input);
-      const auto& [a, b, c] = input.vertex;
       camera_sees_emitters |= height_over(t, camera.position) > 0 && !camera.misses_image(a, b, c);
       power.push_back(record.area * shape_of(t).emission.max());
     }
   }
-  all_triangles = EllipsoidBvh(all);
-  moving_triangles = EllipsoidBvh(moved);
-  emitter_triangles = EllipsoidBvh(emitting);
-
   emitter_distribution_ = DiscreteDistribution(power);
   for (std::size_t i = 0; i < shapes_.size(); ++i) {
     const Shape& shape = scene.shapes[i];
@@ -95,6 +86,21 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
     for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) bounds.add(scene.positions[v]);
     emitter_bounds_.push_back(bounds);
   }
+}
+
+const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {
+  LazyHierarchy& hierarchy = hierarchies_[static_cast<int>(part)];
+  std::call_once(hierarchy.made, [&] {
+    std::vector<EllipsoidBvh::Input> input;
+    for (std::size_t i = 0; i < scene.triangles.size(); ++i) {
+      const TriangleRecord& record = records_[i];
+      if ((part == Part::moving && !record.moves) || (part == Part::emitting && !record.emits)) continue;
+      const auto& v = record.vertex;
+      input.push_back({{scene.positions[v[0]], scene.positions[v[1]], scene.positions[v[2]]}, static_cast<int>(i)});
+    }
+    hierarchy.bvh = EllipsoidBvh(input);
+  });
+  return hierarchy.bvh;
 }
 
 double PreparedScene::distance_to_emitters(const Vec3& p) const {

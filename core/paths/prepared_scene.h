@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -73,7 +74,11 @@ class PreparedScene {
   Bounds moving_bounds, flowing_bounds;
   std::vector<int> emitters;          ///< triangles that emit
   bool camera_sees_emitters = false;  ///< may, if nothing is in between
-  EllipsoidBvh all_triangles, moving_triangles, emitter_triangles;
+
+  /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
+  /// is made when first asked for: standard sampling asks for none.
+  enum class Part { all, moving, emitting };
+  const EllipsoidBvh& hierarchy(Part part) const;
 
   int shape_index(int triangle) const { return records_[triangle].shape; }
   const Shape& shape_of(int triangle) const { return scene.shapes[shape_index(triangle)]; }
@@ -221,7 +226,13 @@ class PreparedScene {
     return t;
   }
 
+  struct LazyHierarchy {
+    std::once_flag made;
+    EllipsoidBvh bvh;
+  };
+
   LargeArray<TriangleRecord> records_;
+  mutable std::array<LazyHierarchy, 3> hierarchies_;  ///< by Part
   std::vector<ShapeRecord> shapes_;
   std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;

@@ -71,7 +71,8 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   const Foci foci(x.p, y.p);
   if (!(high > foci.distance)) return;
   const Ellipsoid ellipsoids[2] = {{foci, target.tau[0] - before}, {foci, target.tau[1] - before}};
-  const EllipsoidBvh& bvh = any_arc_contributes(y.triangle) ? scene_.all_triangles : scene_.moving_triangles;
+  const EllipsoidBvh& bvh =
+      scene_.hierarchy(any_arc_contributes(y.triangle) ? PreparedScene::Part::all : PreparedScene::Part::moving);
   find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
 
   const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
@@ -131,7 +132,7 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
   const double high = 2 * (target.longest() - before), low = 2 * (target.shortest() - before);
   if (!(high > 0)) return;
   const EllipsoidBvh::Focus anywhere{x.p, {0, 0, 0}, 0, 1, false};
-  find_candidates(scene_.emitter_triangles, anywhere, low, high, thinning);
+  find_candidates(scene_.hierarchy(PreparedScene::Part::emitting), anywhere, low, high, thinning);
 
   const Foci foci(x.p, x.p);
   const Ellipsoid spheres[2] = {{foci, 2 * (target.tau[0] - before)}, {foci, 2 * (target.tau[1] - before)}};

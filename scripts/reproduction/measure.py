@@ -22,7 +22,7 @@ class Run:
     """One row of experiments/measured/reconstructions/NAME.csv."""
 
     seed: int
-    status: str  # see the README
+    status: str  # see optim/README.md
     unknowns: int
     iterations: int
     error_percent: float  # distance of the parameters to their targets at the end, in % of that at the start

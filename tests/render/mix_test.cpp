@@ -218,7 +218,7 @@ TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {
 }
 
 /// Each of the tree's gates takes in 0.2 % of the path length, but the fourteen of them 2.4 %: standard sampling uses every
-/// path that hits any, and its gradients have less variance for the same work (8 times on the chart of the README). The
+/// path that hits any, and its gradients have less variance for the same work (8 times on the chart of experiments/MEASURED.md). The
 /// same gates one by one are left to connections.
 TEST(MeasureMix, LooksAtWhatAllGatesCover) {
   Scene scene = load_scene(PROJECT_ROOT "/scenes/tree/scene.yaml");
