@@ -28,7 +28,7 @@ class DiscreteDistribution {
   double probability(int i) const { return (below_[i + 1] - below_[i]) / total(); }
 
   /// Asks early for what sample(u) will read, if all weights are about alike; returns what it then gives.
-  int expect(double u) const {
+  int prefetch(double u) const {
     const int i = guess(u);
     __builtin_prefetch(&below_[i]);
     return i;

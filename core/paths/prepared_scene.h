@@ -134,7 +134,7 @@ class PreparedScene {
   /// The same in three steps, each of which prefetches what the next one reads, so that other work can be done meanwhile;
   /// the first is optional.
   void prefetch_light(double u) const {
-    const int i = emitter_distribution_.expect(u);
+    const int i = emitter_distribution_.prefetch(u);
     __builtin_prefetch(&emitters[i]);
   }
   int pick_emitter(double u) const {

@@ -87,7 +87,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   const double scale = 1.0 / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   const ConnectionRates& used = worker.rates = share == 1 ? rates : ConnectionRates{};
   worker.ellipsoidal_share = share;
-  worker.pair_gain = pair_gain_;
+  worker.antithetic_factor = pair_gain_;
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;

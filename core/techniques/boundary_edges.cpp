@@ -1,6 +1,6 @@
 #include "core/techniques/boundary_edges.h"
 
-#include "core/geometry/piercings.h"
+#include "core/geometry/mesh_intersections.h"
 
 namespace isochron {
 namespace {
@@ -23,8 +23,8 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
   if (scene.camera.misses_image(edge.origin, edge.end)) return 0;
   const Vec3 middle = (a + b) * 0.5;
   const double r = length(middle);
-  bool within_outline = edge.pierced();
-  if (edge.faces() == 2 && !edge.pierced()) {
+  bool within_outline = edge.is_mesh_intersection();
+  if (edge.faces() == 2 && !edge.is_mesh_intersection()) {
     bool seen[2], dark = true;
     for (int i = 0; i < 2; ++i) {
       const Material& material = scene.material_of(edge.face[i]);
@@ -63,13 +63,13 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
       if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
     secondary_.add(b, edge_length * b.azimuths);
   }
-  if (scene.moving.geometry) add_piercings(scene, wedge);
+  if (scene.moving.geometry) add_mesh_intersections(scene, wedge);
   primary_.finish();
   secondary_.finish();
 }
 
-void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
-  for (const Piercing& p : find_piercings(scene.scene, scene.caster)) {
+void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {
+  for (const MeshIntersection& p : find_mesh_intersections(scene.scene, scene.caster)) {
     BoundaryEdge b;
     b.origin = p.end[0];
     b.end = p.end[1];
@@ -89,7 +89,7 @@ void BoundaryEdges::add_piercings(const PreparedScene& scene, bool wedge) {
 void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b,
                                  LocalDifferential& out) {
   const BoundaryEdge& edge = *point.edge;
-  if (!edge.pierced()) {
+  if (!edge.is_mesh_intersection()) {
     const double share[2] = {1 - point.s, point.s};
     for (int i = 0; i < 2; ++i)
       if (scene.moving.vertex[edge.vertex[i]]) out.vertices.push_back({edge.vertex[i], n_b * share[i], {}});

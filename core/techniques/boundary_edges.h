@@ -21,7 +21,7 @@ struct alignas(64) BoundaryEdge {
 
   int faces() const { return face[1] < 0 ? 1 : 2; }
   /// Of two triangles that go on beyond it.
-  bool pierced() const { return vertex[0] < 0; }
+  bool is_mesh_intersection() const { return vertex[0] < 0; }
   Vec3 point(double s) const { return origin + (end - origin) * s; }
 };
 static_assert(sizeof(BoundaryEdge) == 128);
@@ -46,7 +46,7 @@ class BoundaryEdges {
     Sample() = default;
     explicit Sample(const Place& place);
   };
-  /// Edges and lines of piercing triangles that the camera may see moving, by their length in the image and, inside of an
+  /// Edges and intersections of meshes that the camera may see moving, by their length in the image and, inside of an
   /// outline, the angle between their faces; the same of static ones where points beside them may follow others, in equal
   /// shares. `u` in (0, 1).
   bool has_primary() const { return !primary_.distribution.empty(); }
@@ -76,7 +76,7 @@ class BoundaryEdges {
     Place place(double u) const;
   };
   Choice primary_, secondary_;
-  void add_piercings(const PreparedScene& scene, bool wedge);
+  void add_mesh_intersections(const PreparedScene& scene, bool wedge);
 };
 
 }  // namespace isochron

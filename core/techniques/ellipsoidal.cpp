@@ -272,7 +272,7 @@ double EllipsoidalConnections::mis_weight(const TargetLength& target, int i, con
   if (!(sum > 0)) return 0;
   if (receiver_) return d.*technique / sum;
   const double share = worker_.ellipsoidal_share;
-  const double gain = target.pair ? worker_.pair_gain : 1;
+  const double gain = target.pair ? worker_.antithetic_factor : 1;
   const double ours = jump || share == 1 ? 1 : worker_.techniques.ellipsoidal_weight(path, pixel, share, gain);
   return ours / share * (d.*technique / sum);
 }

@@ -16,7 +16,7 @@ std::optional<SurfacePoint> seen_beside(Worker& worker, const BoundaryEdge& edge
   double front_slope = 0;
   Vec3 into_front;
   for (int i = 0; i < edge.faces(); ++i) {
-    const double sign = edge.pierced() && dot(edge.inward[i], side) < 0 ? -1 : 1;
+    const double sign = edge.is_mesh_intersection() && dot(edge.inward[i], side) < 0 ? -1 : 1;
     const Vec3 inward = edge.inward[i] * sign;
     const double across = dot(inward, side);
     // A face seen edge-on takes no part of the image: what lies behind it is seen beside the edge.

@@ -60,7 +60,7 @@ void StandardPaths::Slot::emit(const Rgb& value) {
       return (1 - worker_.techniques.ellipsoidal_weight(path_, pixel_, share, gain)) / (1 - share);
     };
     weights.value = weight(1);
-    weights.slope = pairs_ ? weight(worker_.pair_gain) : weights.value;
+    weights.slope = pairs_ ? weight(worker_.antithetic_factor) : weights.value;
   }
   worker_.emit(path_, pixel_, value * scale_, path_.length.back(), weights);
 }

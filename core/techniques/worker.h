@@ -20,7 +20,7 @@ struct Worker {
   const GatePick& pick;
   double ellipsoidal_share = 0;  ///< of the samples; the others are standard
   ConnectionRates rates = {};    ///< of ellipsoidal connections
-  double pair_gain = 1;          ///< by how much pairs count for more than their density
+  double antithetic_factor = 1;  ///< by how much pairs count for more than their density
   Techniques techniques;
   Sink& sink;
   const bool differential_sink;  ///< sink.differential()

@@ -36,7 +36,7 @@ TEST(DiscreteDistribution, DrawsByCumulativeSums) {
     for (int k = 0; k < kDraws; ++k) {
       double u = (k + 0.5) / kDraws;
       const double target = u * sums.back();
-      const int expected = distribution.expect(u), i = distribution.sample(u);
+      const int expected = distribution.prefetch(u), i = distribution.sample(u);
       ASSERT_TRUE(expected >= 0 && expected < static_cast<int>(c.weights.size())) << k;
       if (c.name == "alike") {
         ASSERT_NEAR(expected, i, 1) << k;

@@ -1,6 +1,6 @@
 #include "core/scene/materials/material.h"
 
-#include "core/base/turn.h"
+#include "core/base/sincos_2pi.h"
 
 namespace isochron {
 namespace {
@@ -17,7 +17,7 @@ struct Frame {
 /// the unit hemisphere, reflections of w_o by visible normals are uniform on the cap z > -w_o.z.
 Vec3 sample_visible_normal(double alpha, const Vec3& w_o, double u0, double u1) {
   const Vec3 v = normalize(Vec3{alpha * w_o.x, alpha * w_o.y, w_o.z});
-  const SineCosine phi = turn(u0);
+  const SineCosine phi = sincos_2pi(u0);
   const double z = (1 - u1) * (1 + v.z) - v.z;
   const double r = std::sqrt(std::max((1 - z) * (1 + z), 0.0));
   const Vec3 h{r * phi.cosine + v.x, r * phi.sine + v.y, z + v.z};
@@ -26,7 +26,7 @@ Vec3 sample_visible_normal(double alpha, const Vec3& w_o, double u0, double u1) 
 
 Vec3 sample_cosine(double u0, double u1) {
   const double r = std::sqrt(u0);
-  const SineCosine phi = turn(u1);
+  const SineCosine phi = sincos_2pi(u1);
   return {r * phi.cosine, r * phi.sine, std::sqrt(1 - u0)};
 }
 

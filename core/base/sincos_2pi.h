@@ -11,7 +11,7 @@ struct SineCosine {
 /// Sine and cosine of 2 pi u for |u| up to 2^20, absolute error below 3e-16. A full turn needs no reduction
 /// by an irrational number: the nearest quarter turn is exact, and Taylor polynomials do the rest, |x| <=
 /// pi/4. No branches.
-inline SineCosine turn(double u) {
+inline SineCosine sincos_2pi(double u) {
   constexpr double kRound = 0x1.8p52;  // adding it leaves round(4u) in the low bits of the sum
   const double quarter = (4 * u + kRound) - kRound;
   const double x = 6.283185307179586477 * (u - 0.25 * quarter), z = x * x;

@@ -1,5 +1,5 @@
 // Surfaces that pass through each other: the lines along which they do, and derivatives of what is seen there.
-#include "core/geometry/piercings.h"
+#include "core/geometry/mesh_intersections.h"
 
 #include <gtest/gtest.h>
 
@@ -12,11 +12,11 @@ namespace {
 double total_length(const Scene& scene) {
   const RayCaster caster(scene);
   double sum = 0;
-  for (const Piercing& p : find_piercings(scene, caster)) sum += length(p.end[1] - p.end[0]);
+  for (const MeshIntersection& p : find_mesh_intersections(scene, caster)) sum += length(p.end[1] - p.end[0]);
   return sum;
 }
 
-TEST(Piercings, ABeamThroughACube) {
+TEST(MeshIntersections, ABeamThroughACube) {
   Scene scene;
   add_shape(scene, "cube", box({-1, -1, -1}, {1, 1, 1}), diffuse(Rgb(0.5)));
   EXPECT_EQ(total_length(scene), 0);  // neighbours in a mesh do not pierce
@@ -24,7 +24,7 @@ TEST(Piercings, ABeamThroughACube) {
   EXPECT_NEAR(total_length(scene), 2 * 2 * (0.7 + 0.5), 1e-9);  // two rectangles
 }
 
-TEST(Piercings, FollowTheSceneScale) {
+TEST(MeshIntersections, FollowTheSceneScale) {
   for (const double scale : {1e-3, 1.0, 1e3}) {
     Scene scene;
     add_shape(scene, "a", box(Vec3(-1, -1, -1) * scale, Vec3(1, 1, 1) * scale), diffuse(Rgb(0.5)));
@@ -34,7 +34,7 @@ TEST(Piercings, FollowTheSceneScale) {
   }
 }
 
-TEST(Piercings, AFoldedMeshPiercesItself) {
+TEST(MeshIntersections, AFoldedMeshPiercesItself) {
   // Two triangles with one vertex in common, the second of which goes through the first from there on.
   Scene scene;
   const Mesh mesh{{{0, 0, 0}, {2, -1, 0}, {2, 1, 0}, {1, 0, 1}, {1, 0, -1}}, {{0, 1, 2}, {0, 3, 4}}};
@@ -42,7 +42,7 @@ TEST(Piercings, AFoldedMeshPiercesItself) {
   EXPECT_NEAR(total_length(scene), 1, 1e-9);
 }
 
-TEST(Piercings, WhatTouchesDoesNotPierce) {
+TEST(MeshIntersections, WhatTouchesDoesNotPierce) {
   Scene scene;
   add_shape(scene, "floor", quad({-2, 0, 2}, {2, 0, 2}, {2, 0, -2}, {-2, 0, -2}), diffuse(Rgb(0.5)));
   add_shape(scene, "block", box({-0.5, 0, -0.5}, {0.5, 1, 0.5}), diffuse(Rgb(0.5)));
@@ -62,8 +62,8 @@ Scene crossing_blocks() {
 }
 
 // The image's mean against finite differences with common random numbers: z-tests at 4 standard errors (false alarm 6e-5
-// each, 8 of them). Without the lines of piercing the clearest of each pair fails by 10 to 60.
-TEST(Piercings, DerivativesAgreeWithFiniteDifferences) {
+// each, 8 of them). Without the intersections the clearest of each pair fails by 10 to 60.
+TEST(MeshIntersections, DerivativesAgreeWithFiniteDifferences) {
   const Scene scene = crossing_blocks();
   const GateSet gates(GateShape::gaussian(0.4), {5.0, 5.6});
   const Motion a = translate(scene, "a", {1, 0.2, 0.3}), b = translate(scene, "b", {1, 0.2, 0.3});

@@ -9,13 +9,13 @@
 namespace isochron {
 
 /// The segment that two triangles have in common. They may share a vertex, its one end.
-struct Piercing {
+struct MeshIntersection {
   std::array<int, 2> triangle;  ///< ascending
   std::array<Vec3, 2> end;
 };
 
 /// All pairs that cross, by triangles. A segment ends where an edge of one triangle goes through the other, which a ray along
 /// each of the scene's edges finds. What merely touches is not found.
-std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster);
+std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const RayCaster& caster);
 
 }  // namespace isochron

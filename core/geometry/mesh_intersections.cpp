@@ -1,4 +1,4 @@
-#include "core/geometry/piercings.h"
+#include "core/geometry/mesh_intersections.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@ namespace isochron {
 namespace {
 
 /// An edge of the first triangle, or of the second, goes through the other here.
-struct Hole {
+struct EdgeHit {
   std::array<int, 2> triangle;
   Vec3 point;
 };
@@ -20,7 +20,7 @@ bool has_vertex(const Scene& scene, int triangle, int vertex) {
 }
 
 /// Goes along the edge from triangle to triangle.
-void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, std::vector<Hole>& holes) {
+void find_edge_hits(const Scene& scene, const RayCaster& caster, const Edge& edge, std::vector<EdgeHit>& hits) {
   const Vec3 from = scene.positions[edge.vertex[0]], to = scene.positions[edge.vertex[1]];
   const double offset = caster.offset(), end = length(to - from) - offset;
   if (!(end > offset)) return;
@@ -41,7 +41,7 @@ void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, s
     if (!(distance < end)) return;
     if (!has_vertex(scene, t, edge.vertex[0]) && !has_vertex(scene, t, edge.vertex[1]))
       for (const int face : edge.face)
-        if (face >= 0) holes.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance});
+        if (face >= 0) hits.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance});
     passed = distance;
     step = offset;
   }
@@ -49,34 +49,35 @@ void find_holes(const Scene& scene, const RayCaster& caster, const Edge& edge, s
 
 }  // namespace
 
-std::vector<Piercing> find_piercings(const Scene& scene, const RayCaster& caster) {
+std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const RayCaster& caster) {
   constexpr std::size_t kChunk = 1024;
   const std::size_t edges = scene.edges.size(), chunks = (edges + kChunk - 1) / kChunk;
-  std::vector<std::vector<Hole>> found(chunks);
+  std::vector<std::vector<EdgeHit>> found(chunks);
   parallel(static_cast<int>(chunks), [&](int chunk) {
     const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
     for (std::size_t e = begin; e < std::min(edges, begin + kChunk); ++e)
-      find_holes(scene, caster, scene.edges[e], found[static_cast<std::size_t>(chunk)]);
+      find_edge_hits(scene, caster, scene.edges[e], found[static_cast<std::size_t>(chunk)]);
   });
-  std::vector<Hole> holes;
-  for (const auto& some : found) holes.insert(holes.end(), some.begin(), some.end());
-  std::stable_sort(holes.begin(), holes.end(), [](const Hole& a, const Hole& b) { return a.triangle < b.triangle; });
+  std::vector<EdgeHit> hits;
+  for (const auto& some : found) hits.insert(hits.end(), some.begin(), some.end());
+  std::stable_sort(hits.begin(), hits.end(),
+                   [](const EdgeHit& a, const EdgeHit& b) { return a.triangle < b.triangle; });
 
-  std::vector<Piercing> piercings;
-  for (std::size_t begin = 0, end; begin < holes.size(); begin = end) {
-    for (end = begin; end < holes.size() && holes[end].triangle == holes[begin].triangle;) ++end;
-    const auto& [a, b] = holes[begin].triangle;
-    Piercing piercing{holes[begin].triangle, {holes[begin].point, holes[begin].point}};
+  std::vector<MeshIntersection> intersections;
+  for (std::size_t begin = 0, end; begin < hits.size(); begin = end) {
+    for (end = begin; end < hits.size() && hits[end].triangle == hits[begin].triangle;) ++end;
+    const auto& [a, b] = hits[begin].triangle;
+    MeshIntersection segment{hits[begin].triangle, {hits[begin].point, hits[begin].point}};
     // The farthest from the first: through a vertex or an edge the same point is found several times.
     const auto consider = [&](const Vec3& p) {
-      if (length(p - piercing.end[0]) > length(piercing.end[1] - piercing.end[0])) piercing.end[1] = p;
+      if (length(p - segment.end[0]) > length(segment.end[1] - segment.end[0])) segment.end[1] = p;
     };
-    for (std::size_t i = begin + 1; i < end; ++i) consider(holes[i].point);
+    for (std::size_t i = begin + 1; i < end; ++i) consider(hits[i].point);
     for (const int v : scene.triangles[a].vertex)
       if (has_vertex(scene, b, v)) consider(scene.positions[v]);
-    if (length(piercing.end[1] - piercing.end[0]) > caster.offset()) piercings.push_back(piercing);
+    if (length(segment.end[1] - segment.end[0]) > caster.offset()) intersections.push_back(segment);
   }
-  return piercings;
+  return intersections;
 }
 
 }  // namespace isochron
