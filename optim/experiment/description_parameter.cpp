@@ -117,8 +117,11 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   keys.value(
       "target", folder.values(spec.target), "where the target is rendered, or known to be",
       {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
-  keys.value("lower", folder.values(spec.lower), "bound", {.unit = own, .unset = spec.lower.empty()});
-  keys.value("upper", folder.values(spec.upper), "bound", {.unit = own, .unset = spec.upper.empty()});
+  keys.value("lower", folder.values(spec.lower),
+             "bound. Besides, albedo and roughness stay below 1 and above 0, ior on its side of 1, emission above 0",
+             {.unit = own, .unset = spec.lower.empty()});
+  keys.value("upper", folder.values(spec.upper), "bound. An ior above 1 has none of its own: give one",
+             {.unit = own, .unset = spec.upper.empty()});
   keys.value("scale", field::positive(spec.scale),
              "what counts as one unit where parameters are compared. Default: 1; of a "
              "rotation 180 / pi; of an emission its largest initial component",

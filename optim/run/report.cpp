@@ -74,12 +74,16 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
   if (!std::isnan(last.loss)) {
     fmt::format_to(out, "  loss {:.3g} +- {:.2g} (at the start {:.3g} +- {:.2g}){}\n", last.loss, last.loss_noise,
                    state.loss_initial, state.loss_noise_initial,
-                   last.loss < 2 * last.loss_noise ? ": it cannot be told from 0" : "");
+                   last.loss >= 2 * last.loss_noise ? ""
+                   : state.loss_initial < 2 * state.loss_noise_initial
+                       ? ": it cannot be told from 0, nor could it at the start"
+                       : ": it cannot be told from 0");
     const LossSpread spread = loss_spread(state.descent);
     if (!std::isnan(spread.noise_share))
       fmt::format_to(out, "  noise makes {:.0f} % of the loss's variance over the last {} iterations\n",
                      100 * spread.noise_share, spread.rows);
-    fmt::format_to(out, "  image RMSE {:.3g} (at the start {:.3g})\n", last.image_rmse, state.image_rmse_initial);
+    const auto rmse = [](double value) { return value > 0 ? fmt::format("{:.3g}", value) : "below the noise"; };
+    fmt::format_to(out, "  image RMSE {} (at the start {})\n", rmse(last.image_rmse), rmse(state.image_rmse_initial));
   }
   return text;
 }
