@@ -120,6 +120,7 @@ Mesh read_mesh(const std::string& file) {
                                    corners.size(), first.x, first.y, first.z, wrong));
     }
   }
+  if (mesh.faces.empty()) throw InputError(file + ": none of its faces has an area");
   return mesh;
 }
 

@@ -236,6 +236,7 @@ TEST_F(MeshFile, ObjErrors) {
   EXPECT_EQ(error("m.obj", three + "f 1 2 3\n\nf 9 2 3\n"), "m.obj:6: there is no vertex 9 (the file has 3)");
   EXPECT_EQ(error("m.obj", ""), "m.obj: has no faces");
   EXPECT_EQ(error("m.obj", "garbage"), "m.obj: has no faces");
+  EXPECT_EQ(error("m.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nf 1 2 4 3\n"), "m.obj: none of its faces has an area");
   EXPECT_EQ(error("m.abc", three), "m.abc: '.abc' is not a kind of mesh (allowed: .obj, .ply, .off, .stl)");
   std::filesystem::create_directory(folder.path("folder.obj"));
   EXPECT_EQ(error_of([&] { read_mesh(folder.path("folder.obj")); }), folder.path("folder.obj") + ": is a folder");
