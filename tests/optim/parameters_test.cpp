@@ -91,6 +91,27 @@ std::vector<double> point_near_initial(const Parameters& parameters, unsigned se
   return theta;
 }
 
+/// The tangent's columns are derivatives of all degrees of freedom; its rows' entries are sorted.
+void expect_central_differences(const Parameters& parameters, const std::vector<double>& theta,
+                                const TangentBasis& basis) {
+  for (int column = 0; column < basis.columns; ++column) {
+    const double h = 1e-5;  // truncation h^2 and cancellation 1e-15 / h are both below 1e-9
+    std::vector<double> up = theta, down = theta;
+    up[column] += h, down[column] -= h;
+    const std::vector<double> above = dofs(parameters.apply(up)), below = dofs(parameters.apply(down));
+    for (std::size_t row = 0; row < above.size(); ++row) {
+      double coefficient = 0;
+      for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e) {
+        if (e > basis.row_begin[row]) {
+          EXPECT_LT(basis.entries[e - 1].column, basis.entries[e].column);
+        }
+        if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
+      }
+      EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
+    }
+  }
+}
+
 TEST(Parameters, TangentIsTheDerivativeOfApply) {
   for (bool grey : {true, false}) {
     const Scene scene = two_shapes(grey);
@@ -101,22 +122,7 @@ TEST(Parameters, TangentIsTheDerivativeOfApply) {
     ASSERT_EQ(basis.columns, parameters.size());
     ASSERT_EQ(static_cast<int>(basis.row_begin.size()), DofLayout(scene).size() + 1);
     ASSERT_EQ(basis.row_begin.back(), static_cast<int>(basis.entries.size()));
-    for (int column = 0; column < basis.columns; ++column) {
-      const double h = 1e-5;  // truncation h^2 and cancellation 1e-16 / h are both below 1e-9
-      std::vector<double> up = theta, down = theta;
-      up[column] += h, down[column] -= h;
-      const std::vector<double> above = dofs(parameters.apply(up)), below = dofs(parameters.apply(down));
-      for (std::size_t row = 0; row < above.size(); ++row) {
-        double coefficient = 0;
-        for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e) {
-          if (e > basis.row_begin[row]) {
-            EXPECT_LT(basis.entries[e - 1].column, basis.entries[e].column);
-          }
-          if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
-        }
-        EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
-      }
-    }
+    expect_central_differences(parameters, theta, basis);
   }
 }
 
@@ -150,22 +156,7 @@ TEST(Parameters, TangentOfPivotsThatMoveWithTheShape) {
   const Parameters parameters(scene, carried_pivots());
   const std::vector<double> theta = point_near_initial(parameters, 8);
   const TangentBasis basis = parameters.tangent(theta);
-  for (int column = 0; column < basis.columns; ++column) {
-    const double h = 1e-5;  // truncation h^2 and cancellation 1e-15 / h are both below 1e-9
-    std::vector<double> up = theta, down = theta;
-    up[column] += h, down[column] -= h;
-    const std::vector<double> above = dofs(parameters.apply(up)), below = dofs(parameters.apply(down));
-    for (std::size_t row = 0; row < above.size(); ++row) {
-      double coefficient = 0;
-      for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e) {
-        if (e > basis.row_begin[row]) {
-          EXPECT_LT(basis.entries[e - 1].column, basis.entries[e].column);
-        }
-        if (basis.entries[e].column == column) coefficient = basis.entries[e].coefficient;
-      }
-      EXPECT_NEAR(coefficient, (above[row] - below[row]) / (2 * h), 1e-8) << "row " << row << " column " << column;
-    }
-  }
+  expect_central_differences(parameters, theta, basis);
 }
 
 TEST(Parameters, PivotsMoveWithTheShape) {
