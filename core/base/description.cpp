@@ -113,6 +113,42 @@ std::string enumeration(const std::vector<std::string>& words) {
 
 namespace {
 
+/// The words of the kinds of a map.
+Field kind_field(const std::vector<Keys::Kind>& kinds, std::function<void(const std::string&)> choose,
+                 const std::string& chosen) {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const Keys::Kind& kind : kinds) names.emplace_back(kind.name, kind.meaning);
+  return field::choice(
+      names, [names, choose = std::move(choose)](int i) { choose(names[i].first); }, [chosen] { return chosen; });
+}
+
+/// Names of keys.
+class NameList final : public Keys {
+ public:
+  bool value(const std::string& name, const Field&, const std::string&, const KeyOptions&) override {
+    names.push_back(name);
+    return false;
+  }
+  void map(const std::string& name, const Describe&, const std::string&, const KeyOptions&) override {
+    names.push_back(name);
+  }
+  void named(const std::string& name, const std::vector<std::string>&, const DescribeNamed&, const std::string&,
+             const KeyOptions&) override {
+    names.push_back(name);
+  }
+  void kinds(const std::string& name, const std::vector<Kind>&, const std::string&,
+             const std::function<void(const std::string&)>&, const DescribeNamed&, const std::string&) override {
+    names.push_back(name);
+  }
+  std::vector<std::string> names;
+
+ private:
+  void entries(const std::string& name, std::size_t, const DescribeEntry&, const std::string&,
+               const KeyOptions&) override {
+    names.push_back(name);
+  }
+};
+
 class Reader final : public Keys {
  public:
   explicit Reader(const YamlValue& value) : value_(value), map_(value.map()) {}
@@ -132,6 +168,23 @@ class Reader final : public Keys {
     YamlMap all = found->map();
     for (const auto& [key, entry] : all.entries())
       read_keys(entry, [&, &own = key](Keys& keys) { describe(keys, own); });
+  }
+  void kinds(const std::string& name, const std::vector<Kind>& kinds, const std::string&,
+             const std::function<void(const std::string&)>& choose, const DescribeNamed& describe,
+             const std::string&) override {
+    std::string chosen;
+    const auto set = [&](const std::string& kind) { choose(chosen = kind); };
+    value(name, kind_field(kinds, set, chosen), "", {.required = true});
+    describe(*this, chosen);
+    std::map<std::string, std::vector<std::string>> owners;
+    for (const Kind& kind : kinds) {
+      NameList list;
+      describe(list, kind.name);
+      for (const std::string& key : list.names) owners[key].push_back(kind.name);
+    }
+    for (const auto& [key, names] : owners)
+      if (std::find(names.begin(), names.end(), chosen) == names.end())
+        map_.explain(key, "belongs to " + enumeration(names) + ", not to " + chosen);
   }
   void remember(Places& places) override {
     places_ = &places;
@@ -191,6 +244,12 @@ class Writer final : public Keys {
     };
     map(name, all, meaning, options);
   }
+  void kinds(const std::string& name, const std::vector<Kind>& kinds, const std::string& chosen,
+             const std::function<void(const std::string&)>& choose, const DescribeNamed& describe,
+             const std::string&) override {
+    value(name, kind_field(kinds, choose, chosen), "", {});
+    describe(*this, chosen);
+  }
 
  private:
   void entries(const std::string& name, std::size_t count, const DescribeEntry& describe, const std::string&,
@@ -234,8 +293,36 @@ class Page final : public Keys {
     nested(
         name, "map of maps, by name", [&](Keys& keys) { describe(keys, "NAME"); }, meaning, options);
   }
+  void kinds(const std::string& name, const std::vector<Kind>& kinds, const std::string& chosen,
+             const std::function<void(const std::string&)>& choose, const DescribeNamed& describe,
+             const std::string& meaning) override {
+    value(name, kind_field(kinds, choose, chosen), meaning, {.required = true});
+    // Keys of several kinds of which the page says the same have one row.
+    std::vector<std::pair<std::string, std::vector<std::string>>> rows;
+    for (const Kind& kind : kinds) {
+      std::vector<Table> own{{"", ""}};
+      Page page(own, 0, path_);
+      page.of_kind_ = true;
+      describe(page, kind.name);
+      const std::string& text = own[0].rows;
+      for (std::size_t begin = 0, end; begin < text.size(); begin = end) {
+        end = text.find('\n', begin) + 1;
+        const std::string line = text.substr(begin, end - begin);
+        auto same = std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.first == line; });
+        if (same == rows.end()) same = rows.insert(rows.end(), {line, {}});
+        same->second.push_back(kind.name);
+      }
+    }
+    for (const auto& [line, names] : rows) {
+      const std::size_t at = line.find(kKindMark);
+      tables_[table_].rows += line.substr(0, at) + enumeration(names) + line.substr(at + 1);
+    }
+  }
 
  private:
+  /// Stands in a row for the kinds that it is of.
+  static constexpr char kKindMark = '\x01';
+
   void entries(const std::string& name, std::size_t, const DescribeEntry& describe, const std::string& meaning,
                const KeyOptions& options) override {
     nested(
@@ -255,7 +342,8 @@ class Page final : public Keys {
     if (standard.empty() && options.required) standard = "required";
     if (standard.empty() && options.unset) standard = "none";
     if (standard.empty()) standard = code(field.write());
-    if (!options.only.to.empty()) meaning = fmt::format("*{}:* {}", options.only.to, meaning);
+    const std::string to = of_kind_ ? std::string(1, kKindMark) : options.only.to;
+    if (!to.empty()) meaning = fmt::format("*{}:* {}", to, meaning);
     tables_[table_].rows += fmt::format("| `{}{}` | {} | {} | {} | {} | {} |\n", path_, name, field.type, options.unit,
                                         standard, field.allowed, meaning);
   }
@@ -264,6 +352,7 @@ class Page final : public Keys {
   std::vector<Table>& tables_;
   std::size_t table_;
   std::string path_;
+  bool of_kind_ = false;
 };
 
 bool is_in(const std::string& path, const std::string& outer) {

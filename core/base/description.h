@@ -158,6 +158,14 @@ class Keys {
   /// A map of maps, each under a name of the user's; `names` are those to be written.
   virtual void named(const std::string& name, const std::vector<std::string>& names, const DescribeNamed& describe,
                      const std::string& meaning, const KeyOptions& options = {}) = 0;
+  struct Kind {
+    std::string name, meaning;
+  };
+  /// A word that says of which kind the map is, and the keys of that kind: describe(keys, kind) names those of any kind.
+  /// `chosen` is the present one, choose(kind) sets another.
+  virtual void kinds(const std::string& name, const std::vector<Kind>& kinds, const std::string& chosen,
+                     const std::function<void(const std::string&)>& choose, const DescribeNamed& describe,
+                     const std::string& meaning) = 0;
   /// From here on, where each key stands that the file has; under "", the map.
   virtual void remember(Places&) {}
   /// Checks of several keys together, on the map that they stand in. To be called when all its keys have been named.

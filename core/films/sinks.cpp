@@ -16,7 +16,8 @@ void ColumnRates::bind(const LocalDifferential& differential) {
   for (const VertexGradient& v : differential.vertices)
     for (int axis = 0; axis < 3; ++axis)
       for_each_column(layout_.vertex(v.vertex, axis), [&](Rates& rates, double velocity) {
-        for (double& f : rates.log_f) f += v.log_f[axis] * velocity;
+        for (int c = 0; c < 3; ++c)
+          if (v.channel < 0 || v.channel == c) rates.log_f[c] += v.log_f[axis] * velocity;
         rates.length += v.length[axis] * velocity;
       });
   for (const ScalarGradient& s : differential.scalars)
@@ -83,7 +84,7 @@ void AdjointSink::scatter(const Rgb& weight, double slope_weight) {
   for (const VertexGradient& v : differential_->vertices)
     for (int axis = 0; axis < 3; ++axis)
       if (const int dof = layout_.vertex(v.vertex, axis); basis_.moves(dof))
-        gradient_.add(dof, sum * v.log_f[axis] + slope_weight * v.length[axis]);
+        gradient_.add(dof, (v.channel < 0 ? sum : weight[v.channel]) * v.log_f[axis] + slope_weight * v.length[axis]);
   for (const ScalarGradient& s : differential_->scalars)
     if (basis_.moves(s.dof))
       gradient_.add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);

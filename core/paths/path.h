@@ -66,26 +66,23 @@ inline bool path_has_gradient(const PreparedScene& scene, const Path& path, int 
          scene.moving.emission[scene.shape_index(emitter_triangle)];
 }
 
-/// Cosines at a scattering vertex x between the neighbours `before` (camera side) and `after` (light side).
-struct Scattering {
-  Vec3 w_o, w_i;
+/// Directions at a scattering vertex x towards its neighbours `before` (camera side) and `after` (light side).
+struct Scattering : Directions {
   double distance_o, distance_i;
-  double cos_o, cos_i, cos_io;
   Scattering(const Vec3& before, const SurfacePoint& x, const Vec3& after)
       : Scattering(x, (before - x.p) * (1 / length(before - x.p)), length(before - x.p), after) {}
   /// `towards_camera`: unit direction to the neighbour on the camera side, which is `distance` away.
   Scattering(const SurfacePoint& x, const Vec3& towards_camera, double distance, const Vec3& after)
-      : w_o(towards_camera), w_i(after - x.p), distance_o(distance), distance_i(length(w_i)) {
+      : distance_o(distance) {
+    n = x.n;
+    w_o = towards_camera;
+    w_i = after - x.p;
+    distance_i = length(w_i);
     w_i *= 1 / distance_i;
     cos_o = dot(x.n, w_o);
     cos_i = dot(x.n, w_i);
     cos_io = dot(w_o, w_i);
   }
-  double lobe(const Material& m) const { return isochron::lobe(m, cos_i, cos_o, cos_io); }
-  /// Density per solid angle of drawing w_i from w_o.
-  double pdf_towards_light(const Material& m) const { return direction_pdf(m, cos_i, cos_o, cos_io); }
-  /// Density per solid angle of drawing w_o from w_i.
-  double pdf_towards_camera(const Material& m) const { return direction_pdf(m, cos_o, cos_i, cos_io); }
 };
 
 /// Converts a density per solid angle at x into one per area at y.

@@ -17,17 +17,25 @@ Vec3 through_normalize(const Vec3& g, const Vec3& w, double distance) {
   return (g - w * dot(g, w)) / distance;
 }
 
-/// Adds the scattering lobe's part at vertex x between its neighbours; returns the lobe's derivative.
-LobeDerivative add_lobe(const Material& material, const SurfacePoint& x, const Scattering& s, Accumulated& before,
-                        Accumulated& here, Accumulated& after) {
-  const LobeDerivative lobe = lobe_derivative(material, s.cos_i, s.cos_o, s.cos_io);
-  const Vec3 to_after = through_normalize(x.n * lobe.d_cos_i + s.w_o * lobe.d_cos_io, s.w_i, s.distance_i);
-  const Vec3 to_before = through_normalize(x.n * lobe.d_cos_o + s.w_i * lobe.d_cos_io, s.w_o, s.distance_o);
+/// Adds what the BSDF at vertex x says of x and its neighbours.
+void add_bsdf(const BsdfDerivative::ByDirections& by, const Scattering& s, Accumulated& before, Accumulated& here,
+              Accumulated& after) {
+  const Vec3 to_after = through_normalize(by.w_i, s.w_i, s.distance_i);
+  const Vec3 to_before = through_normalize(by.w_o, s.w_o, s.distance_o);
   after.position += to_after;
   before.position += to_before;
   here.position -= to_after + to_before;
-  here.normal += s.w_i * lobe.d_cos_i + s.w_o * lobe.d_cos_o;
-  return lobe;
+  here.normal += by.n;
+}
+
+/// Adds what a scalar does to ln F, given by channel.
+void add_scalar(int dof, const Rgb& log_f, LocalDifferential& out) {
+  if (log_f == Rgb(log_f.r)) {
+    if (log_f.r != 0) out.scalars.push_back({dof, -1, log_f.r});
+    return;
+  }
+  for (int c = 0; c < 3; ++c)
+    if (log_f[c] != 0) out.scalars.push_back({dof, c, log_f[c]});
 }
 
 /// What a vertex's material point adds up beyond what its base flow says: from neighbours that follow it, from x1 itself.
@@ -64,7 +72,7 @@ Extra let_follow(const VertexFlow& flow, const SurfacePoint& x, const Accumulate
 /// Carries position and normal gradients of a vertex to its triangle's vertices.
 /// `area`: how often d ln (area of the triangle) counts (paper Eq. 11).
 void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, double area, bool length_only,
-                 LocalDifferential& out) {
+                 int channel, LocalDifferential& out) {
   if (!scene.has_moving_vertex(x.triangle)) return;
   // Both turn with the doubled area's vector.
   const Vec3 through_cross = (in_plane(x, g.normal) + x.n * area) / (2 * scene.area(x.triangle));
@@ -72,15 +80,16 @@ void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumu
   const auto& edge = scene.edges(x.triangle);
   const Vec3 opposite[3] = {edge[0] - edge[1], edge[1], -edge[0]};  // from the next but one corner to the next
   scene.for_each_moving_corner(x.triangle, [&](int i, int vertex) {
-    VertexGradient entry{vertex, g.position * b[i], g.length * b[i]};
+    VertexGradient entry{vertex, g.position * b[i], g.length * b[i], channel};
     if (!length_only) entry.log_f += cross(opposite[i], through_cross);
     out.vertices.push_back(entry);
   });
 }
 
-/// Carries the gradients at the path's vertices through their flows to the vertices of the mesh.
+/// Carries the gradients at the path's vertices, of one channel or of all (-1), through their flows to the vertices of the
+/// mesh.
 void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std::vector<Accumulated>& g,
-              bool length_only, LocalDifferential& out) {
+              bool length_only, int channel, LocalDifferential& out) {
   thread_local std::vector<Extra> extra;
   extra.assign(count, {});
   // Each material point counts its area but that of x1, which the pixel holds.
@@ -123,7 +132,7 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
   for (int k = 1; k < count; ++k) {
     g[k].position += extra[k].position;
     g[k].length += extra[k].length;
-    to_triangle(scene, x[k], g[k], extra[k].area, length_only, out);
+    to_triangle(scene, x[k], g[k], extra[k].area, length_only, channel, out);
   }
 }
 
@@ -139,13 +148,13 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     const double squared = length_squared(d);
     const double inverse = 1 / std::sqrt(squared);
     const Vec3 w = d * inverse;
-    const Material* medium = scene.medium_between(x[k], x[k + 1]);
-    const Vec3 g_length = medium ? w * medium->ior : w;
+    const ShapeRecord* medium = scene.medium_between(x[k], x[k + 1]);
+    const Vec3 g_length = medium ? w * medium->index : w;
     g[k].length -= g_length;
     g[k + 1].length += g_length;
     if (medium) {
-      const int m = static_cast<int>(medium - scene.scene.materials.data());
-      if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, 0, squared * inverse});
+      const int dof = scene.layout.number(medium->material, medium->bsdf->index_number());
+      if (scene.moving.number_moves(scene.layout, dof)) out.scalars.push_back({dof, -1, 0, squared * inverse});
     }
     if (length_only || k == 0) continue;
     const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
@@ -159,19 +168,29 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     g[k].normal += d / cos_near;
     g[k + 1].normal += d / cos_far;
   }
+  // Where colours differ, what is theirs alone.
+  thread_local std::array<std::vector<Accumulated>, 3> own;
+  bool coloured = false;
   if (!length_only) {
     for (int k = 1; k + 1 < count; ++k) {
       const int m = scene.shape_of(x[k].triangle).material;
-      const Material& material = scene.scene.materials[m];
-      if (material.type != MaterialType::diffuse) {
-        const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
-        const LobeDerivative lobe = add_lobe(material, x[k], s, g[k - 1], g[k], g[k + 1]);
-        if (scene.moving.roughness[m]) out.scalars.push_back({scene.layout.roughness(m), -1, lobe.d_roughness});
-        if (scene.moving.ior[m]) out.scalars.push_back({scene.layout.ior(m), -1, lobe.d_ior});
+      const Bsdf& bsdf = scene.bsdf_of(x[k].triangle);
+      if (!bsdf.depends_on_directions() && !scene.moving.material[m]) continue;
+      const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
+      const BsdfDerivative derivative = bsdf.derivative(s);
+      if (derivative.coloured) {
+        for (int c = 0; c < 3; ++c) {
+          if (!coloured) own[c].assign(count, {});
+          add_bsdf(derivative.by_directions[c], s, own[c][k - 1], own[c][k], own[c][k + 1]);
+        }
+        coloured = true;
+      } else {
+        add_bsdf(derivative.by_directions[0], s, g[k - 1], g[k], g[k + 1]);
       }
-      if (scene.moving.albedo[m])
-        for (int c = 0; c < 3; ++c)
-          if (material.albedo[c] > 0) out.scalars.push_back({scene.layout.albedo(m, c), c, 1 / material.albedo[c]});
+      if (!scene.moving.material[m]) continue;
+      for (int i = 0; i < scene.layout.numbers(m); ++i)
+        if (const int dof = scene.layout.number(m, i); scene.moving.number_moves(scene.layout, dof))
+          add_scalar(dof, derivative.by_number[i], out);
     }
     const int s = scene.shape_index(x[count - 1].triangle);
     if (scene.moving.emission[s])
@@ -179,7 +198,18 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
         if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
   }
-  let_flow(scene, x, count, g, length_only, out);
+  if (!coloured) {
+    let_flow(scene, x, count, g, length_only, -1, out);
+    return;
+  }
+  for (int c = 0; c < 3; ++c) {
+    for (int k = 0; k < count; ++k) {
+      own[c][k].position += g[k].position;
+      own[c][k].normal += g[k].normal;
+      if (c == 0) own[c][k].length = g[k].length;  // once for all channels
+    }
+    let_flow(scene, x, count, own[c], length_only, c, out);
+  }
 }
 
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {

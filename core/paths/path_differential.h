@@ -7,11 +7,12 @@
 
 namespace isochron {
 
-/// Gradients with respect to one mesh vertex.
+/// Gradients with respect to one mesh vertex; `channel` -1: ln F of every channel, else of one.
 struct VertexGradient {
   int vertex;
   Vec3 log_f;   ///< of ln F
   Vec3 length;  ///< of the (optical) path length
+  int channel = -1;
 };
 
 /// Gradients with respect to a scalar degree of freedom; `channel` -1: of every channel.

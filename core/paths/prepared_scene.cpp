@@ -7,27 +7,26 @@ namespace isochron {
 MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
     : vertex(scene.positions.size(), 0),
       triangle(scene.triangles.size(), 0),
-      albedo(scene.materials.size(), 0),
-      roughness(scene.materials.size(), 0),
-      ior(scene.materials.size(), 0),
-      emission(scene.shapes.size(), 0),
-      scatters(scene.triangles.size(), 0) {
-  if (!basis || basis->columns == 0) return;
+      material(scene.materials.size(), 0),
+      emission(scene.shapes.size(), 0) {
   const DofLayout layout(scene);
+  const int first_number = layout.first_number[0];
+  number.assign(layout.first_number.back() - first_number, 0);
+  if (!basis || basis->columns == 0) return;
   for (int v = 0; v < layout.vertices; ++v)
     for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->moves(layout.vertex(v, axis));
-  for (int m = 0; m < layout.materials; ++m) {
-    for (int c = 0; c < 3; ++c) albedo[m] |= basis->moves(layout.albedo(m, c));
-    roughness[m] = basis->moves(layout.roughness(m));
-    ior[m] = basis->moves(layout.ior(m)) && scene.materials[m].type == MaterialType::rough_dielectric;
-    lengths |= ior[m] != 0;
+  for (int m = 0; m < layout.materials(); ++m) {
+    for (int k = 0; k < layout.numbers(m); ++k) {
+      const int dof = layout.number(m, k);
+      material[m] |= number[dof - first_number] = basis->moves(dof);
+    }
+    const int index = scene.materials[m].bsdf().index_number();
+    lengths |= index >= 0 && basis->moves(layout.number(m, index));
   }
   for (int s = 0; s < layout.shapes; ++s)
     for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
   for (std::size_t t = 0; t < triangle.size(); ++t) {
     for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
-    const int m = scene.shapes[scene.triangles[t].shape].material;
-    scatters[t] = albedo[m] || roughness[m] || ior[m];
     if (!triangle[t]) continue;
     geometry = true;
     for (int v : scene.triangles[t].vertex) bounds.add(scene.positions[v]);
@@ -45,7 +44,12 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
       caster(source),
       moving_bounds(moving.bounds.grown(caster.offset())),
       flowing_bounds(flows.near().grown(caster.offset())) {
-  for (const Shape& shape : scene.shapes) shapes_.push_back({&scene.materials[shape.material]});
+  for (const Shape& shape : scene.shapes) {
+    const Material& material = scene.materials[shape.material];
+    const Bsdf& bsdf = material.bsdf();
+    shapes_.push_back(
+        {&bsdf, shape.material, bsdf.two_sided(), bsdf.transparent() ? material.number(bsdf.index_number()) : 0});
+  }
   const std::size_t count = scene.triangles.size();
   records_.resize(count);
   std::vector<double> power;
@@ -62,12 +66,12 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
     record.area = 0.5 * doubled;
     record.shape = scene.triangles[t].shape;
     record.vertex = v;
-    if (is_dielectric(t)) {
-      has_dielectric_ = true;
-      least_index_ = std::min(least_index_, material_of(t).ior);
+    if (transparent(t)) {
+      has_medium_ = true;
+      least_index_ = std::min(least_index_, shapes_[record.shape].index);
     }
     for (int k = 0; k < 3; ++k) record.moving_corners |= (moving.vertex[v[k]] != 0) << k;
-    record.moves = record.moving_corners || moving.scatters[t];
+    record.moves = record.moving_corners || moving.material[shapes_[record.shape].material];
     // A triangle that the parameters have flattened to nothing keeps a zero normal: no ray or ellipse meets it.
     if (doubled > 0) record.normal = normal / doubled;
     if (!shape_of(t).emission.is_black() && record.area > 0) {

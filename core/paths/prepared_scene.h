@@ -43,20 +43,25 @@ static_assert(sizeof(TriangleRecord) == 128);
 
 /// What paths ask of a shape.
 struct ShapeRecord {
-  const Material* material = nullptr;
+  const Bsdf* bsdf = nullptr;
+  int material = -1;
+  bool two_sided = false;
+  double index = 0;        ///< of refraction behind its faces; 0: opaque
   double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
 };
 
 /// Which degrees of freedom move. Everything else is skipped by the derivative passes.
 struct MovingParts {
   std::vector<std::uint8_t> vertex, triangle;
-  std::vector<std::uint8_t> albedo, roughness, ior;  ///< per material
-  std::vector<std::uint8_t> emission;                ///< per shape
-  std::vector<std::uint8_t> scatters;                ///< per triangle: its material's albedo, roughness or ior moves
+  std::vector<std::uint8_t> material;  ///< any of its numbers
+  std::vector<std::uint8_t> number;    ///< as DofLayout counts them, from the first material's first on
+  std::vector<std::uint8_t> emission;  ///< per shape
   bool any = false, geometry = false;
   Bounds bounds;         ///< of the triangles with a vertex that moves
   bool lengths = false;  ///< paths can change their length
   MovingParts(const Scene& scene, const TangentBasis* basis);
+  /// Of a degree of freedom that is a material's.
+  bool number_moves(const DofLayout& layout, int dof) const { return number[dof - layout.first_number[0]] != 0; }
 };
 
 class PreparedScene {
@@ -82,30 +87,32 @@ class PreparedScene {
 
   int shape_index(int triangle) const { return records_[triangle].shape; }
   const Shape& shape_of(int triangle) const { return scene.shapes[shape_index(triangle)]; }
-  const Material& material_of(int triangle) const { return *shapes_[shape_index(triangle)].material; }
+  const Bsdf& bsdf_of(int triangle) const { return *shapes_[shape_index(triangle)].bsdf; }
+  /// Whether its material reflects on both sides.
+  bool two_sided(int triangle) const { return shapes_[shape_index(triangle)].two_sided; }
 
   /// Radiance that leaves the point towards the unit direction w; black on the back of an emitter.
   Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
     return dot(x.n, w) > 0 ? shape_of(x.triangle).emission : Rgb();
   }
 
-  /// The dielectric that the segment between x and y, which see each other, runs inside of: one with an end on the
-  /// back of its face. Null outside. Opaque surfaces and the camera (triangle -1) know no medium: a segment between
-  /// two of them counts as outside.
-  const Material* medium_between(const SurfacePoint& x, const SurfacePoint& y) const {
-    if (!has_dielectric_) return nullptr;
+  /// What the segment between x and y, which see each other, runs inside of: the shape of a transparent material with an end
+  /// of the segment on the back of its face. Null outside. Opaque surfaces and the camera (triangle -1) know no medium: a
+  /// segment between two of them counts as outside.
+  const ShapeRecord* medium_between(const SurfacePoint& x, const SurfacePoint& y) const {
+    if (!has_medium_) return nullptr;
     const Vec3 d = y.p - x.p;
-    if (is_behind(x, d)) return &material_of(x.triangle);
-    if (is_behind(y, -d)) return &material_of(y.triangle);
+    if (is_behind(x, d)) return &shapes_[shape_index(x.triangle)];
+    if (is_behind(y, -d)) return &shapes_[shape_index(y.triangle)];
     return nullptr;
   }
   /// Optical length of the segment over its geometric length.
   double index_between(const SurfacePoint& x, const SurfacePoint& y) const {
-    const Material* medium = medium_between(x, y);
-    return medium ? medium->ior : 1;
+    const ShapeRecord* medium = medium_between(x, y);
+    return medium ? medium->index : 1;
   }
   bool outside(const SurfacePoint& x, const SurfacePoint& y) const { return !medium_between(x, y); }
-  bool is_dielectric(int triangle) const { return material_of(triangle).type == MaterialType::rough_dielectric; }
+  bool transparent(int triangle) const { return shapes_[shape_index(triangle)].index > 0; }
   /// Lower bound of the optical length of any path over the distance between its ends.
   double least_index() const { return least_index_; }
 
@@ -216,9 +223,9 @@ class PreparedScene {
   double distance_to_emitters(const Vec3& p) const;
 
  private:
-  /// Whether x is on a dielectric's face whose back the direction d leaves from.
+  /// Whether x is on a transparent face whose back the direction d leaves from.
   bool is_behind(const SurfacePoint& x, const Vec3& d) const {
-    return x.triangle >= 0 && is_dielectric(x.triangle) && dot(x.n, d) < 0;
+    return x.triangle >= 0 && transparent(x.triangle) && dot(x.n, d) < 0;
   }
   int prefetched_hit(const Vec3& from, const Vec3& w) const {
     const int t = caster.closest_hit(from, w);
@@ -236,7 +243,7 @@ class PreparedScene {
   std::vector<ShapeRecord> shapes_;
   std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;
-  bool has_dielectric_ = false;
+  bool has_medium_ = false;
   double least_index_ = 1;
 };
 

@@ -68,8 +68,8 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
   for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
     if (!moving.triangle[t]) continue;
     const Triangle& triangle = scene.triangles[t];
-    const Material& material = scene.materials[scene.shapes[triangle.shape].material];
-    if (material.two_sided || material.type == MaterialType::rough_dielectric) return false;
+    const Bsdf& bsdf = scene.materials[scene.shapes[triangle.shape].material].bsdf();
+    if (bsdf.two_sided() || bsdf.transparent()) return false;
     if (any_vertex < 0) any_vertex = triangle.vertex[0];
     if (bodies.root(triangle.vertex[0]) != bodies.root(any_vertex)) return false;
   }

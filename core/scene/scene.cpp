@@ -34,6 +34,12 @@ int Scene::find_material(const std::string& name) const {
   return find_name(materials, name);
 }
 
+DofLayout::DofLayout(const Scene& scene)
+    : vertices(static_cast<int>(scene.positions.size())), shapes(static_cast<int>(scene.shapes.size())) {
+  first_number.push_back(3 * vertices);
+  for (const Material& material : scene.materials) first_number.push_back(first_number.back() + material.numbers());
+}
+
 std::vector<double> TangentBasis::transpose_apply(const std::vector<double>& dof_gradient) const {
   std::vector<double> gradient(columns, 0.0);
   for (std::size_t row = 0; row < dof_gradient.size(); ++row) {

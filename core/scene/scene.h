@@ -61,20 +61,18 @@ inline constexpr double kLargestCoordinate = 1e12;
 bool coordinates_fit(const Vec3& p);
 bool coordinates_fit(const Scene& scene);
 
-/// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then five
-/// per material (albedo r g b, roughness, ior), then three per shape (emission r g b).
+/// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then those of
+/// each material (Bsdf::quantities), then three per shape (emission r g b).
 struct DofLayout {
-  int vertices = 0, materials = 0, shapes = 0;
-  explicit DofLayout(const Scene& scene)
-      : vertices(static_cast<int>(scene.positions.size())),
-        materials(static_cast<int>(scene.materials.size())),
-        shapes(static_cast<int>(scene.shapes.size())) {}
+  int vertices = 0, shapes = 0;
+  std::vector<int> first_number;  ///< of each material, and where emissions begin
+  explicit DofLayout(const Scene& scene);
+  int materials() const { return static_cast<int>(first_number.size()) - 1; }
   int vertex(int v, int axis) const { return 3 * v + axis; }
-  int albedo(int m, int channel) const { return 3 * vertices + 5 * m + channel; }
-  int roughness(int m) const { return 3 * vertices + 5 * m + 3; }
-  int ior(int m) const { return 3 * vertices + 5 * m + 4; }
-  int emission(int s, int channel) const { return 3 * vertices + 5 * materials + 3 * s + channel; }
-  int size() const { return 3 * vertices + 5 * materials + 3 * shapes; }
+  int number(int m, int k) const { return first_number[m] + k; }
+  int numbers(int m) const { return first_number[m + 1] - first_number[m]; }
+  int emission(int s, int channel) const { return first_number.back() + 3 * s + channel; }
+  int size() const { return first_number.back() + 3 * shapes; }
 };
 
 /// Sparse matrix d(dof)/d(column) in compressed rows: how fast each degree of freedom moves per unit of each column.

@@ -13,12 +13,6 @@
 
 namespace isochron {
 
-template <>
-inline constexpr auto kChoices<MaterialType> = std::to_array<Choice<MaterialType>>(
-    {{MaterialType::diffuse, "diffuse", ""},
-     {MaterialType::rough_conductor, "rough_conductor", "GGX, alpha = `roughness`"},
-     {MaterialType::rough_dielectric, "rough_dielectric", "a solid behind a closed mesh; GGX"}});
-
 namespace {
 
 constexpr int kLargestResolution = 32768;  // so that the number of pixels fits an int
@@ -64,26 +58,15 @@ void describe(Keys& keys, Camera& camera) {
 }
 
 void describe(Keys& keys, Material& material, bool& grey) {
-  using enum MaterialType;
-  const auto of = [&](std::initializer_list<MaterialType> types) { return only(material.type, types); };
-  const NumberRange fraction = NumberRange::closed(0, 1);
-  const auto check_ior = [&](const YamlValue& value) {
-    if (material.ior == 1) value.fail("1 is no boundary", "a number above 0 other than 1");
+  std::vector<Keys::Kind> kinds;
+  for (const MaterialKind* kind : material_kinds()) kinds.push_back({kind->name, kind->meaning});
+  const auto choose = [&](const std::string& kind) { material = Material(kind, material.name); };
+  const auto describe_kind = [&](Keys& inner, const std::string& kind) {
+    if (kind == material.kind()) return material.bsdf().describe(inner, grey);
+    bool ignored = true;
+    Material(kind).bsdf().describe(inner, ignored);
   };
-  keys.value("type", field::choice(material.type), "how it scatters light", {.required = true});
-  keys.value("albedo", field::color(material.albedo, fraction, grey), "share of the light that is reflected",
-             {.required = true, .only = of({diffuse})});
-  keys.value("reflectance", field::color(material.albedo, fraction, grey), "of each of its facets, at any angle",
-             {.required = true, .only = of({rough_conductor})});
-  keys.value("roughness", field::number(material.roughness, {.low = 0, .high = 1, .low_open = true}), "alpha of GGX",
-             {.required = true, .only = of({rough_conductor, rough_dielectric})});
-  keys.value("ior", field::checked(field::positive(material.ior), check_ior), "index of refraction, other than 1",
-             {.required = true, .only = of({rough_dielectric})});
-  keys.value("two_sided", field::boolean(material.two_sided), "whether the back reflects, too",
-             {.only = of({diffuse, rough_conductor})});
-  keys.check([&](const YamlValue&) {
-    if (material.type == rough_dielectric) material.albedo = Rgb(1);
-  });
+  keys.kinds("type", kinds, material.kind(), choose, describe_kind, "how it scatters light");
 }
 
 /// Scale, then rotation, then translation.
@@ -135,7 +118,7 @@ void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
     const auto complain = [&](const char* what) {
       const Vec3 &a = mesh.positions[edge.vertex[0]], &b = mesh.positions[edge.vertex[1]];
       throw InputError(
-          fmt::format("a rough_dielectric needs a closed surface; {} ({:.6g}, {:.6g}, {:.6g}) to "
+          fmt::format("a transparent material needs a closed surface; {} ({:.6g}, {:.6g}, {:.6g}) to "
                       "({:.6g}, {:.6g}, {:.6g})",
                       what, a.x, a.y, a.z, b.x, b.y, b.z));
     };
@@ -180,12 +163,13 @@ Mesh read_shape_mesh(const ShapeKeys& keys, bool solid, std::vector<Edge>& edges
 /// The shape with its mesh becomes part of the scene.
 void add_shape(const ShapeKeys& keys, Scene& scene) {
   Shape shape = keys.shape;
-  const bool dielectric = scene.materials[shape.material].type == MaterialType::rough_dielectric;
-  if (dielectric && !shape.emission.is_black())
-    keys.places.at("emission").fail("a shape of rough_dielectric emits nothing", "leave it out");
+  const bool transparent = scene.materials[shape.material].bsdf().transparent();
+  if (transparent && !shape.emission.is_black())
+    keys.places.at("emission")
+        .fail(fmt::format("a shape of {} emits nothing", scene.materials[shape.material].kind()), "leave it out");
   const YamlValue& file = keys.places.at("file");
   std::vector<Edge> edges;
-  const Mesh mesh = read_shape_mesh(keys, dielectric, edges);
+  const Mesh mesh = read_shape_mesh(keys, transparent, edges);
   constexpr std::size_t kMost = std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
   if (scene.positions.size() + mesh.positions.size() > kMost || scene.triangles.size() + mesh.faces.size() > kMost)
     file.fail("the scene has too many vertices or triangles", fmt::format("at most {} of each", kMost));
@@ -241,9 +225,7 @@ void describe(Keys& keys, Scene& scene) {
   keys.map("camera", [&](Keys& inner) { describe(inner, scene.camera); }, "where the images are taken",
            {.required = true});
   const auto material = [&](Keys& inner, const std::string& name) {
-    Material& added = scene.materials.emplace_back();
-    added.name = name;
-    describe(inner, added, scene.grey);
+    describe(inner, scene.materials.emplace_back(material_kinds()[0]->name, name), scene.grey);
   };
   keys.named("materials", {}, material, "what shapes are made of", {.required = true});
   if (places.contains("materials") && scene.materials.empty())

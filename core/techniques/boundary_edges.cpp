@@ -27,9 +27,8 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
   if (edge.faces() == 2 && !edge.is_mesh_intersection()) {
     bool seen[2], dark = true;
     for (int i = 0; i < 2; ++i) {
-      const Material& material = scene.material_of(edge.face[i]);
       seen[i] = dot(scene.normal(edge.face[i]), a) <= kCoplanarAngle * length(a);
-      dark &= !seen[i] && !material.two_sided && !scene.is_dielectric(edge.face[i]);
+      dark &= !seen[i] && !scene.two_sided(edge.face[i]) && !scene.transparent(edge.face[i]);
     }
     if (dark) return 0;
     within_outline = seen[0] == seen[1];

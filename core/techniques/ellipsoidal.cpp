@@ -79,7 +79,7 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   ArcPair chosen;
   const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
     const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
-    const bool two_sided = scene_.material_of(t).two_sided;
+    const bool two_sided = scene_.two_sided(t);
     if (!((side_x > 0 && side_y > 0) || (two_sided && side_x < 0 && side_y < 0))) return;
     for (int i = 0; i < 2; ++i)
       if (target.present[i] && ellipsoids[i].valid())
@@ -119,7 +119,7 @@ EllipsoidBvh::Focus EllipsoidalConnections::focus() const {
     return {x.p, scene_.camera.forward, cosine, std::sqrt(1 - cosine * cosine), false};
   }
   const Vec3& before = path.vertex[path.size() - 2].p;
-  const bool back = scene_.material_of(x.triangle).two_sided && dot(x.n, before - x.p) < 0;
+  const bool back = scene_.two_sided(x.triangle) && dot(x.n, before - x.p) < 0;
   return {x.p, back ? -x.n : x.n, 0, 1, true};
 }
 
@@ -193,10 +193,8 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t
   const Scattering s(x.p, q, y.p);
   const double cos_y = -dot(y.n, s.w_i);
   if (!(cos_y > 0)) return;
-  const Material& material = scene_.material_of(t);
-  double carried = s.lobe(material) * std::abs(s.cos_i * s.cos_o) * cos_y /
-                   (s.distance_i * s.distance_i * s.distance_o * s.distance_o);
-  Rgb albedo = material.albedo;
+  double carried = std::abs(s.cos_i * s.cos_o) * cos_y / (s.distance_i * s.distance_i * s.distance_o * s.distance_o);
+  Rgb f = scene_.bsdf_of(t).value(s);
   out.pixel = pixel;
   if (path.size() == 1) {
     out.pixel = scene_.camera.project(q.p);
@@ -204,14 +202,13 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t
     carried *= scene_.camera.image_area_per_solid_angle(-s.w_o);
   } else {
     const Scattering at_x(path.vertex[path.size() - 2].p, x, q.p);
-    const Material& material_x = scene_.material_of(x.triangle);
-    carried *= at_x.lobe(material_x) * std::abs(at_x.cos_i);
-    albedo *= material_x.albedo;
+    carried *= std::abs(at_x.cos_i);
+    f *= scene_.bsdf_of(x.triangle).value(at_x);
   }
-  if (!(carried > 0)) return;
+  if (!(carried > 0) || f.is_black()) return;
   const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n);
   out.pdf = 1 / area;
-  out.value = factor * albedo * (carried * area);
+  out.value = factor * f * (carried * area);
   out.point = q;
 }
 
@@ -228,7 +225,7 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, d
   const double cos_y = -dot(y.n, w);
   if (!(cos_y > 0)) return;
   double carried = cos_y / (distance * distance);
-  Rgb albedo(1.0);
+  Rgb f(1.0);
   out.pixel = pixel;
   if (path.size() == 1) {
     out.pixel = scene_.camera.project(y.p);
@@ -236,15 +233,14 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, d
     carried *= scene_.camera.image_area_per_solid_angle(w);
   } else {
     const Scattering at_x(path.vertex[path.size() - 2].p, x, y.p);
-    const Material& material = scene_.material_of(x.triangle);
-    carried *= at_x.lobe(material) * std::abs(at_x.cos_i);
-    albedo = material.albedo;
+    carried *= std::abs(at_x.cos_i);
+    f = scene_.bsdf_of(x.triangle).value(at_x);
   }
-  if (!(carried > 0)) return;
+  if (!(carried > 0) || f.is_black()) return;
   // About the foot of x in the plane, dA = r dr dphi with r the distance.
   const double area = arcs.total_span * distance;
   out.pdf = 1 / area;
-  out.value = throughput * albedo * scene_.shape_of(t).emission * (carried * area);
+  out.value = throughput * f * scene_.shape_of(t).emission * (carried * area);
   out.point = y;
 }
 

@@ -111,8 +111,7 @@ void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
 }
 
 bool SecondaryBoundary::faces(int triangle, const Vec3& w) const {
-  return dot(scene_.normal(triangle), w) > 0 || scene_.material_of(triangle).two_sided ||
-         scene_.is_dielectric(triangle);
+  return dot(scene_.normal(triangle), w) > 0 || scene_.two_sided(triangle) || scene_.transparent(triangle);
 }
 
 Vec3 SecondaryBoundary::direction_in_wedge(const BoundaryEdges::Sample& y, double u0, double u1) {
@@ -182,12 +181,12 @@ double SecondaryBoundary::camera_over_edge(const Segment& g, std::span<const Sur
   ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) * solid_angle_to_area(x[0].p, x[1]) /
            scene_.camera.pixels();
   for (int j = 1; j < k; ++j)
-    ratio *= Scattering(x[j - 1].p, x[j], x[j + 1].p).pdf_towards_light(scene_.material_of(x[j].triangle)) *
+    ratio *= scene_.bsdf_of(x[j].triangle).pdf(Scattering(x[j - 1].p, x[j], x[j + 1].p)) *
              solid_angle_to_area(x[j].p, x[j + 1]);
   double from_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, x[k]);
   for (int j = k; j > 1; --j) {
     const Vec3& after = j == k ? g.y.y : x[j + 1].p;
-    from_edge *= Scattering(x[j - 1].p, x[j], after).pdf_towards_camera(scene_.material_of(x[j].triangle)) *
+    from_edge *= scene_.bsdf_of(x[j].triangle).pdf(Scattering(x[j - 1].p, x[j], after).reversed()) *
                  solid_angle_to_area(x[j].p, x[j - 1]);
   }
   // Within round-off of the next vertex a path may seem impossible both ways.
@@ -204,21 +203,19 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
   double walked = 0;
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
     const SurfacePoint x = walk_.back();
-    const Material& material = scene_.material_of(x.triangle);
     const Vec3 to_camera = camera.position - x.p;
     const double distance = length(to_camera);
     if (const int pixel = camera.project(x.p); pixel >= 0) {
       const Vec3 w_o = to_camera / distance;
-      const double scattered = lobe(material, dot(x.n, from), dot(x.n, w_o), dot(from, w_o));
+      const Rgb f = scene_.bsdf_of(x.triangle).value({x.n, from, w_o, dot(x.n, from), dot(x.n, w_o), dot(from, w_o)});
       // Zero for a face seen edge-on, which has no flow along the pixel's ray either.
       const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
-      if (scattered > 0 && importance > 0 && worker_.visible_from_camera(x)) {
+      if (!f.is_black() && importance > 0 && worker_.visible_from_camera(x)) {
         camera_side_.assign(1, eye);
         camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
-        connections_.push_back({pixel, bounce, throughput * material.albedo * (scattered * importance * scale),
-                                walked + distance * scene_.index_between(x, eye),
-                                camera_over_edge(g, camera_side_, bounce, pixel),
-                                bounce > 1 ? walk_[1] : SurfacePoint{}});
+        connections_.push_back(
+            {pixel, bounce, throughput * f * (importance * scale), walked + distance * scene_.index_between(x, eye),
+             camera_over_edge(g, camera_side_, bounce, pixel), bounce > 1 ? walk_[1] : SurfacePoint{}});
       }
     }
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
@@ -299,18 +296,16 @@ bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throu
   g.w = d / g.r_d;
   const int k = path.size() - 1;
   const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
-  const Material& material = scene_.material_of(g.camera_end.triangle);
-  const double scattered = s.lobe(material);
-  if (!(scattered > 0) || !g.orient()) return false;
+  const Rgb f = scene_.bsdf_of(g.camera_end.triangle).value(s);
+  if (f.is_black() || !g.orient()) return false;
   if (!(g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
   if (!find_light_end(g)) return false;
   if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return false;
   ++worker_.rays;
   if (scene_.caster.occluded(scene_.offset_ray_origin(g.camera_end, g.w), g.offset_ray_origin(scene_.caster.offset())))
     return false;
-  const double factor =
-      g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x())) * scattered;
-  connections_.assign(1, {pixel, k, throughput * material.albedo * factor, path.length.back(),
+  const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x()));
+  connections_.assign(1, {pixel, k, throughput * f * factor, path.length.back(),
                           camera_over_edge(g, path.vertex, k, pixel), k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
   return true;
 }

@@ -51,21 +51,21 @@ class StandardWalk {
     const PreparedScene& scene = worker_.scene;
     const SurfacePoint& x = path_.back();
     if (path_.length.back() + scene.distance_to_emitters(x.p) > reach_.upper) return false;
-    const Material& material = scene.material_of(x.triangle);
-
     const double u1 = rng.uniform(), u2 = rng.uniform();
     const SurfacePoint y = scene.point_on_emitter(light_, u1, u2);
     const Scattering s(x, w_o_, distance_o_, y.p);
-    const double scattered = s.lobe(material) * std::abs(s.cos_i);
     const double cos_y = -dot(y.n, s.w_i);
-    if (scattered > 0 && cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {
-      const double to_area = cos_y / (s.distance_i * s.distance_i);
-      const double pdf_bsdf = s.pdf_towards_light(material) * to_area;
-      path_.push(scene, y, s.distance_i);
-      if (visitor_.wants() && worker_.visible(x, y))
-        visitor_.take(throughput_ * material.albedo * scene.shape_of(y.triangle).emission *
-                      (scattered * to_area / (scene.emitter_pdf(light_) + pdf_bsdf)));
-      path_.pop();
+    if (cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {
+      const Bsdf& bsdf = scene.bsdf_of(x.triangle);
+      if (const Rgb f = bsdf.value(s); !f.is_black()) {
+        const double to_area = cos_y / (s.distance_i * s.distance_i);
+        const double pdf_bsdf = bsdf.pdf(s) * to_area;
+        path_.push(scene, y, s.distance_i);
+        if (visitor_.wants() && worker_.visible(x, y))
+          visitor_.take(throughput_ * f * scene.shape_of(y.triangle).emission *
+                        (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_bsdf)));
+        path_.pop();
+      }
     }
 
     const auto next = sample_bsdf(scene, x, w_o_, throughput_, rng);

@@ -88,7 +88,7 @@ class Techniques {
     if (from == 0)
       return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
     const Scattering s(path.vertex[from - 1].p, x, q.p);
-    return s.pdf_towards_light(scene_.material_of(x.triangle)) * to_area;
+    return scene_.bsdf_of(x.triangle).pdf(s) * to_area;
   }
 
   /// Density of y on its emitter triangle's arc as seen from q, per area and length.

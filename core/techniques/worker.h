@@ -97,12 +97,12 @@ struct BsdfSample {
 /// the BSDF's weight. Empty where the path ends.
 inline std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back,
                                              Rgb& throughput, Rng& rng, TransportMode mode = TransportMode::radiance) {
-  const Material& material = scene.material_of(x.triangle);
+  const Bsdf& bsdf = scene.bsdf_of(x.triangle);
   const double u0 = rng.uniform(), u1 = rng.uniform();
-  const double u2 = material.type == MaterialType::rough_dielectric ? rng.uniform() : 0;
-  const auto next = sample_direction(material, x.n, w_back, u0, u1, u2, mode);
+  const double u2 = bsdf.dimensions() == 3 ? rng.uniform() : 0;
+  const auto next = bsdf.sample(x.n, w_back, u0, u1, u2, mode);
   if (!next) return std::nullopt;
-  throughput *= material.albedo * next->weight;
+  throughput *= next->weight;
   if (throughput.is_black()) return std::nullopt;
   return BsdfSample{next->direction, next->pdf};
 }

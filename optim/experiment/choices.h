@@ -22,9 +22,6 @@ inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterTy
     {{ParameterType::translation, "translation", "along `direction`, scene units"},
      {ParameterType::rotation, "rotation", "about `axis`, degrees"},
      {ParameterType::vertices, "vertices", "each on its own, along `direction`, scene units"},
-     {ParameterType::albedo, "albedo", "of a material; of a conductor its reflectance"},
-     {ParameterType::roughness, "roughness", "of a material"},
-     {ParameterType::ior, "ior", "of a rough_dielectric"},
      {ParameterType::emission, "emission", "radiance of a shape that emits"}});
 
 template <>

@@ -71,6 +71,26 @@ Field pivot(ParameterSpec& spec) {
           "shape, where it is in the scene file"};
 }
 
+/// The quantities of materials are types of their own.
+Field type(ParameterSpec& spec) {
+  std::vector<std::pair<std::string, std::string>> names;
+  for (const Choice<ParameterType>& each : kChoices<ParameterType>) names.emplace_back(each.name, each.meaning);
+  const std::size_t fixed = names.size();
+  for (const auto& [quantity, kinds] : material_quantities()) names.emplace_back(quantity, "of " + enumeration(kinds));
+  const auto choose = [&spec, names, fixed](int i) {
+    const bool of_material = static_cast<std::size_t>(i) >= fixed;
+    spec.type = of_material ? ParameterType::material : kChoices<ParameterType>[i].value;
+    spec.quantity = of_material ? names[i].first : "";
+  };
+  return field::choice(names, choose, [&spec] { return type_name(spec); });
+}
+
+Only of_materials(const ParameterSpec& spec) {
+  std::vector<std::string> names;
+  for (const auto& [quantity, kinds] : material_quantities()) names.push_back(quantity);
+  return {spec.type == ParameterType::material, enumeration(names), type_name(spec)};
+}
+
 void check_name(const YamlValue& value) {
   for (const char* reserved : {"render", "target", "initial", "final"})
     if (value.text() == reserved) value.fail(fmt::format("'{}' is the name of another output", reserved));
@@ -78,17 +98,29 @@ void check_name(const YamlValue& value) {
 
 }  // namespace
 
+std::string type_name(const ParameterSpec& spec) {
+  return spec.type == ParameterType::material ? spec.quantity : name_of(spec.type);
+}
+
 void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool target_required) {
   using enum ParameterType;
-  const auto of = [&](std::initializer_list<ParameterType> types) { return only(spec.type, types); };
+  const auto of = [&](std::initializer_list<ParameterType> types) {
+    Only result{false, "", type_name(spec)};
+    std::vector<std::string> names;
+    for (const ParameterType type : types) {
+      names.push_back(name_of(type));
+      result.here |= type == spec.type;
+    }
+    result.to = enumeration(names);
+    return result;
+  };
   const char* const own = "the parameter's";
   keys.remember(spec.where);
   keys.value("name", field::checked(file_name(spec.name), check_name), "names columns and files", {.required = true});
-  keys.value("type", field::choice(spec.type), "what changes, in which unit", {.required = true});
+  keys.value("type", type(spec), "what changes, in which unit", {.required = true});
   keys.value("shape", field::text(spec.shape), "whose vertices or emission changes",
              {.required = true, .only = of({translation, rotation, vertices, emission})});
-  keys.value("material", field::text(spec.material), "which changes",
-             {.required = true, .only = of({albedo, roughness, ior})});
+  keys.value("material", field::text(spec.material), "which changes", {.required = true, .only = of_materials(spec)});
   keys.value("selection", selection(spec.selection), "the vertices that move: by number, or inside a box of the world",
              {.only = of({translation, rotation, vertices}),
               .unset = spec.selection.kind == Selection::Kind::all,
@@ -118,7 +150,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
       "target", folder.values(spec.target), "where the target is rendered, or known to be",
       {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
   keys.value("lower", folder.values(spec.lower),
-             "bound. Besides, albedo and roughness stay below 1 and above 0, ior on its side of 1, emission above 0",
+             "bound. Besides, ior stays on its side of 1, emission above 0, what else materials have between 0 and 1",
              {.unit = own, .unset = spec.lower.empty()});
   keys.value("upper", folder.values(spec.upper), "bound. An ior above 1 has none of its own: give one",
              {.unit = own, .unset = spec.upper.empty()});

@@ -45,15 +45,11 @@ GateSet make_gates(const GateSpec& spec);
 /// pixel's value is).
 ExrNotes exr_notes(const GateSpec& spec);
 
-enum class ParameterType { translation, rotation, vertices, albedo, roughness, ior, emission };
+enum class ParameterType { translation, rotation, vertices, material, emission };
 enum class VertexDirection { fixed, normal, free };
 /// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
 /// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
 enum class PivotKind { fixed, center, follow };
-/// Whether it is a material's, else a shape's.
-inline bool is_of_material(ParameterType type) {
-  return type == ParameterType::albedo || type == ParameterType::roughness || type == ParameterType::ior;
-}
 
 /// Which vertices of a shape a parameter moves: all, a list of indices, or those inside a box.
 struct Selection {
@@ -63,12 +59,13 @@ struct Selection {
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
-/// file; those of albedo, roughness, ior and emission replace what the scene file says.
+/// file; those of materials and emission replace what the scene file says.
 struct ParameterSpec {
   std::string name;
   ParameterType type = ParameterType::translation;
   std::string shape;     ///< translation, rotation, vertices, emission
-  std::string material;  ///< albedo, roughness, ior
+  std::string material;  ///< material
+  std::string quantity;  ///< material: which of its quantities, as `type` in the file
   Selection selection;
   VertexDirection direction_kind = VertexDirection::fixed;
   Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
@@ -89,6 +86,9 @@ struct ParameterSpec {
   /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
   [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
 };
+
+/// Its type as files name it.
+std::string type_name(const ParameterSpec& spec);
 
 struct TargetSpec {
   std::string images;  ///< absolute path of an EXR; empty: render at the target values

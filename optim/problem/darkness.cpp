@@ -73,7 +73,7 @@ std::optional<std::pair<double, double>> path_length_range(const Problem& proble
     }
   double index = 1;
   for (const Material& material : scene.materials)
-    if (material.type == MaterialType::rough_dielectric) index = std::max(index, material.ior);
+    if (material.bsdf().transparent()) index = std::max(index, material.number(material.bsdf().index_number()));
   const auto coarse = narrowed(problem, scene, 0, (kMostBounces + 2) * index * length(high - low));
   return coarse ? narrowed(problem, scene, coarse->first, coarse->second) : coarse;
 }

@@ -15,7 +15,7 @@ namespace isochron {
 namespace {
 
 constexpr double kRadian = 180 / kPi;
-constexpr double kLeastAlbedo = 1e-4, kLeastRoughness = 1e-3, kLeastContrast = 1e-3, kLeastRelativeEmission = 1e-6;
+constexpr double kLeastRelativeEmission = 1e-6;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -75,15 +75,6 @@ double default_scale(const ParameterSpec& spec) {
   return 1;
 }
 
-void check_material(const ParameterSpec& spec, MaterialType type) {
-  const auto reject = [&](const char* is, const char* has) {
-    spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material, is, has));
-  };
-  if (spec.type == ParameterType::roughness && type == MaterialType::diffuse) reject("diffuse", "roughness");
-  if (spec.type == ParameterType::ior && type != MaterialType::rough_dielectric) reject("no dielectric", "ior");
-  if (spec.type == ParameterType::albedo && type == MaterialType::rough_dielectric) reject("a dielectric", "albedo");
-}
-
 }  // namespace
 
 Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs)
@@ -91,12 +82,18 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
   for (const ParameterSpec& spec : specs) {
     int count = 1;
     int shape = -1, material = -1;
-    if (is_of_material(spec.type)) {
+    const bool of_material = spec.type == ParameterType::material;
+    Quantity quantity{};
+    int first_number = -1;
+    if (of_material) {
       material = scene.find_material(spec.material);
       if (material < 0)
         spec.fail("material", fmt::format("there is no material '{}' in the scene", spec.material),
                   "allowed: " + names_of(scene.materials));
-      check_material(spec, scene.materials[material].type);
+      first_number = scene.materials[material].find(spec.quantity, &quantity);
+      if (first_number < 0)
+        spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material,
+                                          scene.materials[material].kind(), spec.quantity));
     } else {
       shape = scene.find_shape(spec.shape);
       if (shape < 0)
@@ -111,14 +108,16 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
       bind_motion(spec, motion, shape, count);
       motions_[shape].push_back(std::move(motion));
     } else {
-      if ((spec.type == ParameterType::albedo || spec.type == ParameterType::emission) && !scene.grey) count = 3;
-      const int index = spec.type == ParameterType::emission ? shape : material;
-      for (const MaterialValue& other : material_values_)
-        if (other.type == spec.type && other.index == index)
-          spec.fail("type", fmt::format("another parameter sets the same {} already", name_of(spec.type)));
-      material_values_.push_back({spec.type, index, first, count});
+      const int numbers = of_material ? static_cast<int>(quantity.values.size()) : 3;
+      if (numbers == 3 && !scene.grey) count = 3;
+      const DofLayout layout(scene);
+      const int dof = of_material ? layout.number(material, first_number) : layout.emission(shape, 0);
+      for (const Value& other : values_)
+        if (other.dof == dof)
+          spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
+      values_.push_back({material, of_material ? first_number : shape, dof, numbers, first, count});
     }
-    bind_values(spec, count);
+    bind_values(spec, count, quantity);
     blocks_.push_back({spec.name, first, count, spec.scale > 0 ? spec.scale : default_scale(spec)});
     for (int i = 0; i < count; ++i)
       component_names_.push_back(count == 1 ? spec.name : fmt::format("{}[{}]", spec.name, i));
@@ -147,7 +146,7 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
   }
 }
 
-void Parameters::bind_values(const ParameterSpec& spec, int count) {
+void Parameters::bind_values(const ParameterSpec& spec, int count, const Quantity& quantity) {
   const auto expand = [&](const std::vector<double>& values, const char* key, double missing, auto& into) {
     if (values.size() > 1 && static_cast<int>(values.size()) != count)
       spec.fail(key, fmt::format("{} values are given", values.size()),
@@ -156,16 +155,13 @@ void Parameters::bind_values(const ParameterSpec& spec, int count) {
       into.push_back(values.empty() ? missing : values.size() == 1 ? values[0] : values[i]);
   };
   double lowest = -kInfinity, highest = kInfinity;
-  if (spec.type == ParameterType::albedo) lowest = kLeastAlbedo, highest = 1;
-  if (spec.type == ParameterType::roughness) lowest = kLeastRoughness, highest = 1;
-  if (spec.type == ParameterType::ior) {
-    if (std::any_of(spec.initial.begin(), spec.initial.end(), [](double value) { return value > 1; }))
-      lowest = 1 + kLeastContrast;
-    else
-      lowest = kLeastContrast, highest = 1 - kLeastContrast;
+  const double largest = spec.initial.empty() ? 0 : *std::max_element(spec.initial.begin(), spec.initial.end());
+  if (spec.type == ParameterType::material) {
+    const Quantity::Range range = quantity.range(largest);
+    lowest = range.lowest;
+    highest = range.highest;
   }
   if (spec.type == ParameterType::emission) {
-    const double largest = *std::max_element(spec.initial.begin(), spec.initial.end());
     if (!(largest > 0)) spec.fail("initial", "is no emission", "a number above 0");
     lowest = kLeastRelativeEmission * largest;
   }
@@ -248,14 +244,14 @@ Scene Parameters::apply(const std::vector<double>& theta) const {
     for (int v = 0; v < shape.vertex_count; ++v)
       scene.positions[shape.first_vertex + v] = move(static_cast<int>(s), v, centers, theta, nullptr);
   }
-  for (const MaterialValue& value : material_values_) {
-    const double* t = theta.data() + value.first_component;
-    const Rgb colour = value.count == 1 ? Rgb(t[0]) : Rgb(t[0], t[1], t[2]);
-    if (value.type == ParameterType::albedo) scene.materials[value.index].albedo = colour;
-    if (value.type == ParameterType::roughness) scene.materials[value.index].roughness = t[0];
-    if (value.type == ParameterType::ior) scene.materials[value.index].ior = t[0];
-    if (value.type == ParameterType::emission) scene.shapes[value.index].emission = colour;
-  }
+  for (const Value& value : values_)
+    for (int i = 0; i < value.numbers; ++i) {
+      const double t = theta[value.first_component + (value.count == 1 ? 0 : i)];
+      if (value.material >= 0)
+        scene.materials[value.material].set_number(value.index + i, t);
+      else
+        scene.shapes[value.index].emission[i] = t;
+    }
   return scene;
 }
 
@@ -285,16 +281,9 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
     }
   }
   std::vector<int> column_of(layout.size() - 3 * layout.vertices, -1);
-  const auto set = [&](int dof, int column) { column_of[dof - 3 * layout.vertices] = column; };
-  for (const MaterialValue& value : material_values_) {
-    for (int channel = 0; channel < 3; ++channel) {
-      const int column = value.first_component + (value.count == 3 ? channel : 0);
-      if (value.type == ParameterType::albedo) set(layout.albedo(value.index, channel), column);
-      if (value.type == ParameterType::emission) set(layout.emission(value.index, channel), column);
-    }
-    if (value.type == ParameterType::roughness) set(layout.roughness(value.index), value.first_component);
-    if (value.type == ParameterType::ior) set(layout.ior(value.index), value.first_component);
-  }
+  for (const Value& value : values_)
+    for (int i = 0; i < value.numbers; ++i)
+      column_of[value.dof + i - 3 * layout.vertices] = value.first_component + (value.count == 1 ? 0 : i);
   for (std::size_t i = 0; i < column_of.size(); ++i) {
     if (column_of[i] >= 0) basis.entries.push_back({column_of[i], 1.0});
     end_row(3 * layout.vertices + static_cast<int>(i));

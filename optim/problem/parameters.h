@@ -8,12 +8,11 @@
 //
 // Scales: what counts as one unit of each parameter where parameters of different units are compared, as optimisers
 // and param_rmse do. Values, bounds, gradients, checkpoints and logs are in units of the parameter. Default: 1 for
-// translations and vertices (units of the parameter, usually scene units), albedo, roughness and ior; 180 / pi degrees for
+// translations and vertices (units of the parameter, usually scene units) and what materials have; 180 / pi degrees for
 // rotations, which move what is one scene unit from the axis by one scene unit; the largest initial component of an
 // emission.
 //
-// Physical bounds, always applied besides the user's: albedo in [1e-4, 1], roughness in [1e-3, 1], ior at
-// least 1e-3 from 1 on the side of its initial value, emission
+// Physical bounds, always applied besides the user's: of materials as their quantities say (core/scene/materials), emission
 // at least 1e-6 of its largest initial component (so that an emitter stays one).
 #pragma once
 #include <string>
@@ -93,9 +92,11 @@ class Parameters {
     std::vector<int> slot;
     std::vector<int> carriers;  ///< of a rotation's pivot: places in the shape's list of motions, rising
   };
-  struct MaterialValue {
-    ParameterType type;
-    int index;  ///< material, or shape for emission
+  /// A parameter that is a value: a quantity of a material, or the emission of a shape.
+  struct Value {
+    int material;      ///< -1: emission
+    int index;         ///< the quantity's first number in its material, or the shape
+    int dof, numbers;  ///< degrees of freedom that it sets
     int first_component, count;
   };
   struct Moved {
@@ -112,7 +113,8 @@ class Parameters {
   void bind_motion(const ParameterSpec& spec, Motion& motion, int shape, int& count);
   /// Sets the pivot in the scene as loaded, and what carries it.
   void bind_pivot(const ParameterSpec& spec, Motion& motion, int shape) const;
-  void bind_values(const ParameterSpec& spec, int count);
+  /// `quantity`: of a parameter of a material.
+  void bind_values(const ParameterSpec& spec, int count, const Quantity& quantity);
   /// Turns `p` and what `tangent`, if given, holds about the pivot.
   static void turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,
                    std::vector<Moved>* tangent);
@@ -124,7 +126,7 @@ class Parameters {
 
   const Scene& scene_;
   std::vector<std::vector<Motion>> motions_;  ///< per shape, in the listed order
-  std::vector<MaterialValue> material_values_;
+  std::vector<Value> values_;
   std::vector<Block> blocks_;
   std::vector<std::string> component_names_;
   std::vector<double> initial_, target_, lower_, upper_;

@@ -7,23 +7,16 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/scene/materials/material.h"
 #include "tests/materials/chi_square.h"
+#include "tests/materials/cosines.h"
 #include "tests/materials/walter.h"
 
 namespace isochron {
 namespace {
 
 using namespace textbook;
-
-Material glass(double alpha, double ior) {
-  Material m;
-  m.type = MaterialType::rough_dielectric;
-  m.albedo = Rgb(1);
-  m.roughness = alpha;
-  m.ior = ior;
-  return m;
-}
+using testing::CosineDerivative;
+using testing::derivative, testing::glass, testing::pdf, testing::value;
 
 struct Cosines {
   double i, o, io;
@@ -49,8 +42,8 @@ void expect_matches_walter(const Cosines& c, double alpha, double ior, int& comp
   using Jet = ceres::Jet<long double, 5>;
   const Jet expected = walter(Jet(c.i, 0), Jet(c.o, 1), Jet(c.io, 2), Jet(alpha, 3), Jet(ior, 4));
   const Material m = glass(alpha, ior);
-  const LobeDerivative got = lobe_derivative(m, c.i, c.o, c.io);
-  EXPECT_EQ(got.value, lobe(m, c.i, c.o, c.io));
+  const CosineDerivative got = derivative(m, c.i, c.o, c.io);
+  EXPECT_EQ(got.value, value(m, c.i, c.o, c.io));
   EXPECT_EQ(got.value > 0, expected.a > 0) << c.i << ' ' << c.o << ' ' << c.io << ' ' << alpha << ' ' << ior;
   if (!(got.value > 0) || !(expected.a > 0)) return;
   ++compared;
@@ -60,7 +53,7 @@ void expect_matches_walter(const Cosines& c, double alpha, double ior, int& comp
   double slope = 1;
   for (int k = 0; k < 3; ++k) slope += std::abs(static_cast<double>(logarithm.v[k]));
   EXPECT_NEAR(got.value / static_cast<double>(expected.a), 1, 64 * kEpsilon * slope) << c.i << ' ' << c.o;
-  const double d[5] = {got.d_cos_i, got.d_cos_o, got.d_cos_io, got.d_roughness, got.d_ior};
+  const double d[5] = {got.by_cos_i, got.by_cos_o, got.by_cos_io, got.by_roughness, got.by_ior};
   double scale = 0;
   for (int k = 0; k < 5; ++k) scale = std::max(scale, std::abs(static_cast<double>(logarithm.v[k])));
   for (int k = 0; k < 5; ++k)
@@ -115,8 +108,8 @@ TEST(DielectricLobe, ReciprocalUpToTheSquaredIndex) {
     const Vec3 i = direction(kPi * rng.uniform(), kTwoPi * rng.uniform()), o = direction(kPi * rng.uniform(), 0);
     const Material m = glass(0.3, ior);
     const double n_i = i.z > 0 ? 1 : ior, n_o = o.z > 0 ? 1 : ior;
-    const double there = lobe(m, i.z, o.z, dot(i, o)) / (n_o * n_o);
-    EXPECT_NEAR(there, lobe(m, o.z, i.z, dot(i, o)) / (n_i * n_i), 1e-14 * there);
+    const double there = value(m, i.z, o.z, dot(i, o)) / (n_o * n_o);
+    EXPECT_NEAR(there, value(m, o.z, i.z, dot(i, o)) / (n_i * n_i), 1e-14 * there);
   }
 }
 
@@ -154,7 +147,7 @@ TEST(DielectricSampling, FollowsItsDensityAndLosesNothingElse) {
               const double solid_angle = std::pow(h.z / g, 3) * alpha * alpha * kTwoPi / (kHalf * kSub * kSub);
               const double visible = ggx(h.z, alpha) * smith_g1(o.z, alpha) * x / o.z * solid_angle;
               const auto add = [&](const Vec3& i, double jacobian) {
-                const double mass = direction_pdf(m, side * i.z, side * o.z, dot(i, o)) * jacobian * solid_angle;
+                const double mass = pdf(m, side * i.z, side * o.z, dot(i, o)) * jacobian * solid_angle;
                 probability[bin_of(i, o, relative, alpha)] += mass;
                 total += mass;
               };
@@ -184,7 +177,7 @@ TEST(DielectricSampling, FollowsItsDensityAndLosesNothingElse) {
           Rng rng({23, 0, 0}, 0, 0);
           for (int k = 0; k < kSamples; ++k) {
             const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-            const auto sample = sample_direction(m, {0, 0, side}, o, u0, u1, u2);
+            const auto sample = testing::sample(m, {0, 0, side}, o, u0, u1, u2);
             ++counts[sample ? bin_of(sample->direction, o, relative, alpha) : 2 * kHalf];
           }
           EXPECT_LT(std::abs(chi_square_z(counts, probability)), 5.5) << where;
@@ -201,16 +194,16 @@ TEST(DielectricSampling, WeightAndDensityAgreeWithTheLobe) {
           const Material m = glass(alpha, ior);
           const Vec3 given = direction(kPi * rng.uniform(), 0.9);
           const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-          const auto sample = sample_direction(m, {0, 0, 1}, given, u0, u1, u2, mode);
+          const auto sample = testing::sample(m, {0, 0, 1}, given, u0, u1, u2, mode);
           if (!sample) continue;
           const Vec3& drawn = sample->direction;
           refractions += drawn.z * given.z < 0;
           EXPECT_NEAR(length(drawn), 1, 1e-14);
           const double c = dot(given, drawn);
-          EXPECT_NEAR(sample->pdf / direction_pdf(m, drawn.z, given.z, c), 1, 1e-8);
+          EXPECT_NEAR(sample->pdf / pdf(m, drawn.z, given.z, c), 1, 1e-8);
           const bool light = mode == TransportMode::radiance;
-          const double f = lobe(m, light ? drawn.z : given.z, light ? given.z : drawn.z, c);
-          EXPECT_NEAR(sample->weight * sample->pdf / (f * std::abs(drawn.z)), 1, 1e-8);
+          const double f = value(m, light ? drawn.z : given.z, light ? given.z : drawn.z, c);
+          EXPECT_NEAR(sample->weight.r * sample->pdf / (f * std::abs(drawn.z)), 1, 1e-8);
         }
   EXPECT_GT(refractions, 3000);
 }
@@ -222,7 +215,7 @@ double energy(const Material& m, const Vec3& given) {
   for (int a = 0; a < kTheta; ++a)
     for (int b = 0; b < kPhi; ++b) {
       const Vec3 o = direction(kPi * (a + 0.5) / kTheta, kTwoPi * (b + 0.5) / kPhi);
-      sum += lobe(m, given.z, o.z, dot(given, o)) * std::abs(o.z) * std::sqrt((1 - o.z) * (1 + o.z));
+      sum += value(m, given.z, o.z, dot(given, o)) * std::abs(o.z) * std::sqrt((1 - o.z) * (1 + o.z));
     }
   return sum * (kPi / kTheta) * (kTwoPi / kPhi);
 }
@@ -242,8 +235,8 @@ TEST(DielectricSampling, ConservesEnergy) {
         Rng rng({25, 0, 0}, 0, 0);
         for (int k = 0; k < kSamples; ++k) {
           const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-          const auto sample = sample_direction(m, {0, 0, 1}, given, u0, u1, u2, TransportMode::importance);
-          const double w = sample ? sample->weight : 0;
+          const auto sample = testing::sample(m, {0, 0, 1}, given, u0, u1, u2, TransportMode::importance);
+          const double w = sample ? sample->weight.r : 0;
           EXPECT_LE(w, 1 + 1e-12);
           sum += w;
           squares += w * w;
@@ -260,8 +253,8 @@ TEST(DielectricSampling, SmoothFaceFollowsFresnel) {
     Rng rng({26, 0, 0}, 0, 0);
     for (int k = 0; k < kSamples; ++k) {
       const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-      const auto s = sample_direction(glass(0.001, 1.5), {0, 0, behind ? -1.0 : 1.0}, direction(theta, 0), u0, u1, u2);
-      if (s && s->direction.z > 0) sum += s->weight;
+      const auto s = testing::sample(glass(0.001, 1.5), {0, 0, behind ? -1.0 : 1.0}, direction(theta, 0), u0, u1, u2);
+      if (s && s->direction.z > 0) sum += s->weight.r;
     }
     return sum / kSamples;
   };

@@ -6,24 +6,18 @@
 #include <vector>
 
 #include "core/base/random.h"
-#include "core/scene/materials/material.h"
 #include "tests/materials/chi_square.h"
+#include "tests/materials/cosines.h"
 
 namespace isochron {
 namespace {
 
 const Vec3 kNormal = normalize(Vec3{0.3, -0.5, 0.7});
 
-Material make(MaterialType type, double alpha = 0.2, bool two_sided = false) {
-  Material m;
-  m.type = type;
-  m.roughness = alpha;
-  m.two_sided = two_sided;
-  return m;
-}
+using namespace testing;
 
-struct Frame {
-  Frame() { complete_frame(kNormal, s, t); }
+struct LocalFrame {
+  LocalFrame() { complete_frame(kNormal, s, t); }
   Vec3 world(const Vec3& v) const { return v.x * s + v.y * t + v.z * kNormal; }
   Vec3 local(const Vec3& v) const { return {dot(v, s), dot(v, t), dot(v, kNormal)}; }
   Vec3 s, t;
@@ -37,10 +31,10 @@ Vec3 tilted(double theta) {
 // too narrow: dw_i = 4 (w_o.h) dw_h and dw_h = cos^3(theta_h) alpha^2 / g^3 dg dphi. 18 tests at |z| < 5.5
 // (the tail of a chi-square with 250 degrees of freedom beyond it: about 1e-6): false alarm 2e-5.
 TEST(SampleDirection, ConductorFollowsItsDensity) {
-  const Frame frame;
+  const LocalFrame frame;
   for (const double alpha : {0.01, 0.2, 0.7}) {
     for (const double theta : {0.0, 0.6, 1.2, 1.5, 1.55, 1.5705}) {
-      const Material m = make(MaterialType::rough_conductor, alpha);
+      const Material m = white_conductor(alpha);
       const Vec3 o = tilted(theta), w_o = frame.world(o);
       std::vector<double> probability(kSide * kSide + 1);
       constexpr int kSub = 24;
@@ -54,7 +48,7 @@ TEST(SampleDirection, ConductorFollowsItsDensity) {
           if (facing <= 0) continue;
           const Vec3 i = 2 * facing * h - o;
           const double by_g_phi = 4 * facing * std::pow(h.z / g, 3) * alpha * alpha;
-          const double mass = direction_pdf(m, i.z, o.z, dot(i, o)) * by_g_phi * kTwoPi / (kSide * kSide * kSub * kSub);
+          const double mass = pdf(m, i.z, o.z, dot(i, o)) * by_g_phi * kTwoPi / (kSide * kSide * kSub * kSub);
           probability[bin(g, phi)] += mass;
           total += mass;
         }
@@ -66,7 +60,7 @@ TEST(SampleDirection, ConductorFollowsItsDensity) {
       Rng rng({11, 0, 0}, 0, 0);
       for (int k = 0; k < kSamples; ++k) {
         const double u0 = rng.uniform(), u1 = rng.uniform();
-        const auto sample = sample_direction(m, kNormal, w_o, u0, u1);
+        const auto sample = testing::sample(m, kNormal, w_o, u0, u1);
         if (!sample) {
           ++counts.back();
           continue;
@@ -82,14 +76,14 @@ TEST(SampleDirection, ConductorFollowsItsDensity) {
 
 // Equal areas of the projected disc; one test at |z| < 5.5.
 TEST(SampleDirection, DiffuseFollowsTheCosine) {
-  const Frame frame;
+  const LocalFrame frame;
   std::vector<int> counts(kSide * kSide + 1);
   std::vector<double> probability(kSide * kSide + 1, 1.0 / (kSide * kSide));
   probability.back() = 0;
   Rng rng({12, 0, 0}, 0, 0);
   for (int k = 0; k < kSamples; ++k) {
     const double u0 = rng.uniform(), u1 = rng.uniform();
-    const auto sample = sample_direction(make(MaterialType::diffuse), kNormal, frame.world(tilted(1.0)), u0, u1);
+    const auto sample = testing::sample(white_diffuse(), kNormal, frame.world(tilted(1.0)), u0, u1);
     ASSERT_TRUE(sample);
     const Vec3 i = frame.local(sample->direction);
     ++counts[bin(i.x * i.x + i.y * i.y, std::atan2(i.y, i.x))];
@@ -98,18 +92,17 @@ TEST(SampleDirection, DiffuseFollowsTheCosine) {
 }
 
 TEST(SampleDirection, WeightAndDensityAgreeWithTheLobe) {
-  const Frame frame;
+  const LocalFrame frame;
   Rng rng({13, 0, 0}, 0, 0);
   for (const bool behind : {false, true}) {
     for (const double alpha : {0.0, 0.01, 0.1, 0.8}) {  // 0: diffuse
-      const Material m =
-          alpha == 0 ? make(MaterialType::diffuse, 1, behind) : make(MaterialType::rough_conductor, alpha, behind);
+      const Material m = alpha == 0 ? white_diffuse(behind) : white_conductor(alpha, behind);
       for (int k = 0; k < 2000; ++k) {
         Vec3 o = tilted(1.57 * rng.uniform());
         if (behind) o.z = -o.z;
         const double u0 = rng.uniform(), u1 = rng.uniform();
         const Vec3 w_o = frame.world(o);
-        const auto sample = sample_direction(m, kNormal, w_o, u0, u1);
+        const auto sample = testing::sample(m, kNormal, w_o, u0, u1);
         if (!sample) continue;
         const double cos_i = dot(kNormal, sample->direction), cos_o = dot(kNormal, w_o);
         const double cos_io = dot(sample->direction, w_o);
@@ -121,19 +114,20 @@ TEST(SampleDirection, WeightAndDensityAgreeWithTheLobe) {
         const double q = 2 + 2 * cos_io, p = cos_i + cos_o;
         const double t = alpha * alpha * p * p + std::max(q - p * p, 0.0);
         const double tolerance = 16 * std::numeric_limits<double>::epsilon() * (1 + (alpha > 0 ? 2 / t + 1 / q : 0));
-        EXPECT_NEAR(sample->pdf / direction_pdf(m, cos_i, cos_o, cos_io), 1, tolerance);
-        const double expected = lobe(m, cos_i, cos_o, cos_io) * std::abs(cos_i);
-        EXPECT_NEAR(sample->weight * sample->pdf / expected, 1, tolerance + 8e-16 / std::abs(cos_i));
+        EXPECT_NEAR(sample->pdf / pdf(m, cos_i, cos_o, cos_io), 1, tolerance);
+        const double expected = value(m, cos_i, cos_o, cos_io) * std::abs(cos_i);
+        EXPECT_NEAR(sample->weight.r * sample->pdf / expected, 1, tolerance + 8e-16 / std::abs(cos_i));
       }
     }
   }
 }
 
 TEST(SampleDirection, NothingBehindAOneSidedSurface) {
-  const Frame frame;
-  for (const MaterialType type : {MaterialType::diffuse, MaterialType::rough_conductor}) {
-    EXPECT_FALSE(sample_direction(make(type), kNormal, frame.world({0.6, 0, -0.8}), 0.3, 0.6));
-    EXPECT_TRUE(sample_direction(make(type, 0.2, true), kNormal, frame.world({0.6, 0, -0.8}), 0.3, 0.6));
+  const LocalFrame frame;
+  for (Material m : {white_diffuse(), white_conductor(0.2)}) {
+    EXPECT_FALSE(sample(m, kNormal, frame.world({0.6, 0, -0.8}), 0.3, 0.6));
+    m.bsdf().set_two_sided(true);
+    EXPECT_TRUE(sample(m, kNormal, frame.world({0.6, 0, -0.8}), 0.3, 0.6));
   }
 }
 
@@ -146,7 +140,7 @@ double albedo(const Material& m, const Vec3& o) {
     for (int b = 0; b < kPhi; ++b) {
       const double phi = kTwoPi * (b + 0.5) / kPhi;
       const Vec3 i{r * std::cos(phi), r * std::sin(phi), z};
-      sum += lobe(m, i.z, o.z, dot(i, o)) * i.z * r;
+      sum += value(m, i.z, o.z, dot(i, o)) * i.z * r;
     }
   }
   return sum * (0.5 * kPi / kTheta) * (kTwoPi / kPhi);
@@ -154,9 +148,9 @@ double albedo(const Material& m, const Vec3& o) {
 
 // Monte Carlo mean of the weights against quadrature. 12 tests at |z| < 5: false alarm 7e-6.
 TEST(SampleDirection, EnergyMatchesQuadrature) {
-  const Frame frame;
+  const LocalFrame frame;
   for (const double alpha : {0.1, 0.4, 1.0}) {
-    const Material m = make(MaterialType::rough_conductor, alpha);
+    const Material m = white_conductor(alpha);
     for (const double theta : {0.0, 0.8, 1.3, 1.5}) {
       const double expected = albedo(m, tilted(theta));
       EXPECT_LT(expected, 1 + 1e-6);
@@ -165,8 +159,8 @@ TEST(SampleDirection, EnergyMatchesQuadrature) {
       Rng rng({14, 0, 0}, 0, 0);
       for (int k = 0; k < kSamples; ++k) {
         const double u0 = rng.uniform(), u1 = rng.uniform();
-        const auto sample = sample_direction(m, kNormal, frame.world(tilted(theta)), u0, u1);
-        const double w = sample ? sample->weight : 0;
+        const auto sample = testing::sample(m, kNormal, frame.world(tilted(theta)), u0, u1);
+        const double w = sample ? sample->weight.r : 0;
         EXPECT_LE(w, 1 + 1e-12);
         sum += w;
         squares += w * w;
@@ -178,19 +172,19 @@ TEST(SampleDirection, EnergyMatchesQuadrature) {
   }
 }
 
-TEST(Lobe, DiffuseWhiteFurnace) {
-  EXPECT_NEAR(albedo(make(MaterialType::diffuse), tilted(0.9)), 1, 1e-5);
-  EXPECT_EQ(sample_direction(make(MaterialType::diffuse), {0, 0, 1}, {0, 0, 1}, 0.2, 0.7)->weight, 1);
+TEST(Bsdf, DiffuseWhiteFurnace) {
+  EXPECT_NEAR(albedo(white_diffuse(), tilted(0.9)), 1, 1e-5);
+  EXPECT_EQ(sample(white_diffuse(), {0, 0, 1}, {0, 0, 1}, 0.2, 0.7)->weight.r, 1);
 }
 
 // A smooth conductor loses almost nothing: the white furnace of GGX as alpha goes to zero.
-TEST(Lobe, SmoothConductorKeepsItsEnergy) {
+TEST(Bsdf, SmoothConductorKeepsItsEnergy) {
   double sum = 0;
   Rng rng({15, 0, 0}, 0, 0);
   for (int k = 0; k < 10000; ++k) {
     const double u0 = rng.uniform(), u1 = rng.uniform();
-    const auto sample = sample_direction(make(MaterialType::rough_conductor, 0.01), {0, 0, 1}, tilted(0.5), u0, u1);
-    if (sample) sum += sample->weight;
+    const auto sample = testing::sample(white_conductor(0.01), {0, 0, 1}, tilted(0.5), u0, u1);
+    if (sample) sum += sample->weight.r;
   }
   EXPECT_NEAR(sum / 10000, 1, 2e-3);
 }

@@ -272,7 +272,7 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.resolution, (std::array<int, 2>{12, 9}));
     EXPECT_EQ(back.target.max_bounces, 3);
     ASSERT_EQ(back.parameters.size(), 9u);
-    EXPECT_EQ(back.parameters[7].type, ParameterType::ior);
+    EXPECT_EQ(back.parameters[7].quantity, "ior");
     EXPECT_EQ(back.parameters[7].material, "glass");
     EXPECT_EQ(back.parameters[3].scale, 12.5);
     EXPECT_EQ(back.parameters[3].pivot_kind, PivotKind::center);

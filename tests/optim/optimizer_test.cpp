@@ -71,10 +71,11 @@ struct Bound {
   std::vector<ParameterSpec> specs;
   Bound() {
     for (const char* name : {"a", "b", "c", "d"}) {
-      scene.materials.push_back({.name = name});
+      scene.materials.push_back(Material("diffuse", name));
       ParameterSpec spec;
       spec.name = name;
-      spec.type = ParameterType::albedo;
+      spec.type = ParameterType::material;
+      spec.quantity = "albedo";
       spec.material = name;
       spec.initial = {0.5};
       specs.push_back(spec);

@@ -15,9 +15,8 @@ namespace {
 Scene two_shapes(bool grey) {
   Scene scene;
   scene.grey = grey;
-  scene.materials = {{.name = "white"},
-                     {.name = "metal", .type = MaterialType::rough_conductor},
-                     {.name = "glass", .type = MaterialType::rough_dielectric}};
+  scene.materials = {Material("diffuse", "white"), Material("rough_conductor", "metal"),
+                     Material("rough_dielectric", "glass")};
   scene.positions = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}, {0, 0, 3}, {-2, 0, -2}, {-2, 0, 2}, {2, 0, 2}, {2, 0, -2}};
   scene.triangles = {{{0, 2, 1}, 0}, {{0, 1, 3}, 0}, {{0, 3, 2}, 0}, {{1, 2, 3}, 0}, {{4, 5, 6}, 1}, {{4, 6, 7}, 1}};
   scene.shapes = {{.name = "tetra",
@@ -43,9 +42,17 @@ ParameterSpec spec(const std::string& name, ParameterType type, const std::strin
   ParameterSpec s;
   s.name = name;
   s.type = type;
-  (is_of_material(type) ? s.material : s.shape) = of;
+  s.shape = of;
   s.initial = {initial};
   s.target = {initial};
+  return s;
+}
+
+ParameterSpec of_material(const std::string& name, const std::string& quantity, const std::string& material,
+                          double initial) {
+  ParameterSpec s = spec(name, ParameterType::material, "", initial);
+  s.quantity = quantity;
+  s.material = material;
   return s;
 }
 
@@ -66,9 +73,9 @@ std::vector<ParameterSpec> every_kind() {
   specs.back().axis = {0, 0, 3};
   specs.push_back(spec("lift", ParameterType::vertices, "quad", 0.0));
   specs.back().direction = {0, 2, 0};
-  specs.push_back(spec("colour", ParameterType::albedo, "white", 0.4));
-  specs.push_back(spec("rough", ParameterType::roughness, "metal", 0.25));
-  specs.push_back(spec("bend", ParameterType::ior, "glass", 1.5));
+  specs.push_back(of_material("colour", "albedo", "white", 0.4));
+  specs.push_back(of_material("rough", "roughness", "metal", 0.25));
+  specs.push_back(of_material("bend", "ior", "glass", 1.5));
   specs.push_back(spec("power", ParameterType::emission, "quad", 3));
   return specs;
 }
@@ -78,7 +85,7 @@ std::vector<double> dofs(const Scene& scene) {
   std::vector<double> all;
   for (const Vec3& p : scene.positions) all.insert(all.end(), {p.x, p.y, p.z});
   for (const Material& m : scene.materials)
-    all.insert(all.end(), {m.albedo.r, m.albedo.g, m.albedo.b, m.roughness, m.ior});
+    for (int k = 0; k < m.numbers(); ++k) all.push_back(m.number(k));
   for (const Shape& s : scene.shapes) all.insert(all.end(), {s.emission.r, s.emission.g, s.emission.b});
   return all;
 }
@@ -309,9 +316,9 @@ TEST(Parameters, RejectWhatDoesNotFitTheScene) {
   };
   ParameterSpec s = spec("p", ParameterType::translation, "cube", 0);
   EXPECT_EQ(message(s), "parameter p: shape: there is no shape 'cube' in the scene (allowed: tetra, quad)");
-  s = spec("p", ParameterType::roughness, "white", 0.2);
+  s = of_material("p", "roughness", "white", 0.2);
   EXPECT_EQ(message(s), "parameter p: material: material 'white' is diffuse and has no roughness");
-  s = spec("p", ParameterType::albedo, "gold", 0.2);
+  s = of_material("p", "albedo", "gold", 0.2);
   EXPECT_EQ(message(s),
             "parameter p: material: there is no material 'gold' in the scene (allowed: white, metal, glass)");
   s = spec("p", ParameterType::translation, "tetra", 0);
@@ -321,20 +328,20 @@ TEST(Parameters, RejectWhatDoesNotFitTheScene) {
   EXPECT_EQ(message(s), "parameter p: selection: there is no vertex 4 in shape 'tetra' (0 to 3)");
   s.selection = {Selection::Kind::list, {2, 2}, {}, {}};
   EXPECT_EQ(message(s), "parameter p: selection: vertex 2 is listed twice");
-  s = spec("p", ParameterType::ior, "metal", 1.5);
-  EXPECT_EQ(message(s), "parameter p: material: material 'metal' is no dielectric and has no ior");
-  s = spec("p", ParameterType::albedo, "glass", 0.5);
-  EXPECT_EQ(message(s), "parameter p: material: material 'glass' is a dielectric and has no albedo");
+  s = of_material("p", "ior", "metal", 1.5);
+  EXPECT_EQ(message(s), "parameter p: material: material 'metal' is rough_conductor and has no ior");
+  s = of_material("p", "albedo", "glass", 0.5);
+  EXPECT_EQ(message(s), "parameter p: material: material 'glass' is rough_dielectric and has no albedo");
   // An index keeps to its side of one.
-  s = spec("p", ParameterType::ior, "glass", 1.5);
+  s = of_material("p", "ior", "glass", 1.5);
   s.target = {0.9};
   EXPECT_EQ(message(s), "parameter p: target: 0.9 is out of bounds (1.001 to inf)");
-  s = spec("p", ParameterType::ior, "glass", 0.7);
+  s = of_material("p", "ior", "glass", 0.7);
   s.target = {1};
   EXPECT_EQ(message(s), "parameter p: target: 1 is out of bounds (0.001 to 0.999)");
-  s = spec("p", ParameterType::albedo, "white", 1.2);
+  s = of_material("p", "albedo", "white", 1.2);
   EXPECT_EQ(message(s), "parameter p: initial: 1.2 is out of bounds (0.0001 to 1)");
-  s = spec("p", ParameterType::albedo, "white", 0.5);
+  s = of_material("p", "albedo", "white", 0.5);
   s.target = {0.2};
   s.lower = {0.3};
   EXPECT_EQ(message(s), "parameter p: target: 0.2 is out of bounds (0.3 to 1)");

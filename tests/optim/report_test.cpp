@@ -12,8 +12,8 @@ namespace {
 class Report : public testing::Test {
  protected:
   Report() {
-    scene_.materials.push_back({.name = "wall"});
-    scene_.materials.push_back({.name = "thing"});
+    scene_.materials.push_back(Material("diffuse", "wall"));
+    scene_.materials.push_back(Material("diffuse", "thing"));
     state_.iteration = 12;
     state_.seconds = 3.25;
     state_.loss_initial = 0.5;
@@ -32,7 +32,8 @@ class Report : public testing::Test {
   ParameterSpec albedo(const char* material, std::vector<double> initial, std::vector<double> target) const {
     ParameterSpec spec;
     spec.name = spec.material = material;
-    spec.type = ParameterType::albedo;
+    spec.type = ParameterType::material;
+    spec.quantity = "albedo";
     spec.initial = std::move(initial);
     spec.target = std::move(target);
     return spec;

@@ -45,7 +45,7 @@ class BadGeometry : public ::testing::TestWithParam<Sampling> {
   }
   TangentBasis basis() const {
     return make_basis(scene_, {translate(scene_, "block", {1, 0.3, 0}), translate(scene_, "panel", {0, 1, 0}),
-                               translate(scene_, "light", {0, 1, 0.5}), change_albedo(scene_, "grey")});
+                               translate(scene_, "light", {0, 1, 0.5}), change_material(scene_, "grey", "albedo")});
   }
   Scene scene_;
 };

@@ -133,7 +133,7 @@ TEST(BoundaryEdges, OnlyThoseThatTheCameraCanSee) {
   Scene corner = cube_scene();
   corner.camera.position = {5, 5, 5};
   EXPECT_EQ(seen(corner).size(), 9u) << "six of the outline, three inside it";
-  corner.materials[0].two_sided = true;
+  corner.materials[0].bsdf().set_two_sided(true);
   EXPECT_EQ(seen(corner).size(), 12u);
 
   Scene ahead = cube_scene();

@@ -53,13 +53,7 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
   const Case& c = GetParam();
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   scene.camera.width = scene.camera.height = 8;
-  if (c.glass) {
-    Material& m = scene.materials[scene.find_material("block")];
-    m.type = MaterialType::rough_dielectric;
-    m.albedo = Rgb(1);
-    m.roughness = 0.3;
-    m.ior = 1.5;
-  }
+  if (c.glass) replace_material(scene, "block", glass(0.3, 1.5));
   const std::vector<Motion> motions = {translate(scene, "block", {0.3, 1, 0.2}),
                                        rotate_y(scene, "block", {-0.9, -0.4, -0.6}),
                                        translate(scene, "panel", {-1, 0.2, 0.1})};
@@ -234,7 +228,7 @@ TEST(CameraFlow, IsLeftOutWhereNothingMovesCloseToAnything) {
     for (Vec3& p : s.positions)
       if (p.y == -2) p.y = -0.6;
   })) << "close to the floor";
-  EXPECT_TRUE(possible([](Scene& s) { s.materials[0].type = MaterialType::rough_dielectric; })) << "glass, from within";
+  EXPECT_TRUE(possible([](Scene& s) { s.materials[0] = glass(0.3, 1.5); })) << "glass, from within";
   EXPECT_TRUE(possible([](Scene& s) { s.positions[7] = {0.1, 0.1, 0.1}; })) << "a dent";
 }
 

@@ -68,14 +68,6 @@ inline Mesh lump() {
   return mesh;
 }
 
-inline Material glass() {
-  Material m = diffuse(Rgb(1.0));
-  m.type = MaterialType::rough_dielectric;
-  m.roughness = 0.3;
-  m.ior = 1.5;
-  return m;
-}
-
 inline Scene with(Scene scene, const char* name, const Mesh& mesh, const Material& material) {
   add_shape(scene, name, mesh, material);
   return scene;
@@ -163,7 +155,7 @@ inline std::vector<ContactCase> cases() {
                   slide_neighbour, false, Sampling::standard, 64},
       ContactCase{"beside_glass",
                   [] {
-                    return with(with_box(), "glass", box({-0.5, -1, 0}, {-0.15, -0.6, 0.4}), glass());
+                    return with(with_box(), "glass", box({-0.5, -1, 0}, {-0.15, -0.6, 0.4}), glass(0.3, 1.5));
                   },
                   slide, false, Sampling::standard, 64, 0.08}};
 }

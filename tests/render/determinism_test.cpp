@@ -20,7 +20,8 @@ class Determinism : public ::testing::TestWithParam<Sampling> {
   Determinism()
       : scene_(load_scene(TEST_DATA "/validation/scene.yaml")),
         gates_(GateShape::truncated_gaussian(0.2, 0.3), {4.9, 5.3, 5.8}),
-        basis_(make_basis(scene_, {translate(scene_, "block", {0.5, 0, 1}), change_albedo(scene_, "grey")})),
+        basis_(
+            make_basis(scene_, {translate(scene_, "block", {0.5, 0, 1}), change_material(scene_, "grey", "albedo")})),
         renderer_(make_renderer()) {}
   ~Determinism() override { set_thread_count(0); }
 

@@ -283,11 +283,9 @@ TEST_P(Agreement, OfStandardAndEllipsoidalPerBlock) {
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   scene.camera.look_at = {0, 0.2, 0};  // the lamp itself is in view
   if (glossy)
-    for (const char* name : {"grey", "panel", "block"}) {
-      Material& m = scene.materials[scene.find_material(name)];
-      m.type = MaterialType::rough_conductor;
-      m.roughness = 0.4;
-    }
+    for (const auto& [name, reflectance, two_sided] :
+         {std::tuple{"grey", 0.5, false}, {"panel", 0.7, true}, {"block", 0.6, false}})
+      replace_material(scene, name, conductor(Rgb(reflectance), 0.4, two_sided));
   const std::vector<double> centers =
       bounces == 0 ? std::vector<double>{3.7, 4.0, 4.3} : std::vector<double>{4.6, 5.3, 6.0};
   const GateSet gates(GateShape::gaussian(0.25), centers);

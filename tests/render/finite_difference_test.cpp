@@ -1,13 +1,13 @@
 // Total derivative = finite differences, for everything that can move, in a diffuse and a glossy scene and
-// one with glass, under every kind of gate and both samplings. The finite differences render the moved scenes
+// ones with retroreflectors and glass, under every kind of gate and both samplings. The finite differences render the moved scenes
 // with common random numbers.
 //
 // Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at 4 standard errors of the difference
 // (false alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below
-// 5 % of the derivative's scale (15 % in the glossy one, 50 % with glass and twice that for motions of the
+// 5 % of the derivative's scale (15 % in the glossy ones, 50 % with glass and twice that for motions of the
 // glass): the terms' root mean square over gates and over all motions, which have comparable speeds; over
 // gates for a material's parameter. The steps are small enough that their bias, of second order, stays below
-// that. The glass's roughness and, under ellipsoidal sampling, its ior change these images little: limits on their errors
+// that. The glass's roughness and, under ellipsoidal sampling, its ior change these images little, and so does that of a retroreflector: limits on their errors
 // are wider, about 1.5 to 2.3 times what was seen, so that z-tests of them catch gross errors alone but more noise than
 // that shows. Of the roughness most is the finite differences'; our own error has a limit of its own.
 // ISOCHRON_TEST_SAMPLES=16 in the environment takes 16 times the samples, for errors four times smaller.
@@ -20,7 +20,7 @@
 namespace isochron::testing {
 namespace {
 
-enum class Look { diffuse, glossy, glass };
+enum class Look { diffuse, glossy, retroreflecting, glass };
 
 struct Case {
   const char* name;
@@ -38,20 +38,15 @@ class FiniteDifference : public ::testing::TestWithParam<Case> {};
 TEST_P(FiniteDifference, TotalDerivative) {
   const Case& c = GetParam();
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
-  if (c.look == Look::glass) {
-    Material& m = scene.materials[scene.find_material("block")];
-    m.type = MaterialType::rough_dielectric;
-    m.albedo = Rgb(1);
-    m.roughness = 0.3;
-    m.ior = 1.5;
+  if (c.look == Look::glass) replace_material(scene, "block", glass(0.3, 1.5));
+  if (c.look == Look::glossy) {
+    replace_material(scene, "block", conductor(Rgb(0.9), 0.5));
+    replace_material(scene, "panel", conductor(Rgb(0.9), 0.5, true));
   }
-  if (c.look == Look::glossy)
-    for (const char* name : {"block", "panel"}) {
-      Material& m = scene.materials[scene.find_material(name)];
-      m.type = MaterialType::rough_conductor;
-      m.albedo = Rgb(0.9);
-      m.roughness = 0.5;
-    }
+  if (c.look == Look::retroreflecting) {
+    replace_material(scene, "block", retroreflector(Rgb(0.3), Rgb(0.6), 0.5));
+    replace_material(scene, "panel", retroreflector(Rgb(0.2), Rgb(0.7), 0.5, true));
+  }
   const Vec3 corner = scene.positions[scene.shapes[scene.find_shape("block")].first_vertex + 2];
   const Vec3 middle = scene.positions[scene.shapes[scene.find_shape("panel")].first_vertex + 4];
   const auto at = [](const Vec3& place) { return [=](const Vec3& p) { return p == place; }; };
@@ -71,13 +66,21 @@ TEST_P(FiniteDifference, TotalDerivative) {
       {"rotation", rotate_y(scene, "block", {-0.9, -0.4, -0.6}), 0.02, true, glass ? 2.0 : 1.0},
       {"vertex of a silhouette", translate(scene, "block", {-0.3, 1, 0.5}, at(corner)), 0.02},
       {"vertex within a surface", translate(scene, "panel", {-1, 0, 0.3}, at(middle)), 0.01},
-      {"albedo", change_albedo(scene, glass ? "grey" : "block"), 0.01, false}};
+      {"albedo", change_material(scene, glass ? "grey" : "block", "albedo"), 0.01, false}};
   if (glass)
     parameters.push_back(
-        {"ior", change_ior(scene, "block"), 0.01, false, c.sampling == Sampling::ellipsoidal ? 2.0 : 1.0});
+        {"ior", change_material(scene, "block", "ior"), 0.01, false, c.sampling == Sampling::ellipsoidal ? 2.0 : 1.0});
+  if (c.look == Look::retroreflecting)
+    parameters.push_back({"reflectance", change_material(scene, "block", "reflectance"), 0.01, false});
+  // What roughness changes is little beside the noise of the finite differences.
   if (c.look != Look::diffuse)
-    parameters.push_back(
-        {"roughness", change_roughness(scene, "block"), 0.01, false, glass ? 20.0 : 1.0, glass ? 4.0 : INFINITY});
+    parameters.push_back({"roughness", change_material(scene, "block", "roughness"), 0.01, false,
+                          glass                             ? 20.0
+                          : c.look == Look::retroreflecting ? 2.5
+                                                            : 1.0,
+                          glass                             ? 4.0
+                          : c.look == Look::retroreflecting ? 0.5
+                                                            : INFINITY});
   std::vector<Motion> motions;
   for (const Parameter& p : parameters) motions.push_back(p.motion);
   const TangentBasis basis = make_basis(scene, motions);
@@ -107,7 +110,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
     if (parameters[p].geometry) motion_scale = std::hypot(motion_scale, size_of(p)), ++motion_count;
   motion_scale /= std::sqrt(motion_count);
 
-  const double limit = c.look == Look::diffuse ? 0.05 : c.look == Look::glossy ? 0.15 : 0.5;
+  const double limit = c.look == Look::diffuse ? 0.05 : c.look == Look::glass ? 0.5 : 0.15;
   EstimatorOptions reference_options = options;
   reference_options.sampling = Sampling::standard;
   for (std::size_t p = 0; p < parameters.size(); ++p) {
@@ -144,6 +147,10 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 200},
         Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60,
              200},
+        Case{"retroreflecting_gaussian_standard", Look::retroreflecting, GateShape::gaussian(0.3), Sampling::standard,
+             60, 125},
+        Case{"retroreflecting_boxcar_ellipsoidal", Look::retroreflecting, GateShape::boxcar(0.6), Sampling::ellipsoidal,
+             40, 200},
         Case{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 125},
         Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60, 125}),
     [](const auto& test) { return test.param.name; });

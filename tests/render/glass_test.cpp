@@ -9,15 +9,6 @@ namespace {
 
 constexpr int kBatches = 32;
 
-Material glass(double roughness, double ior) {
-  Material m;
-  m.type = MaterialType::rough_dielectric;
-  m.albedo = Rgb(1);
-  m.roughness = roughness;
-  m.ior = ior;
-  return m;
-}
-
 /// A block of glass with no two faces parallel, so that it traps no light, in a room whose black walls emit 1.
 Scene furnace(double ior) {
   Scene scene;

@@ -236,8 +236,9 @@ TEST(ShortestPath, GatesThatEndThereAreExactlyDark) {
   // Of all lamp points the corner nearest to the camera has the shortest path over the floor.
   const Scene scene = make_scene(facing_down({-0.6, 1, 0.2}, {0, 0, 0}, 60, {0.5, 1.4, -0.1}, 0.05));
   const double shortest = std::sqrt(1.05 * 1.05 + 0.25 * 0.25 + 2.4 * 2.4);
-  const TangentBasis basis = make_basis(scene, {translate(scene, "floor", {0, 1, 0}),
-                                                translate(scene, "lamp", {0.3, 1, 0}), change_albedo(scene, "floor")});
+  const TangentBasis basis =
+      make_basis(scene, {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0}),
+                         change_material(scene, "floor", "albedo")});
   for (const double width : {1e-6, 3e-3, 0.3})
     for (const double share : {0.0, 0.3, 1.0}) {
       EstimatorOptions options{.max_bounces = 2};

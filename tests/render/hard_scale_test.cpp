@@ -43,9 +43,9 @@ class Scaled : public ::testing::TestWithParam<ScaleCase> {
     for (Vec3& p : scene.positions) p *= scale;
     scene.camera.position *= scale;
     scene.camera.look_at *= scale;
-    const TangentBasis basis =
-        make_basis(scene, {translate(scene, "block", {1, 0.3, 0}), translate(scene, "light", {0.2, 1, 0.5}),
-                           rotate_y(scene, "block", Vec3{-0.2, 0, 0.15} * scale), change_albedo(scene, "panel")});
+    const TangentBasis basis = make_basis(
+        scene, {translate(scene, "block", {1, 0.3, 0}), translate(scene, "light", {0.2, 1, 0.5}),
+                rotate_y(scene, "block", Vec3{-0.2, 0, 0.15} * scale), change_material(scene, "panel", "albedo")});
     const GateShape shape = GetParam().shape(scale);
     const GateSet gates(shape, {5.2 * scale, 6.0 * scale});
     const double per_length = shape.is_steady() ? 1 : scale;  // gated images are radiance per length

@@ -19,7 +19,7 @@ TEST(LargeScene, TheSamePicturesAsInLargeTriangles) {
   const GateSet gates(GateShape::gaussian(0.2), {4.9, 5.3, 5.8});
   const auto run = [&](const Scene& scene) {
     const TangentBasis basis =
-        make_basis(scene, {translate(scene, "block", {0.5, 0, 1}), change_albedo(scene, "grey")});
+        make_basis(scene, {translate(scene, "block", {0.5, 0, 1}), change_material(scene, "grey", "albedo")});
     const Renderer renderer(scene, gates, {.max_bounces = 4, .sampling = Sampling::standard}, &basis);
     std::vector<GatedImage> images = renderer.derive(Term::interior, {5, 0, 1}, {0, 8});
     images.push_back(renderer.render({5, 0, 0}, {0, 8}));

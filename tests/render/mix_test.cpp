@@ -31,9 +31,7 @@ class Combined : public ::testing::TestWithParam<Case> {};
 TEST_P(Combined, GivesWhatStandardSamplingGives) {
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   scene.camera.width = scene.camera.height = 16;
-  Material& panel = scene.materials[scene.find_material("panel")];
-  panel.type = MaterialType::rough_conductor;
-  panel.roughness = 0.5;
+  replace_material(scene, "panel", conductor(Rgb(0.7), 0.5, true));
   const TangentBasis basis =
       make_basis(scene, {translate(scene, "block", {0.3, 1, 0.2}), translate(scene, "light", {0.4, 0, 0.3})});
   const GateSet gates(GetParam().shape, {5.0, 6.0});

@@ -69,6 +69,9 @@ PathValue<T> evaluate(const Scene& scene, const PathSpec& spec, const std::vecto
       log_all += log(length(m));  // area factor, up to a constant
     }
   }
+  const auto number = [&](int m, const char* quantity, int c = 0) {
+    return dofs[layout.number(m, scene.materials[m].find(quantity) + c)];
+  };
   PathValue<T> result;
   // Index of the medium from vertex k to the next, told by the ends' sides, the one before first.
   const auto index = [&](int k) {
@@ -76,8 +79,7 @@ PathValue<T> evaluate(const Scene& scene, const PathSpec& spec, const std::vecto
       if (end == 0) continue;
       const int material = scene.shapes[scene.triangles[spec.triangle[end - 1]].shape].material;
       const T height = dot(n[end], x[end == k ? k + 1 : k] - x[end]);
-      if (scene.materials[material].type == MaterialType::rough_dielectric && height < T(0.0))
-        return dofs[layout.ior(material)];
+      if (scene.materials[material].bsdf().transparent() && height < T(0.0)) return number(material, "ior");
     }
     return T(1.0);
   };
@@ -88,14 +90,22 @@ PathValue<T> evaluate(const Scene& scene, const PathSpec& spec, const std::vecto
     result.length += index(k) * length(d);
     log_all += log(abs(dot(n[k], w_i)) * abs(dot(n[k + 1], w_i)) / dot(d, d));
     const int material = scene.shapes[scene.triangles[spec.triangle[k - 1]].shape].material;
-    if (scene.materials[material].type == MaterialType::rough_conductor) {
-      const Vec3T<T> facing = dot(n[k], w_o) < T(0.0) ? -n[k] : n[k];
-      log_all += log(ggx(dofs[layout.roughness(material)], facing, w_i, w_o));
+    const std::string kind = scene.materials[material].kind();
+    const Vec3T<T> facing = dot(n[k], w_o) < T(0.0) ? -n[k] : n[k];
+    for (int c = 0; c < 3; ++c) {
+      T f(0.0);
+      if (kind == "diffuse") f = number(material, "albedo", c);
+      if (kind == "rough_conductor")
+        f = number(material, "reflectance", c) * ggx(number(material, "roughness"), facing, w_i, w_o);
+      if (kind == "retroreflecting")
+        f = number(material, "albedo", c) / kPi +
+            number(material, "reflectance", c) *
+                ggx(number(material, "roughness"), facing, w_i, facing * (dot(facing, w_o) * 2.0) - w_o);
+      if (kind == "rough_dielectric")
+        f = textbook::walter(dot(n[k], w_i), dot(n[k], w_o), dot(w_i, w_o), number(material, "roughness"),
+                             number(material, "ior"));
+      result.log_f[c] += log(f);
     }
-    if (scene.materials[material].type == MaterialType::rough_dielectric)
-      log_all += log(textbook::walter(dot(n[k], w_i), dot(n[k], w_o), dot(w_i, w_o), dofs[layout.roughness(material)],
-                                      dofs[layout.ior(material)]));
-    for (int c = 0; c < 3; ++c) result.log_f[c] += log(dofs[layout.albedo(material, c)]);
   }
   const int emitter = scene.triangles[spec.triangle.back()].shape;
   for (int c = 0; c < 3; ++c) result.log_f[c] += log_all + log(dofs[layout.emission(emitter, c)]);
@@ -107,11 +117,8 @@ std::vector<double> all_dofs(const Scene& scene) {
   std::vector<double> dofs(layout.size(), 0.0);
   for (int v = 0; v < layout.vertices; ++v)
     for (int axis = 0; axis < 3; ++axis) dofs[layout.vertex(v, axis)] = scene.positions[v][axis];
-  for (int m = 0; m < layout.materials; ++m) {
-    for (int c = 0; c < 3; ++c) dofs[layout.albedo(m, c)] = scene.materials[m].albedo[c];
-    dofs[layout.roughness(m)] = scene.materials[m].roughness;
-    dofs[layout.ior(m)] = scene.materials[m].ior;
-  }
+  for (int m = 0; m < layout.materials(); ++m)
+    for (int k = 0; k < layout.numbers(m); ++k) dofs[layout.number(m, k)] = scene.materials[m].number(k);
   for (int s = 0; s < layout.shapes; ++s)
     for (int c = 0; c < 3; ++c) dofs[layout.emission(s, c)] = scene.shapes[s].emission[c];
   return dofs;
@@ -159,7 +166,8 @@ Gradients by_hand(const PreparedScene& scene, const PathSpec& spec, bool length_
   for (const VertexGradient& v : raw.vertices)
     for (int axis = 0; axis < 3; ++axis) {
       const int dof = scene.layout.vertex(v.vertex, axis);
-      for (auto& g : result.log_f) g[dof] += v.log_f[axis];
+      for (int c = 0; c < 3; ++c)
+        if (v.channel < 0 || v.channel == c) result.log_f[c][dof] += v.log_f[axis];
       result.length[dof] += v.length[axis];
     }
   for (const ScalarGradient& s : raw.scalars) {
@@ -196,9 +204,13 @@ class Numbers {
     return {a / sum, b / sum, c / sum};
   }
   Material material() {
-    const Rgb albedo = colour();
+    const Rgb albedo = colour(), reflectance = colour();
     const double roughness = in(0.1, 0.9);
-    return coin() ? diffuse(albedo, coin()) : conductor(albedo, roughness, coin());
+    const int kind = below(3);
+    const bool two_sided = coin();
+    return kind == 0   ? diffuse(albedo, two_sided)
+           : kind == 1 ? conductor(reflectance, roughness, two_sided)
+                       : retroreflector(albedo, reflectance, roughness, two_sided);
   }
 
  private:
@@ -234,7 +246,7 @@ void random_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
     do {
       n = normalize(numbers.vector());
     } while (!(dot(n, w_o) > 0.15 && dot(n, w_i) > 0.15));
-    if (k < count && material.two_sided && numbers.coin()) n = -n;
+    if (k < count && material.bsdf().two_sided() && numbers.coin()) n = -n;
     const auto b = numbers.barycentrics();
     const Rgb emission = k == count ? numbers.colour() * 7.0 : Rgb();
     add_shape(scene, std::to_string(k), triangle_about(x[k], n, b, numbers), material, emission);
@@ -253,17 +265,14 @@ void glass_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
   for (int k = 1; k <= count; ++k) {
     const Vec3 w_o = normalize(x[k - 1] - x[k]), w_i = k < count ? normalize(x[k + 1] - x[k]) : w_o;
     Material material = numbers.material();
-    if (k < count) {
-      material.type = MaterialType::rough_dielectric;
-      material.ior = numbers.coin() ? numbers.in(1.3, 2.5) : numbers.in(0.4, 0.8);
-      material.two_sided = false;
-    }
+    if (k < count) material = glass(numbers.in(0.1, 0.9), numbers.coin() ? numbers.in(1.3, 2.5) : numbers.in(0.4, 0.8));
     Vec3 n;
     double c_i, c_o;
     do {
       n = normalize(numbers.vector());
       c_i = dot(n, w_i), c_o = dot(n, w_o);
-    } while (!(std::abs(c_i) > 0.1 && std::abs(c_o) > 0.1 && lobe(material, c_i, c_o, dot(w_i, w_o)) > 1e-3));
+    } while (!(std::abs(c_i) > 0.1 && std::abs(c_o) > 0.1 &&
+               material.bsdf().value({n, w_i, w_o, c_i, c_o, dot(w_i, w_o)}).r > 1e-3));
     const auto b = numbers.barycentrics();
     const Rgb emission = k == count ? numbers.colour() * 7.0 : Rgb();
     add_shape(scene, std::to_string(k), triangle_about(x[k], n, b, numbers), material, emission);
@@ -281,7 +290,7 @@ void book_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
   mesh.faces = {{0, 1, 2}, {1, 0, 3}};
   for (auto& f : mesh.faces) std::swap(f[1], f[2]);
   Material material = numbers.material();
-  material.two_sided = true;
+  material.bsdf().set_two_sided(true);
   add_shape(scene, "book", mesh, material, numbers.colour());
   for (int k = 0; k < count; ++k) {
     spec.triangle.push_back(k % 2);
@@ -319,7 +328,7 @@ TEST_P(PathDifferential, AgreesWithJets) {
       const TangentBasis basis = free_dofs(scene, every_dof(scene));
       const PreparedScene prepared(scene, &basis);
       for (int k = 0; k + 1 < count; ++k) {
-        rough += prepared.material_of(spec.triangle[k]).type != MaterialType::diffuse;
+        rough += prepared.bsdf_of(spec.triangle[k]).depends_on_directions();
         if (k == 0) from_behind += dot(prepared.normal(spec.triangle[0]), spec.ray) > 0;
       }
 
@@ -355,8 +364,10 @@ TEST_P(PathDifferential, LeavesOutWhatIsStatic) {
         moves[dof] = same_vertex ? moves[dof - 1] : numbers.below(3) == 0;
       }
       // The channels of a colour move as one.
-      for (int m = 0; m < layout.materials; ++m)
-        for (int c = 1; c < 3; ++c) moves[layout.albedo(m, c)] = moves[layout.albedo(m, 0)];
+      for (int m = 0; m < layout.materials(); ++m)
+        for (const char* colour : {"albedo", "reflectance"})
+          if (const int k = scene.materials[m].find(colour); k >= 0)
+            for (int c = 1; c < 3; ++c) moves[layout.number(m, k + c)] = moves[layout.number(m, k)];
       for (int s = 0; s < layout.shapes; ++s)
         for (int c = 1; c < 3; ++c) moves[layout.emission(s, c)] = moves[layout.emission(s, 0)];
       for (int dof = 0; dof < layout.size(); ++dof)

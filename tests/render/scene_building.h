@@ -11,18 +11,41 @@
 namespace isochron::testing {
 
 inline Material diffuse(const Rgb& albedo, bool two_sided = false) {
-  Material m;
-  m.type = MaterialType::diffuse;
-  m.albedo = albedo;
-  m.two_sided = two_sided;
+  Material m("diffuse");
+  m.set("albedo", albedo);
+  m.bsdf().set_two_sided(two_sided);
   return m;
 }
 
 inline Material conductor(const Rgb& reflectance, double roughness, bool two_sided = false) {
-  Material m = diffuse(reflectance, two_sided);
-  m.type = MaterialType::rough_conductor;
-  m.roughness = roughness;
+  Material m("rough_conductor");
+  m.set("reflectance", reflectance);
+  m.set("roughness", roughness);
+  m.bsdf().set_two_sided(two_sided);
   return m;
+}
+
+inline Material retroreflector(const Rgb& albedo, const Rgb& reflectance, double roughness, bool two_sided = false) {
+  Material m("retroreflecting");
+  m.set("albedo", albedo);
+  m.set("reflectance", reflectance);
+  m.set("roughness", roughness);
+  m.bsdf().set_two_sided(two_sided);
+  return m;
+}
+
+inline Material glass(double roughness, double ior) {
+  Material m("rough_dielectric");
+  m.set("roughness", roughness);
+  m.set("ior", ior);
+  return m;
+}
+
+/// Another material in place of the one of this name.
+inline void replace_material(Scene& scene, const std::string& name, Material material) {
+  Material& old = scene.materials[scene.find_material(name)];
+  material.name = name;
+  old = std::move(material);
 }
 
 /// Adds a mesh as it is (no welding) with a material of its own, both called `name`. Returns the shape's

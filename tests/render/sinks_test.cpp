@@ -14,14 +14,11 @@ namespace {
 Scene make_scene(bool grey) {
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   scene.camera.width = scene.camera.height = 8;
-  Material& panel = scene.materials[scene.find_material("panel")];
-  panel.type = MaterialType::rough_conductor;
-  panel.roughness = 0.35;
   scene.grey = grey;
+  replace_material(scene, "panel", conductor(grey ? Rgb(0.7) : Rgb{0.8, 0.6, 0.3}, 0.35, true));
   if (!grey) {
-    panel.albedo = {0.8, 0.6, 0.3};
-    scene.materials[scene.find_material("grey")].albedo = {0.5, 0.2, 0.7};
-    scene.materials[scene.find_material("block")].albedo = {0.3, 0.6, 0.9};
+    replace_material(scene, "grey", diffuse({0.5, 0.2, 0.7}));
+    replace_material(scene, "block", retroreflector({0.3, 0.1, 0.4}, {0.1, 0.5, 0.3}, 0.4));
     scene.shapes[scene.find_shape("light")].emission = {15, 12, 4};
   }
   return scene;
@@ -34,8 +31,8 @@ std::vector<Motion> all_motions(const Scene& scene) {
           rotate_y(scene, "block", {-0.2, 0, 0.1}),
           translate(scene, "panel", {0.2, 1, -0.5}, [corner](const Vec3& p) { return p == corner; }),
           translate(scene, "light", {0, 0, 1}),
-          change_albedo(scene, "grey"),
-          change_roughness(scene, "panel"),
+          change_material(scene, "grey", "albedo"),
+          change_material(scene, "panel", "roughness"),
           change_emission(scene, "light")};
 }
 

@@ -8,6 +8,7 @@
 #include "core/render/renderer.h"
 #include "core/scene/scene_loader.h"
 #include "core/techniques/boundary_guide.h"
+#include "tests/render/scene_building.h"
 
 namespace isochron::testing {
 
@@ -55,29 +56,17 @@ inline Motion rotate_y(const Scene& scene, const std::string& shape, const Vec3&
       });
 }
 
-inline Motion change_albedo(const Scene& scene, const std::string& material) {
+/// All values of a quantity of a material alike.
+inline Motion change_material(const Scene& scene, const std::string& material, const std::string& quantity) {
   const int m = scene.find_material(material);
+  Quantity found;
+  const int first = scene.materials[m].find(quantity, &found), count = static_cast<int>(found.values.size());
   return {[=](Scene& target, double t) {
-            for (int c = 0; c < 3; ++c) target.materials[m].albedo[c] += t;
+            Material& changed = target.materials[m];
+            for (int k = first; k < first + count; ++k) changed.set_number(k, changed.number(k) + t);
           },
           [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
-            for (int c = 0; c < 3; ++c) out.emplace_back(DofLayout(source).albedo(m, c), 1.0);
-          }};
-}
-
-inline Motion change_roughness(const Scene& scene, const std::string& material) {
-  const int m = scene.find_material(material);
-  return {[=](Scene& target, double t) { target.materials[m].roughness += t; },
-          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
-            out.emplace_back(DofLayout(source).roughness(m), 1.0);
-          }};
-}
-
-inline Motion change_ior(const Scene& scene, const std::string& material) {
-  const int m = scene.find_material(material);
-  return {[=](Scene& target, double t) { target.materials[m].ior += t; },
-          [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
-            out.emplace_back(DofLayout(source).ior(m), 1.0);
+            for (int k = first; k < first + count; ++k) out.emplace_back(DofLayout(source).number(m, k), 1.0);
           }};
 }
 

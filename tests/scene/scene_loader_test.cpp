@@ -26,6 +26,11 @@ shapes:
 constexpr char kQuad[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 constexpr char kTriangle[] = "OFF\n3 1 0\n0 0 2\n1 0 2\n0 1 2\n3 0 1 2\n";
 
+/// The first number of a quantity.
+double number(const Material& material, const char* quantity) {
+  return material.number(material.find(quantity));
+}
+
 class SceneLoader : public testing::Test {
  protected:
   SceneLoader() {
@@ -65,13 +70,14 @@ TEST_F(SceneLoader, LoadsEverything) {
   EXPECT_EQ(scene.find_material("white"), 0);
   EXPECT_EQ(scene.find_material("metal"), 1);
   EXPECT_EQ(scene.find_material("gold"), -1);
-  EXPECT_EQ(scene.materials[0].type, MaterialType::diffuse);
-  EXPECT_EQ(scene.materials[0].albedo, Rgb(0.6));
-  EXPECT_FALSE(scene.materials[0].two_sided);
-  EXPECT_EQ(scene.materials[1].type, MaterialType::rough_conductor);
-  EXPECT_EQ(scene.materials[1].albedo, Rgb(0.9));
-  EXPECT_EQ(scene.materials[1].roughness, 0.2);
-  EXPECT_TRUE(scene.materials[1].two_sided);
+  EXPECT_STREQ(scene.materials[0].kind(), "diffuse");
+  EXPECT_EQ(number(scene.materials[0], "albedo"), 0.6);
+  EXPECT_FALSE(scene.materials[0].bsdf().two_sided());
+  EXPECT_STREQ(scene.materials[1].kind(), "rough_conductor");
+  EXPECT_EQ(number(scene.materials[1], "reflectance"), 0.9);
+  EXPECT_EQ(number(scene.materials[1], "albedo"), 0.9) << "its other name";
+  EXPECT_EQ(number(scene.materials[1], "roughness"), 0.2);
+  EXPECT_TRUE(scene.materials[1].bsdf().two_sided());
   EXPECT_TRUE(scene.grey);
 
   ASSERT_EQ(scene.shapes.size(), 2u);
@@ -121,19 +127,35 @@ TEST_F(SceneLoader, Glass) {
     return white + "\n  glass: {type: rough_dielectric, " + keys + "}";
   };
   const Material m = load_scene(with(white, glass("roughness: 0.1, ior: 1.4"))).materials[1];
-  EXPECT_EQ(m.type, MaterialType::rough_dielectric);
-  EXPECT_EQ(m.roughness, 0.1);
-  EXPECT_EQ(m.ior, 1.4);
-  EXPECT_EQ(m.albedo, Rgb(1));
+  EXPECT_STREQ(m.kind(), "rough_dielectric");
+  EXPECT_EQ(number(m, "roughness"), 0.1);
+  EXPECT_EQ(number(m, "ior"), 1.4);
   EXPECT_EQ(error(white, glass("roughness: 0.1")), "scene.yaml:9:10: materials.glass.ior: is missing");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1")),
             "scene.yaml:9:56: materials.glass.ior: 1 is no boundary (a number above 0 other than 1)");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: -1.5")),
             "scene.yaml:9:56: materials.glass.ior: -1.5 is out of range (a number above 0)");
+  EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
+            "scene.yaml:9:61: materials.glass.two_sided: belongs to diffuse, rough_conductor and retroreflecting, not "
+            "to rough_dielectric "
+            "(allowed: type, roughness, ior)");
+}
+
+TEST_F(SceneLoader, Retroreflector) {
+  const std::string white = "white: {type: diffuse, albedo: 0.6}";
+  const auto sign = [&](const std::string& keys) { return "white: {type: retroreflecting, " + keys + "}"; };
+  const Scene scene = load_scene(with(white, sign("albedo: 0.2, reflectance: [0.8, 0.1, 0], roughness: 0.1")));
+  EXPECT_FALSE(scene.grey);
+  const Material& m = scene.materials[0];
+  EXPECT_STREQ(m.kind(), "retroreflecting");
+  EXPECT_EQ(number(m, "albedo"), 0.2);
+  EXPECT_EQ(number(m, "reflectance"), 0.8);
+  EXPECT_EQ(m.number(m.find("reflectance") + 1), 0.1);
+  EXPECT_EQ(number(m, "roughness"), 0.1);
   EXPECT_EQ(
-      error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
-      "scene.yaml:9:61: materials.glass.two_sided: belongs to diffuse and rough_conductor, not to rough_dielectric "
-      "(allowed: type, roughness, ior)");
+      error(white, sign("albedo: 0.3, reflectance: 0.8, roughness: 0.1")),
+      "scene.yaml:8:60: materials.white.reflectance: albedo and reflectance make more than 1 together (a sum of at "
+      "most 1)");
 }
 
 TEST_F(SceneLoader, GlassIsSolid) {
@@ -154,11 +176,11 @@ TEST_F(SceneLoader, GlassIsSolid) {
   EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n"), "no error");
   EXPECT_EQ(
       message("3 0 2 1\n3 0 1 3\n3 0 3 2\n"),
-      "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; this one ends at the "
+      "scene.yaml:11:23: shapes[0].file: gem.off: a transparent material needs a closed surface; this one ends at the "
       "edge from (1, 0, 0) to (0, 1, 0)");
   EXPECT_EQ(
       message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 3 2\n"),
-      "scene.yaml:11:23: shapes[0].file: gem.off: a rough_dielectric needs a closed surface; the faces of this one "
+      "scene.yaml:11:23: shapes[0].file: gem.off: a transparent material needs a closed surface; the faces of this one "
       "disagree about its outside at the edge from (1, 0, 0) to (0, 1, 0)");
   EXPECT_EQ(message("3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n", ", emission: 1"),
             "scene.yaml:11:59: shapes[0].emission: a shape of rough_dielectric emits nothing (leave it out)");
@@ -265,11 +287,11 @@ TEST_F(SceneLoader, MaterialErrors) {
             "scene.yaml:9:79: materials.metal.two_sided: '1' is neither (true or false)");
   EXPECT_EQ(error("type: diffuse", "type: difuse"),
             "scene.yaml:8:17: materials.white.type: 'difuse' is not known, did you mean 'diffuse'? "
-            "(allowed: diffuse, rough_conductor, rough_dielectric)");
-  EXPECT_EQ(
-      error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
-      "scene.yaml:8:39: materials.white.roughness: belongs to rough_conductor and rough_dielectric, not to diffuse "
-      "(allowed: type, albedo, two_sided)");
+            "(allowed: diffuse, rough_conductor, rough_dielectric, retroreflecting)");
+  EXPECT_EQ(error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
+            "scene.yaml:8:39: materials.white.roughness: belongs to rough_conductor, rough_dielectric and "
+            "retroreflecting, not to diffuse "
+            "(allowed: type, albedo, two_sided)");
   EXPECT_EQ(error("  metal:", "  white:"), "scene.yaml:9:3: materials.white: stands here twice, first on line 8");
 }
 

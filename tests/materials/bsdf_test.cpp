@@ -1,4 +1,4 @@
-// Values and derivatives of the lobes against the textbook formulas on dual numbers in extended precision.
+// Values and derivatives of materials against the textbook formulas on dual numbers in extended precision.
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
@@ -7,18 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/scene/materials/material.h"
+#include "tests/materials/cosines.h"
 
 namespace isochron {
 namespace {
 
-Material conductor(double alpha, bool two_sided = false) {
-  Material m;
-  m.type = MaterialType::rough_conductor;
-  m.roughness = alpha;
-  m.two_sided = two_sided;
-  return m;
-}
+using namespace testing;
 
 template <class T>
 T smith_lambda(const T& cosine, const T& alpha) {
@@ -28,7 +22,7 @@ T smith_lambda(const T& cosine, const T& alpha) {
 
 /// D G2 / (4 cos_i cos_o), term by term as in Heitz 2014.
 template <class T>
-T textbook_lobe(const T& cos_i, const T& cos_o, const T& cos_io, const T& alpha) {
+T textbook(const T& cos_i, const T& cos_o, const T& cos_io, const T& alpha) {
   const T cos_h = (cos_i + cos_o) / sqrt(T(2) + T(2) * cos_io);
   const T tan2_h = (T(1) - cos_h * cos_h) / (cos_h * cos_h);
   const T factor = T(1) + tan2_h / (alpha * alpha);
@@ -49,8 +43,8 @@ Cosines cosines(double theta_i, double theta_o, double phi) {
 
 void expect_matches_textbook(const Cosines& c, double alpha) {
   using Jet = ceres::Jet<long double, 4>;
-  const Jet expected = log(textbook_lobe(Jet(c.i, 0), Jet(c.o, 1), Jet(c.io, 2), Jet(alpha, 3)));
-  const LobeDerivative got = lobe_derivative(conductor(alpha), c.i, c.o, c.io);
+  const Jet expected = log(textbook(Jet(c.i, 0), Jet(c.o, 1), Jet(c.io, 2), Jet(alpha, 3)));
+  const CosineDerivative got = derivative(white_conductor(alpha), c.i, c.o, c.io);
 
   // q - p^2 is rounded to a few ulp of q, and the lobe divides by q - p^2 + alpha^2 p^2: that is its
   // condition.
@@ -58,8 +52,8 @@ void expect_matches_textbook(const Cosines& c, double alpha) {
   const long double t = q - (1 - static_cast<long double>(alpha) * alpha) * p * p;
   const double tolerance = 16 * std::numeric_limits<double>::epsilon() * static_cast<double>(1 + 2 / t);
   EXPECT_NEAR(std::log(got.value), static_cast<double>(expected.a), tolerance) << alpha;
-  EXPECT_NEAR(got.value / lobe(conductor(alpha), c.i, c.o, c.io), 1, tolerance);
-  const double d[4] = {got.d_cos_i, got.d_cos_o, got.d_cos_io, got.d_roughness};
+  EXPECT_NEAR(got.value / value(white_conductor(alpha), c.i, c.o, c.io), 1, tolerance);
+  const double d[4] = {got.by_cos_i, got.by_cos_o, got.by_cos_io, got.by_roughness};
   double scale = 0;
   for (int k = 0; k < 4; ++k) scale = std::max(scale, std::abs(static_cast<double>(expected.v[k])));
   // The textbook's own 1 / cos cancels at grazing, down to an ulp of the extended type.
@@ -70,7 +64,7 @@ void expect_matches_textbook(const Cosines& c, double alpha) {
   }
 }
 
-TEST(LobeDerivative, MatchesDualNumbers) {
+TEST(BsdfDerivative, MatchesDualNumbers) {
   std::mt19937 generator(3);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int k = 0; k < 2000; ++k) {
@@ -80,7 +74,7 @@ TEST(LobeDerivative, MatchesDualNumbers) {
   }
 }
 
-TEST(LobeDerivative, MatchesDualNumbersNearTheMirrorDirection) {
+TEST(BsdfDerivative, MatchesDualNumbersNearTheMirrorDirection) {
   for (const double alpha : {0.01, 0.05, 0.3}) {
     for (const double theta : {0.1, 0.8, 1.3, 1.5}) {
       for (const double off : {1e-6, 1e-4, 1e-2}) {
@@ -91,7 +85,7 @@ TEST(LobeDerivative, MatchesDualNumbersNearTheMirrorDirection) {
   }
 }
 
-TEST(LobeDerivative, MatchesDualNumbersAtGrazing) {
+TEST(BsdfDerivative, MatchesDualNumbersAtGrazing) {
   constexpr double kHalfPi = 1.5707963267948966;
   for (const double alpha : {0.01, 0.1, 1.0}) {
     for (const double grazing : {1e-2, 1e-4, 1e-6}) {
@@ -102,89 +96,89 @@ TEST(LobeDerivative, MatchesDualNumbersAtGrazing) {
   }
 }
 
-TEST(LobeDerivative, MatchesDifferencesOfLobe) {
+TEST(BsdfDerivative, MatchesDifferencesOfValue) {
   const double alpha = 0.3, h = 1e-6;
   const Cosines c = cosines(0.9, 0.5, 2.5);
   const auto ln = [&](double di, double d_o, double dio, double da) {
-    return std::log(lobe(conductor(alpha + da), c.i + di, c.o + d_o, c.io + dio));
+    return std::log(value(white_conductor(alpha + da), c.i + di, c.o + d_o, c.io + dio));
   };
-  const LobeDerivative d = lobe_derivative(conductor(alpha), c.i, c.o, c.io);
-  EXPECT_NEAR(d.d_cos_i, (ln(h, 0, 0, 0) - ln(-h, 0, 0, 0)) / (2 * h), 1e-7);
-  EXPECT_NEAR(d.d_cos_o, (ln(0, h, 0, 0) - ln(0, -h, 0, 0)) / (2 * h), 1e-7);
-  EXPECT_NEAR(d.d_cos_io, (ln(0, 0, h, 0) - ln(0, 0, -h, 0)) / (2 * h), 1e-7);
-  EXPECT_NEAR(d.d_roughness, (ln(0, 0, 0, h) - ln(0, 0, 0, -h)) / (2 * h), 1e-7);
+  const CosineDerivative d = derivative(white_conductor(alpha), c.i, c.o, c.io);
+  EXPECT_NEAR(d.by_cos_i, (ln(h, 0, 0, 0) - ln(-h, 0, 0, 0)) / (2 * h), 1e-7);
+  EXPECT_NEAR(d.by_cos_o, (ln(0, h, 0, 0) - ln(0, -h, 0, 0)) / (2 * h), 1e-7);
+  EXPECT_NEAR(d.by_cos_io, (ln(0, 0, h, 0) - ln(0, 0, -h, 0)) / (2 * h), 1e-7);
+  EXPECT_NEAR(d.by_roughness, (ln(0, 0, 0, h) - ln(0, 0, 0, -h)) / (2 * h), 1e-7);
 }
 
-TEST(Lobe, PeakInClosedForm) {
+TEST(Bsdf, PeakInClosedForm) {
   for (const double alpha : {0.01, 0.2, 1.0}) {
     // Normal incidence: D = 1 / (pi alpha^2), G2 = 1.
-    EXPECT_DOUBLE_EQ(lobe(conductor(alpha), 1, 1, 1), 1 / (4 * kPi * alpha * alpha));
+    EXPECT_DOUBLE_EQ(value(white_conductor(alpha), 1, 1, 1), 1 / (4 * kPi * alpha * alpha));
   }
   // alpha = 1: D = 1 / pi for every h and Lambda = (1 / cos - 1) / 2, so lobe = 1 / (2 pi (cos_i + cos_o)).
-  EXPECT_NEAR(lobe(conductor(1), 0.3, 0.8, 0.5), 1 / (2 * kPi * 1.1), 1e-15);
+  EXPECT_NEAR(value(white_conductor(1), 0.3, 0.8, 0.5), 1 / (2 * kPi * 1.1), 1e-15);
 }
 
-TEST(Lobe, Diffuse) {
-  const Material m;
-  EXPECT_EQ(lobe(m, 0.2, 0.9, 0.1), kInvPi);
-  const LobeDerivative d = lobe_derivative(m, 0.2, 0.9, 0.1);
+TEST(Bsdf, Diffuse) {
+  const Material m = white_diffuse();
+  EXPECT_EQ(value(m, 0.2, 0.9, 0.1), kInvPi);
+  const CosineDerivative d = derivative(m, 0.2, 0.9, 0.1);
   EXPECT_EQ(d.value, kInvPi);
-  EXPECT_EQ(d.d_cos_i, 0);
-  EXPECT_EQ(d.d_cos_o, 0);
-  EXPECT_EQ(d.d_cos_io, 0);
-  EXPECT_EQ(d.d_roughness, 0);
+  EXPECT_EQ(d.by_cos_i, 0);
+  EXPECT_EQ(d.by_cos_o, 0);
+  EXPECT_EQ(d.by_cos_io, 0);
+  EXPECT_EQ(d.by_roughness, 0);
 }
 
-TEST(Lobe, Reciprocal) {
+TEST(Bsdf, Reciprocal) {
   const Cosines c = cosines(1.2, 0.3, 2.0);
   for (const double alpha : {0.02, 0.5}) {
-    EXPECT_DOUBLE_EQ(lobe(conductor(alpha), c.i, c.o, c.io), lobe(conductor(alpha), c.o, c.i, c.io));
+    EXPECT_DOUBLE_EQ(value(white_conductor(alpha), c.i, c.o, c.io), value(white_conductor(alpha), c.o, c.i, c.io));
   }
 }
 
-TEST(Lobe, NothingBelowTheSurface) {
-  for (Material m : {Material{}, conductor(0.3)}) {
+TEST(Bsdf, NothingBelowTheSurface) {
+  for (Material m : {white_diffuse(), white_conductor(0.3)}) {
     for (const bool two_sided : {false, true}) {
-      m.two_sided = two_sided;
+      m.bsdf().set_two_sided(two_sided);
       for (const auto& [i, o] : std::vector<std::pair<double, double>>{{-0.5, 0.5}, {0.5, -0.5}, {0, 0.5}, {0.5, 0}}) {
-        EXPECT_EQ(lobe(m, i, o, 0.1), 0);
-        EXPECT_EQ(direction_pdf(m, i, o, 0.1), 0);
-        const LobeDerivative d = lobe_derivative(m, i, o, 0.1);
+        EXPECT_EQ(value(m, i, o, 0.1), 0);
+        EXPECT_EQ(pdf(m, i, o, 0.1), 0);
+        const CosineDerivative d = derivative(m, i, o, 0.1);
         EXPECT_EQ(d.value, 0);
-        EXPECT_EQ(d.d_cos_i, 0);
-        EXPECT_EQ(d.d_roughness, 0);
+        EXPECT_EQ(d.by_cos_i, 0);
+        EXPECT_EQ(d.by_roughness, 0);
       }
     }
-    m.two_sided = false;
-    EXPECT_EQ(lobe(m, -0.5, -0.5, 0.6), 0);
-    EXPECT_EQ(direction_pdf(m, -0.5, -0.5, 0.6), 0);
-    EXPECT_EQ(lobe_derivative(m, -0.5, -0.5, 0.6).value, 0);
+    m.bsdf().set_two_sided(false);
+    EXPECT_EQ(value(m, -0.5, -0.5, 0.6), 0);
+    EXPECT_EQ(pdf(m, -0.5, -0.5, 0.6), 0);
+    EXPECT_EQ(derivative(m, -0.5, -0.5, 0.6).value, 0);
   }
 }
 
 // Opposite directions graze each other through the surface: no half vector, no lobe, and no NaN.
-TEST(Lobe, OppositeDirections) {
-  EXPECT_EQ(lobe(conductor(0.1), 1e-20, 1e-20, -1), 0);
-  EXPECT_EQ(direction_pdf(conductor(0.1), 1e-20, 1e-20, -1), 0);
-  EXPECT_EQ(lobe_derivative(conductor(0.1), 1e-20, 1e-20, -1).d_cos_io, 0);
+TEST(Bsdf, OppositeDirections) {
+  EXPECT_EQ(value(white_conductor(0.1), 1e-20, 1e-20, -1), 0);
+  EXPECT_EQ(pdf(white_conductor(0.1), 1e-20, 1e-20, -1), 0);
+  EXPECT_EQ(derivative(white_conductor(0.1), 1e-20, 1e-20, -1).by_cos_io, 0);
 }
 
-TEST(Lobe, TwoSidedMirrorsValueAndDerivative) {
-  const Material m = conductor(0.25, true);
+TEST(Bsdf, TwoSidedMirrorsValueAndDerivative) {
+  const Material m = white_conductor(0.25, true);
   const Cosines c = cosines(0.8, 0.5, 2.8);
-  const LobeDerivative front = lobe_derivative(m, c.i, c.o, c.io), back = lobe_derivative(m, -c.i, -c.o, c.io);
+  const CosineDerivative front = derivative(m, c.i, c.o, c.io), back = derivative(m, -c.i, -c.o, c.io);
   EXPECT_GT(front.value, 0);
   EXPECT_EQ(back.value, front.value);
-  EXPECT_EQ(back.d_cos_i, -front.d_cos_i);
-  EXPECT_EQ(back.d_cos_o, -front.d_cos_o);
-  EXPECT_EQ(back.d_cos_io, front.d_cos_io);
-  EXPECT_EQ(back.d_roughness, front.d_roughness);
-  EXPECT_EQ(lobe(m, -c.i, -c.o, c.io), lobe(m, c.i, c.o, c.io));
-  EXPECT_EQ(direction_pdf(m, -c.i, -c.o, c.io), direction_pdf(m, c.i, c.o, c.io));
+  EXPECT_EQ(back.by_cos_i, -front.by_cos_i);
+  EXPECT_EQ(back.by_cos_o, -front.by_cos_o);
+  EXPECT_EQ(back.by_cos_io, front.by_cos_io);
+  EXPECT_EQ(back.by_roughness, front.by_roughness);
+  EXPECT_EQ(value(m, -c.i, -c.o, c.io), value(m, c.i, c.o, c.io));
+  EXPECT_EQ(pdf(m, -c.i, -c.o, c.io), pdf(m, c.i, c.o, c.io));
   // The sign, by differences of the lobe behind the surface.
   const double h = 1e-6;
-  const double by_i = std::log(lobe(m, -c.i + h, -c.o, c.io) / lobe(m, -c.i - h, -c.o, c.io)) / (2 * h);
-  EXPECT_NEAR(back.d_cos_i, by_i, 1e-7 * std::abs(by_i));
+  const double by_i = std::log(value(m, -c.i + h, -c.o, c.io) / value(m, -c.i - h, -c.o, c.io)) / (2 * h);
+  EXPECT_NEAR(back.by_cos_i, by_i, 1e-7 * std::abs(by_i));
 }
 
 }  // namespace
