@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/parallel.h"
+#include "core/geometry/bounds.h"
 
 namespace isochron {
 namespace {
@@ -12,6 +13,7 @@ namespace {
 struct EdgeHit {
   std::array<int, 2> triangle;
   Vec3 point;
+  int edge;
 };
 
 bool has_vertex(const Scene& scene, int triangle, int vertex) {
@@ -20,7 +22,8 @@ bool has_vertex(const Scene& scene, int triangle, int vertex) {
 }
 
 /// Goes along the edge from triangle to triangle.
-void find_edge_hits(const Scene& scene, const RayCaster& caster, const Edge& edge, std::vector<EdgeHit>& hits) {
+void find_edge_hits(const Scene& scene, const RayCaster& caster, int number, std::vector<EdgeHit>& hits) {
+  const Edge& edge = scene.edges[number];
   const Vec3 from = scene.positions[edge.vertex[0]], to = scene.positions[edge.vertex[1]];
   const double offset = caster.offset(), end = length(to - from) - offset;
   if (!(end > offset)) return;
@@ -41,25 +44,29 @@ void find_edge_hits(const Scene& scene, const RayCaster& caster, const Edge& edg
     if (!(distance < end)) return;
     if (!has_vertex(scene, t, edge.vertex[0]) && !has_vertex(scene, t, edge.vertex[1]))
       for (const int face : edge.face)
-        if (face >= 0) hits.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance});
+        if (face >= 0) hits.push_back({{std::min(face, t), std::max(face, t)}, from + along * distance, number});
     passed = distance;
     step = offset;
   }
 }
 
-}  // namespace
-
-std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const RayCaster& caster) {
+/// Along all those edges that `wanted` says.
+template <class Wanted>
+std::vector<EdgeHit> find_hits(const Scene& scene, const RayCaster& caster, Wanted&& wanted) {
   constexpr std::size_t kChunk = 1024;
   const std::size_t edges = scene.edges.size(), chunks = (edges + kChunk - 1) / kChunk;
   std::vector<std::vector<EdgeHit>> found(chunks);
   parallel(static_cast<int>(chunks), [&](int chunk) {
     const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
     for (std::size_t e = begin; e < std::min(edges, begin + kChunk); ++e)
-      find_edge_hits(scene, caster, scene.edges[e], found[static_cast<std::size_t>(chunk)]);
+      if (wanted(e)) find_edge_hits(scene, caster, static_cast<int>(e), found[static_cast<std::size_t>(chunk)]);
   });
   std::vector<EdgeHit> hits;
   for (const auto& some : found) hits.insert(hits.end(), some.begin(), some.end());
+  return hits;
+}
+
+std::vector<MeshIntersection> join(const Scene& scene, const RayCaster& caster, std::vector<EdgeHit> hits) {
   std::stable_sort(hits.begin(), hits.end(),
                    [](const EdgeHit& a, const EdgeHit& b) { return a.triangle < b.triangle; });
 
@@ -78,6 +85,62 @@ std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const 
     if (length(segment.end[1] - segment.end[0]) > caster.offset()) intersections.push_back(segment);
   }
   return intersections;
+}
+
+/// What other shapes have near each shape: boxes of their triangles, joined where there are many.
+std::vector<std::vector<Bounds>> boxes_near_shapes(const Scene& scene, double margin) {
+  constexpr std::size_t kMostBoxes = 8;
+  std::vector<Bounds> bounds(scene.shapes.size());
+  for (std::size_t s = 0; s < bounds.size(); ++s)
+    for (int v = 0; v < scene.shapes[s].vertex_count; ++v)
+      bounds[s].add(scene.positions[scene.shapes[s].first_vertex + v]);
+  std::vector<std::vector<Bounds>> near(bounds.size());
+  for (std::size_t a = 0; a < bounds.size(); ++a)
+    for (std::size_t b = 0; b < bounds.size(); ++b) {
+      const Bounds of_a = bounds[a].grown(margin);
+      if (a == b || !of_a.overlaps(bounds[b])) continue;
+      std::vector<Bounds> boxes;
+      const Shape& other = scene.shapes[b];
+      for (int t = other.first_triangle; t < other.first_triangle + other.triangle_count; ++t) {
+        Bounds box;
+        for (const int v : scene.triangles[t].vertex) box.add(scene.positions[v]);
+        if (!of_a.overlaps(box)) continue;
+        if (boxes.size() < kMostBoxes)
+          boxes.push_back(box.grown(margin));
+        else
+          boxes.back().add(box.grown(margin));
+      }
+      near[a].insert(near[a].end(), boxes.begin(), boxes.end());
+    }
+  return near;
+}
+
+}  // namespace
+
+std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const RayCaster& caster) {
+  return join(scene, caster, find_hits(scene, caster, [](std::size_t) { return true; }));
+}
+
+CrossingEdges::CrossingEdges(const Scene& at_first) : through_own_shape_(at_first.edges.size(), 0) {
+  for (const Edge& edge : at_first.edges) shape_.push_back(at_first.triangles[edge.face[0]].shape);
+  const RayCaster caster(at_first);
+  for (const EdgeHit& hit : find_hits(at_first, caster, [](std::size_t) { return true; }))
+    if (at_first.triangles[hit.triangle[0]].shape == at_first.triangles[hit.triangle[1]].shape)
+      through_own_shape_[static_cast<std::size_t>(hit.edge)] = 1;
+}
+
+std::vector<MeshIntersection> CrossingEdges::find(const Scene& scene, const RayCaster& caster) const {
+  const auto near = boxes_near_shapes(scene, 2 * caster.offset());
+  const auto may_cross = [&](std::size_t e) {
+    const int shape = shape_[e];
+    if (through_own_shape_[e] || scene.shapes[shape].deforms) return true;
+    if (near[shape].empty()) return false;
+    Bounds box;
+    for (const int v : scene.edges[e].vertex) box.add(scene.positions[v]);
+    return std::any_of(near[shape].begin(), near[shape].end(),
+                       [&](const Bounds& other) { return other.overlaps(box); });
+  };
+  return join(scene, caster, find_hits(scene, caster, may_cross));
 }
 
 }  // namespace isochron

@@ -18,4 +18,17 @@ struct MeshIntersection {
 /// each of the scene's edges finds. What merely touches is not found.
 std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const RayCaster& caster);
 
+/// The same, again and again while vertices move, by the edges that may cross something: those near another shape, those of
+/// shapes that deform, and those that go through their own shape in the scene at first.
+class CrossingEdges {
+ public:
+  explicit CrossingEdges(const Scene& at_first);
+  /// `scene` has the topology of the one at first.
+  std::vector<MeshIntersection> find(const Scene& scene, const RayCaster& caster) const;
+
+ private:
+  std::vector<char> through_own_shape_;  ///< per edge
+  std::vector<int> shape_;               ///< per edge
+};
+
 }  // namespace isochron

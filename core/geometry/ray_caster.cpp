@@ -1,5 +1,6 @@
 #include "core/geometry/ray_caster.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -18,36 +19,80 @@ RTCDevice device() {
 
 }  // namespace
 
-RayCaster::RayCaster(const Scene& scene) {
+RayCaster::RayCaster(const Scene& scene, CasterUpdate update) : update_(update) {
+  set_offset(scene);
+  build(scene);
+}
+
+RayCaster::~RayCaster() {
+  rtcReleaseScene(scene_);
+}
+
+void RayCaster::set_offset(const Scene& scene) {
   double largest = 0;
   for (const Vec3& p : scene.positions) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   const Vec3& c = scene.camera.position;
   largest = std::max({largest, std::abs(c.x), std::abs(c.y), std::abs(c.z)});
   offset_ = largest * 0x1p-20;
+}
 
-  RTCGeometry mesh = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                               3 * sizeof(float), scene.positions.size()));
-  auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                 3 * sizeof(unsigned), scene.triangles.size()));
-  if (!vertices || !indices) throw std::runtime_error("Embree: out of memory for the scene's triangles");
-  for (std::size_t i = 0; i < scene.positions.size(); ++i)
-    for (int axis = 0; axis < 3; ++axis) vertices[3 * i + axis] = static_cast<float>(scene.positions[i][axis]);
-  for (std::size_t i = 0; i < scene.triangles.size(); ++i)
-    for (int corner = 0; corner < 3; ++corner)
-      indices[3 * i + corner] = static_cast<unsigned>(scene.triangles[i].vertex[corner]);
-  rtcCommitGeometry(mesh);
-
+void RayCaster::build(const Scene& scene) {
   scene_ = rtcNewScene(device());
-  rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
-  rtcAttachGeometry(scene_, mesh);
-  rtcReleaseGeometry(mesh);
+  first_.clear();
+  if (update_ == CasterUpdate::rebuild) {
+    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
+    attach(scene, 0, static_cast<int>(scene.positions.size()), 0, static_cast<int>(scene.triangles.size()));
+  } else {  // two levels, of which Embree makes only what has changed
+    rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC);
+    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_LOW);
+    for (const Shape& shape : scene.shapes)
+      attach(scene, shape.first_vertex, shape.vertex_count, shape.first_triangle, shape.triangle_count);
+  }
   rtcCommitScene(scene_);
 }
 
-RayCaster::~RayCaster() {
-  rtcReleaseScene(scene_);
+void RayCaster::attach(const Scene& scene, int first_vertex, int vertices, int first_triangle, int triangles) {
+  const auto count = [](int n) { return static_cast<std::size_t>(n); };
+  RTCGeometry mesh = rtcNewGeometry(device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* positions =
+      rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), count(vertices));
+  auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                                 3 * sizeof(unsigned), count(triangles)));
+  if (!positions || !indices) throw std::runtime_error("Embree: out of memory for the scene's triangles");
+  for (int i = 0; i < triangles; ++i)
+    for (int corner = 0; corner < 3; ++corner)
+      indices[3 * i + corner] =
+          static_cast<unsigned>(scene.triangles[first_triangle + i].vertex[corner] - first_vertex);
+  if (update_ == CasterUpdate::refit) rtcSetGeometryBuildQuality(mesh, RTC_BUILD_QUALITY_REFIT);
+  const unsigned id = static_cast<unsigned>(first_.size());
+  rtcAttachGeometryByID(scene_, mesh, id);
+  rtcReleaseGeometry(mesh);
+  first_.push_back(first_triangle);
+  fill_vertices(scene, id, first_vertex, vertices);
+}
+
+void RayCaster::fill_vertices(const Scene& scene, unsigned geometry, int first_vertex, int vertices) const {
+  RTCGeometry mesh = rtcGetGeometry(scene_, geometry);
+  auto* to = static_cast<float*>(rtcGetGeometryBufferData(mesh, RTC_BUFFER_TYPE_VERTEX, 0));
+  for (int i = 0; i < vertices; ++i)
+    for (int axis = 0; axis < 3; ++axis) to[3 * i + axis] = static_cast<float>(scene.positions[first_vertex + i][axis]);
+  rtcUpdateGeometryBuffer(mesh, RTC_BUFFER_TYPE_VERTEX, 0);
+  rtcCommitGeometry(mesh);
+}
+
+void RayCaster::update(const Scene& scene, const std::vector<char>& moved_shapes) {
+  set_offset(scene);
+  if (std::find(moved_shapes.begin(), moved_shapes.end(), 1) == moved_shapes.end()) return;
+  if (update_ == CasterUpdate::rebuild) {
+    rtcReleaseScene(scene_);
+    build(scene);
+    return;
+  }
+  for (std::size_t s = 0; s < moved_shapes.size(); ++s)
+    if (moved_shapes[s])
+      fill_vertices(scene, static_cast<unsigned>(s), scene.shapes[s].first_vertex, scene.shapes[s].vertex_count);
+  rtcCommitScene(scene_);
 }
 
 }  // namespace isochron

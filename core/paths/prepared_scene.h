@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <vector>
@@ -59,16 +60,32 @@ struct MovingParts {
   bool any = false, geometry = false;
   Bounds bounds;         ///< of the triangles with a vertex that moves
   bool lengths = false;  ///< paths can change their length
+  MovingParts() = default;
   MovingParts(const Scene& scene, const TangentBasis* basis);
+  /// Sets `bounds`; to be called again when vertices have moved.
+  void find_bounds(const Scene& scene);
   /// Of a degree of freedom that is a material's.
   bool number_moves(const DofLayout& layout, int dof) const { return number[dof - layout.first_number[0]] != 0; }
 };
 
+/// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
 class PreparedScene {
  public:
-  PreparedScene(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow = {});
+  PreparedScene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow = {},
+                CasterUpdate of_caster = CasterUpdate::rebuild);
+  PreparedScene(const PreparedScene&) = delete;
+  PreparedScene& operator=(const PreparedScene&) = delete;
 
-  const Scene& scene;
+  /// For `source`, which has the topology of the scene at first. The result is the same whatever there was in between.
+  void update(const Scene& source, const TangentBasis* basis, const FollowOptions& follow);
+  /// Whether the last update had a basis that moved the same.
+  bool same_moves(const TangentBasis* basis) const;
+  /// Counts updates. changed(t): the last one that moved the triangle, or changed whether it, its vertices or its material
+  /// move.
+  int revision() const { return revision_; }
+  int changed(int triangle) const { return changed_[triangle]; }
+
+  Scene scene;  ///< a copy
   CameraModel camera;
   DofLayout layout;
   MovingParts moving;
@@ -237,10 +254,19 @@ class PreparedScene {
     std::once_flag made;
     EllipsoidBvh bvh;
   };
+  /// Returns which vertices have moved, and sets which shapes have.
+  std::vector<char> move_vertices(const std::vector<Vec3>& positions, std::vector<char>& moved_shapes);
+  void update_shapes();
+  void update_record(int triangle);
+  void update_emitters();
 
   LargeArray<TriangleRecord> records_;
-  mutable std::array<LazyHierarchy, 3> hierarchies_;  ///< by Part
+  std::vector<int> changed_;
+  int revision_ = 0;
+  std::vector<int> pattern_;                                           ///< TangentBasis::row_begin: what moves
+  mutable std::array<std::unique_ptr<LazyHierarchy>, 3> hierarchies_;  ///< by Part
   std::vector<ShapeRecord> shapes_;
+  std::vector<char> emitting_shapes_;
   std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
   DiscreteDistribution emitter_distribution_;
   bool has_medium_ = false;

@@ -4,6 +4,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/base/parallel.h"
 #include "core/paths/path_differential.h"
 
 namespace isochron {
@@ -34,44 +35,31 @@ class DisjointSets {
   std::vector<int> parent_;
 };
 
-DisjointSets bodies_of(const Scene& scene) {
-  DisjointSets sets(scene.positions.size());
-  for (const Triangle& t : scene.triangles)
-    for (const int v : t.vertex) sets.join(v, t.vertex[0]);
-  return sets;
-}
-
 Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
   Bounds bounds;
   for (const int v : triangle.vertex) bounds.add(scene.positions[v]);
   return bounds;
 }
 
-Vec3 doubled_normal(const Scene& scene, int t) {
-  const auto& v = scene.triangles[t].vertex;
-  const Vec3& p = scene.positions[v[0]];
-  return cross(scene.positions[v[1]] - p, scene.positions[v[2]] - p);
-}
-
 /// Whether the two faces of the edge lie in one plane, on either side of the edge.
-bool is_flat(const Scene& scene, const Edge& edge) {
+bool is_flat(const PreparedScene& scene, const Edge& edge) {
   if (edge.face[1] < 0) return false;
-  const Vec3 a = doubled_normal(scene, edge.face[0]), b = doubled_normal(scene, edge.face[1]);
-  return dot(a, b) > 0 && length(cross(a, b)) <= kCoplanarAngle * length(a) * length(b);
+  const Vec3 &a = scene.normal(edge.face[0]), &b = scene.normal(edge.face[1]);
+  return dot(a, b) > 0 && length(cross(a, b)) <= kCoplanarAngle;
 }
 
 /// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat
 /// piece whose dark side is inside.
-bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
-  DisjointSets bodies = bodies_of(scene);
-  int any_vertex = -1;
+bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int>& body_of_vertex) {
+  const Scene& scene = prepared.scene;
+  const MovingParts& moving = prepared.moving;
+  int body = -1;
   for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
     if (!moving.triangle[t]) continue;
-    const Triangle& triangle = scene.triangles[t];
-    const Bsdf& bsdf = scene.materials[scene.shapes[triangle.shape].material].bsdf();
-    if (bsdf.two_sided() || bsdf.transparent()) return false;
-    if (any_vertex < 0) any_vertex = triangle.vertex[0];
-    if (bodies.root(triangle.vertex[0]) != bodies.root(any_vertex)) return false;
+    const int i = static_cast<int>(t), own = body_of_vertex[scene.triangles[t].vertex[0]];
+    if (prepared.two_sided(i) || prepared.transparent(i)) return false;
+    if (body < 0) body = own;
+    if (own != body) return false;
   }
   bool open = false, flat = true;
   for (const Edge& edge : scene.edges) {
@@ -81,10 +69,10 @@ bool sees_nothing_of_itself(const Scene& scene, const MovingParts& moving) {
       open = true;
       continue;
     }
-    const Vec3 n = doubled_normal(scene, edge.face[0]);
+    const Vec3& n = prepared.normal(edge.face[0]);
     for (const int v : scene.triangles[edge.face[1]].vertex) {
       const Vec3 d = scene.positions[v] - scene.positions[edge.vertex[0]];
-      const double height = dot(n, d), scale = kCoplanarAngle * length(n) * length(d);
+      const double height = dot(n, d), scale = kCoplanarAngle * length(d);
       if (height > scale) return false;
       flat &= height >= -scale;
     }
@@ -98,12 +86,22 @@ Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
 
 }  // namespace
 
-VertexFlows::VertexFlows(const Scene& scene, const CameraModel& camera, const MovingParts& moving,
-                         const FollowOptions& options)
-    : position_(camera.position),
-      forward_(camera.forward),
-      radius_(options.radius_in_pixels * camera.pixel_size()),
-      near_(moving.bounds) {
+VertexFlows::VertexFlows(const Scene& scene) {
+  DisjointSets sets(scene.positions.size());
+  for (const Triangle& t : scene.triangles)
+    for (const int v : t.vertex) sets.join(v, t.vertex[0]);
+  body_of_vertex_ = sets.numbered(bodies_);
+}
+
+void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& options) {
+  const Scene& scene = prepared.scene;
+  const CameraModel& camera = prepared.camera;
+  const MovingParts& moving = prepared.moving;
+  position_ = camera.position;
+  forward_ = camera.forward;
+  radius_ = options.radius_in_pixels * camera.pixel_size();
+  camera_possible_ = follows_bodies_ = false;
+  near_ = moving.bounds;
   if (!moving.geometry) return;
   if (options.radius_in_pixels > 0) {
     // x1 is within s of the box, and its own depth enters s.
@@ -115,78 +113,103 @@ VertexFlows::VertexFlows(const Scene& scene, const CameraModel& camera, const Mo
     const double margin =
         radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
     camera_near_ = moving.bounds.grown(margin);
-    camera_possible_ = !sees_nothing_of_itself(scene, moving);
+    camera_possible_ = !sees_nothing_of_itself(prepared, body_of_vertex_);
     for (std::size_t t = 0; t < scene.triangles.size() && !camera_possible_; ++t)
       camera_possible_ = !moving.triangle[t] && bounds_of(scene, scene.triangles[t]).overlaps(camera_near_);
   }
-  if (options.bodies > 0) {
-    find_patches(scene);
-    std::vector<Bounds> bodies(body_radius_.size());
-    std::vector<char> moves(body_radius_.size(), 0);
-    for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
-      const int body = patches_[patch_[t]].body;
-      bodies[body].add(bounds_of(scene, scene.triangles[t]));
-      moves[body] |= moving.triangle[t] != 0;
-    }
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-      body_radius_[i] = options.bodies * 0.5 * length(bodies[i].high - bodies[i].low);
-    double largest = 0;
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-      for (std::size_t j = 0; j < bodies.size() && moves[i]; ++j)
-        if (j != i && largest < std::min(body_radius_[i], body_radius_[j]) &&
-            bodies[j].grown(std::min(body_radius_[i], body_radius_[j])).overlaps(bodies[i]))
-          largest = std::min(body_radius_[i], body_radius_[j]);
-    if (largest > 0)
-      near_ = moving.bounds.grown(largest);
-    else
-      patch_.clear();  // no two bodies are close enough
-  }
+  if (options.bodies > 0) find_near_bodies(prepared, options.bodies);
 }
 
-void VertexFlows::find_patches(const Scene& scene) {
-  int bodies, count;
-  const std::vector<int> body = bodies_of(scene).numbered(bodies);
-  body_radius_.resize(bodies);
+void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies) {
+  const std::size_t count = static_cast<std::size_t>(bodies_);
+  const std::vector<Vec3>& positions = prepared.scene.positions;
+  std::vector<Bounds> bounds(count);
+  std::vector<char> moves(count, 0), near(count);
+  for (std::size_t v = 0; v < positions.size(); ++v) {
+    bounds[body_of_vertex_[v]].add(positions[v]);
+    moves[body_of_vertex_[v]] |= prepared.moving.vertex[v] != 0;
+  }
+  body_radius_.resize(count);
+  for (std::size_t i = 0; i < count; ++i) body_radius_[i] = bodies * 0.5 * length(bounds[i].high - bounds[i].low);
+  double largest = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    for (std::size_t j = 0; j < count && moves[i]; ++j) {
+      const double radius = std::min(body_radius_[i], body_radius_[j]);
+      if (j != i && largest < radius && bounds[j].grown(radius).overlaps(bounds[i])) largest = radius;
+    }
+  if (!(largest > 0)) return;  // no two bodies are close enough
+  follows_bodies_ = true;
+  near_ = prepared.moving.bounds.grown(largest);
+  // Of a pair within `largest` of each other one is in near_.
+  for (std::size_t i = 0; i < count; ++i) near[i] = bounds[i].overlaps(near_.grown(largest));
+  find_patches(prepared, near);
+}
+
+void VertexFlows::find_patches(const PreparedScene& prepared, const std::vector<char>& near) {
+  const Scene& scene = prepared.scene;
+  const std::size_t edges = scene.edges.size();
+  constexpr std::size_t kChunk = 4096;
+  std::vector<char> joined(edges), near_triangle(scene.triangles.size());
+  parallel(static_cast<int>((edges + kChunk - 1) / kChunk), [&](int chunk) {
+    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
+    for (std::size_t e = begin; e < std::min(begin + kChunk, edges); ++e) {
+      const Edge& edge = scene.edges[e];
+      joined[e] = near[body_of_vertex_[edge.vertex[0]]] && is_flat(prepared, edge);
+    }
+  });
+  for (std::size_t t = 0; t < near_triangle.size(); ++t)
+    near_triangle[t] = near[body_of_vertex_[scene.triangles[t].vertex[0]]];
+  if (joined != joined_ || near_triangle != near_triangle_ || patch_.empty()) {
+    joined_ = std::move(joined);
+    near_triangle_ = std::move(near_triangle);
+    make_patches(scene);
+  }
+  for (Patch& patch : patches_) patch.area = 0;
+  for (std::size_t t = 0; t < patch_.size(); ++t)
+    if (patch_[t] >= 0) patches_[patch_[t]].area += prepared.area(static_cast<int>(t));
+}
+
+void VertexFlows::make_patches(const Scene& scene) {
   DisjointSets sets(scene.triangles.size());
-  for (const Edge& e : scene.edges)
-    if (is_flat(scene, e)) sets.join(e.face[0], e.face[1]);
+  for (std::size_t e = 0; e < joined_.size(); ++e)
+    if (joined_[e]) sets.join(scene.edges[e].face[0], scene.edges[e].face[1]);
+  int count;
   patch_ = sets.numbered(count);
-  patches_.resize(count);
-  for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
-    Patch& patch = patches_[patch_[t]];
-    patch.body = body[scene.triangles[t].vertex[0]];
-    patch.area += 0.5 * length(doubled_normal(scene, static_cast<int>(t)));
+  patches_.assign(static_cast<std::size_t>(count), {});
+  for (std::size_t t = 0; t < patch_.size(); ++t) {
+    if (!near_triangle_[t]) patch_[t] = -1;
+    if (patch_[t] >= 0) patches_[patch_[t]].body = body_of_vertex_[scene.triangles[t].vertex[0]];
   }
   const auto for_each_crease = [&](auto&& f) {
-    for (const Edge& e : scene.edges)
-      for (int i = 0; i < 2 && e.face[i] >= 0; ++i)
-        if (e.face[1] < 0 || patch_[e.face[0]] != patch_[e.face[1]]) f(patches_[patch_[e.face[i]]], e);
+    for (std::size_t e = 0; e < scene.edges.size(); ++e) {
+      const auto& face = scene.edges[e].face;
+      if (patch_[face[0]] < 0 || (face[1] >= 0 && patch_[face[0]] == patch_[face[1]])) continue;
+      for (int i = 0; i < 2 && face[i] >= 0; ++i) f(patches_[patch_[face[i]]], static_cast<int>(e));
+    }
   };
-  for_each_crease([](Patch& patch, const Edge&) { ++patch.creases; });
+  for_each_crease([](Patch& patch, int) { ++patch.creases; });
   int first = 0;
   for (Patch& patch : patches_) {
     patch.first_crease = first;
     first += std::exchange(patch.creases, 0);
   }
-  creases_.resize(first);
-  for_each_crease([&](Patch& patch, const Edge& e) {
-    const Vec3 &a = scene.positions[e.vertex[0]], d = scene.positions[e.vertex[1]] - a;
-    const double size = length(d);
-    creases_[patch.first_crease + patch.creases++] = {a, size > 0 ? d / size : Vec3(), size};
-  });
+  creases_.resize(static_cast<std::size_t>(first));
+  for_each_crease([&](Patch& patch, int edge) { creases_[patch.first_crease + patch.creases++] = edge; });
 }
 
-VertexFlows::Pair::Weight VertexFlows::weight(const Vec3& x, int patch, const Vec3& y, double largest,
-                                              Vec3& gradient_other) const {
+VertexFlows::Pair::Weight VertexFlows::weight(const PreparedScene& prepared, const Vec3& x, int patch, const Vec3& y,
+                                              double largest, Vec3& gradient_other) const {
   const Vec3 d = x - y;
   const double squared = length_squared(d);
   double s2 = largest * largest;
   Vec3 to_nearest;  // from the nearest crease to x, where that is what limits s
   const Patch& p = patches_[patch];
   for (int i = p.first_crease; i < p.first_crease + p.creases; ++i) {
-    const Crease& c = creases_[i];
-    const Vec3 a = x - c.origin;
-    const Vec3 off = a - c.direction * std::clamp(dot(a, c.direction), 0.0, c.length);
+    const auto& end = prepared.scene.edges[creases_[i]].vertex;
+    const Vec3 &origin = prepared.scene.positions[end[0]], a = x - origin,
+               along = prepared.scene.positions[end[1]] - origin;
+    const double squared_length = length_squared(along);
+    const Vec3 off = a - along * (squared_length > 0 ? std::clamp(dot(a, along) / squared_length, 0.0, 1.0) : 0.0);
     const double distance = length_squared(off);
     if (distance >= s2) continue;
     if (distance <= squared) return {};
@@ -208,16 +231,17 @@ VertexFlows::Pair VertexFlows::pair(const PreparedScene& scene, const SurfacePoi
                                     int k) const {
   Pair result;
   Vec3 gradient_near;  // of the weight of y with respect to x, and the other way round
-  if (!patch_.empty()) {
+  if (follows_bodies_) {
     const int patch_x = patch_[x.triangle], patch_y = patch_[y.triangle];
-    const int body_x = patches_[patch_x].body, body_y = patches_[patch_y].body;
+    const bool near = patch_x >= 0 && patch_y >= 0;
+    const int body_x = near ? patches_[patch_x].body : -1, body_y = near ? patches_[patch_y].body : -1;
     if (body_x != body_y) {
       const double largest = std::min(body_radius_[body_x], body_radius_[body_y]);
       if (length_squared(x.p - y.p) < largest * largest && (near_.holds(x.p) || near_.holds(y.p))) {
-        result.far = weight(y.p, patch_y, x.p, largest, gradient_near);
+        result.far = weight(scene, y.p, patch_y, x.p, largest, gradient_near);
         if (k > 1) {
           Vec3 gradient_far;
-          result.near = weight(x.p, patch_x, y.p, largest, gradient_far);
+          result.near = weight(scene, x.p, patch_x, y.p, largest, gradient_far);
           // The one on the larger patch comes first.
           const auto second = [](Pair::Weight& w, const Pair::Weight& first, const Vec3& gradient_first) {
             w.gradient = w.gradient * first.missing - gradient_first * w.value;

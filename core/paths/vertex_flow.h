@@ -56,7 +56,9 @@ struct VertexFlow {
 
 class VertexFlows {
  public:
-  VertexFlows(const Scene& scene, const CameraModel& camera, const MovingParts& moving, const FollowOptions& options);
+  explicit VertexFlows(const Scene& scene);
+  /// For the scene as it is made ready but for its flows.
+  void update(const PreparedScene& scene, const FollowOptions& options);
 
   /// Of a segment between neighbours x_k and x_(k+1): how either would follow the other, were there no further ones.
   struct Pair {
@@ -82,32 +84,38 @@ class VertexFlows {
   double camera_radius_at(const Vec3& x1) const { return radius_ * dot(forward_, x1 - position_); }
 
   /// Whether there may be a neighbour of x_k = p, k > 1, that it follows.
-  bool possible_at(const Vec3& p) const { return !patch_.empty() && near_.holds(p); }
+  bool possible_at(const Vec3& p) const { return follows_bodies_ && near_.holds(p); }
   /// Holds all that moves, and every vertex but x1 that may follow or be followed.
   const Bounds& near() const { return near_; }
 
  private:
-  struct Crease {
-    Vec3 origin, direction;  ///< direction is unit
-    double length;
-  };
   struct Patch {
     int body = -1;
     int first_crease = 0, creases = 0;
     double area = 0;
   };
-  void find_patches(const Scene& scene);
-  Pair::Weight weight(const Vec3& x, int patch, const Vec3& y, double largest, Vec3& gradient_other) const;
+  /// Sets `possible_patches_` and what depends on it.
+  void find_near_bodies(const PreparedScene& scene, double bodies);
+  /// `near`: of each body, whether it may follow or be followed.
+  void find_patches(const PreparedScene& scene, const std::vector<char>& near);
+  void make_patches(const Scene& scene);
+  Pair::Weight weight(const PreparedScene& scene, const Vec3& x, int patch, const Vec3& y, double largest,
+                      Vec3& gradient_other) const;
 
   Vec3 position_, forward_;  ///< of the camera
-  double radius_;            ///< s of x1 per depth
+  double radius_ = 0;        ///< s of x1 per depth
   bool camera_possible_ = false;
-  Bounds camera_near_;      ///< holds every x1 that may follow
-  Bounds near_;             ///< holds what moves and all others that may
-  std::vector<int> patch_;  ///< of each triangle: coplanar triangles of one mesh that share edges; empty: none follows
-  std::vector<Patch> patches_;
-  std::vector<Crease> creases_;      ///< patch by patch
+  Bounds camera_near_;  ///< holds every x1 that may follow
+  Bounds near_;         ///< holds what moves and all others that may
+  bool follows_bodies_ = false;
+  std::vector<int> body_of_vertex_;  ///< connected meshes, which do not change when vertices move
+  int bodies_ = 0;
   std::vector<double> body_radius_;  ///< times `follow`
+  std::vector<char> joined_;         ///< of each edge: its faces are one plane, and near other bodies
+  std::vector<char> near_triangle_;  ///< its body is near others
+  std::vector<int> patch_;  ///< of each triangle that is: coplanar triangles of one mesh that share edges; else -1
+  std::vector<Patch> patches_;
+  std::vector<int> creases_;  ///< edges, patch by patch
 };
 
 /// Adds g . (velocity of x1 along its pixel ray) to `out`.

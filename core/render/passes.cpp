@@ -21,16 +21,24 @@ constexpr int kPixelsPerBlock = 8;
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
 constexpr long long kFewestLearningRounds = 64;
 
+std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow,
+                                        SceneCache* cache) {
+  if (cache) return cache->take(source, basis, follow);
+  return std::shared_ptr<ReadyScene>(new ReadyScene{PreparedScene(source, basis, follow), std::nullopt});
+}
+
 }  // namespace
 
 Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator,
-               const TangentBasis* tangent)
-    : gates(gate_set),
+               const TangentBasis* tangent, SceneCache* cache)
+    : ready(ready_scene(source, tangent, {estimator.follow_radius, estimator.follow}, cache)),
+      gates(gate_set),
       options(estimator),
       basis(tangent),
-      scene(source, tangent, {estimator.follow_radius, estimator.follow}),
+      scene(ready->scene),
       mix(sampling_mix(estimator, gate_set)),
-      every_gate(gate_set) {
+      every_gate(gate_set),
+      cache_(cache) {
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
   // (measured on the cube and the box, 0.1 % to 10 %).
   if (options.antithetic) pair_gain_ = 1 + 0.1 / gates.relative_width();
@@ -115,8 +123,8 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
 
 void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
   const double scale = 1.0 / pass.range.count(), splat_scale = scale / scene.camera.pixels();
-  PrimaryBoundary primary(worker, *edges_, *guide_, mix.interior == 1);
-  SecondaryBoundary secondary(worker, *edges_, *guide_, mix.interior == 1);
+  PrimaryBoundary primary(worker, edges(), *guide_, mix.interior == 1);
+  SecondaryBoundary secondary(worker, edges(), *guide_, mix.interior == 1);
   const double edges_rate = guide_->rate(BoundaryGuide::primary),
                borders_rate = guide_->rate(BoundaryGuide::pixel_border),
                from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
@@ -139,12 +147,15 @@ void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partitio
 
 void Passes::learn() const {
   using Guide = BoundaryGuide;
-  edges_.emplace(scene, options.boundary.wedge);
+  if (ready->edges)
+    ready->edges->update(scene, options.boundary.wedge);
+  else
+    ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->crossing() : nullptr);
   Guide::Each<bool> possible;
-  possible[Guide::primary] = edges_->has_primary();
+  possible[Guide::primary] = edges().has_primary();
   possible[Guide::pixel_border] = scene.flows.camera_possible();
-  possible[Guide::from_edge] = edges_->has_secondary();
-  possible[Guide::from_camera] = edges_->has_secondary() && options.boundary.from_camera;
+  possible[Guide::from_edge] = edges().has_secondary();
+  possible[Guide::from_camera] = edges().has_secondary() && options.boundary.from_camera;
   const Guide& unguided = guide_.emplace(possible);
   const auto searches = std::count(possible.begin(), possible.end(), true);
   if (searches == 0) return;
@@ -165,8 +176,8 @@ void Passes::learn() const {
       search();
       cost[technique] += worker.work() - before;
     };
-    PrimaryBoundary primary(worker, *edges_, unguided, mix.interior == 1);
-    SecondaryBoundary secondary(worker, *edges_, unguided, mix.interior == 1);
+    PrimaryBoundary primary(worker, edges(), unguided, mix.interior == 1);
+    SecondaryBoundary secondary(worker, edges(), unguided, mix.interior == 1);
     const double splat_scale = 1.0 / scene.camera.pixels();
     for (long long i = partition; i < rounds; i += kPartitions) {
       throw_if_stopped();

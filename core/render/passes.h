@@ -8,7 +8,7 @@
 #include "core/base/random.h"
 #include "core/films/sinks.h"
 #include "core/paths/options.h"
-#include "core/techniques/boundary_edges.h"
+#include "core/render/scene_cache.h"
 #include "core/techniques/boundary_guide.h"
 #include "core/techniques/gate_pick.h"
 #include "core/techniques/target_lengths.h"
@@ -31,7 +31,8 @@ struct Pass {
 class Passes {
  public:
   /// `basis` says what moves; null or empty: nothing does. What this refers to must outlive it.
-  Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent);
+  Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator, const TangentBasis* tangent,
+         SceneCache* cache);
 
   /// Number of partitions of a pass where each partition has so many sums of its own.
   int partitions_for(SampleRange range, std::size_t values) const;
@@ -52,10 +53,11 @@ class Passes {
   /// One partition of a term of the derivative, which was prepared; gates and pixels by `pick`. `sink` is differential.
   void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
 
+  const std::shared_ptr<ReadyScene> ready;
   const GateSet& gates;
   const EstimatorOptions options;
   const TangentBasis* const basis;
-  const PreparedScene scene;
+  const PreparedScene& scene;
   const SamplingMix mix;      ///< what the options resolve to
   const GatePick every_gate;  ///< all gates and pixels alike
 
@@ -83,11 +85,13 @@ class Passes {
   /// Adds the rays and arcs of a worker that has done its work.
   void count(const Worker& worker) const;
 
+  const BoundaryEdges& edges() const { return *ready->edges; }
+
+  SceneCache* const cache_;
   double pair_gain_ = 1;
   mutable std::atomic<long long> rays_{0}, arcs_{0};
   mutable std::once_flag learned_;
-  mutable std::optional<BoundaryEdges> edges_;  ///< of the visibility term alone
-  mutable std::optional<BoundaryGuide> guide_;  ///< likewise
+  mutable std::optional<BoundaryGuide> guide_;  ///< of the visibility term alone
 };
 
 }  // namespace isochron

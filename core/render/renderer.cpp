@@ -24,8 +24,9 @@ struct Renderer::Impl : Passes {
   }
 };
 
-Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options, const TangentBasis* basis)
-    : impl_(std::make_unique<Impl>(scene, gates, options, basis)) {}
+Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options, const TangentBasis* basis,
+                   SceneCache* cache)
+    : impl_(std::make_unique<Impl>(scene, gates, options, basis, cache)) {}
 Renderer::~Renderer() = default;
 
 bool Renderer::has(Term term) const {

@@ -13,6 +13,8 @@
 
 namespace isochron {
 
+class SceneCache;
+
 /// Of a gradient, see Renderer::add_gradient.
 inline constexpr int kGradientParts = 32;
 
@@ -21,8 +23,9 @@ class Renderer {
  public:
   /// `basis` says what moves (derivatives skip all else); null or empty: nothing does, only `render` makes sense.
   /// The scene, gates and basis must outlive the renderer.
+  /// With a cache, what scenes of the same topology have in common is not made again; the bits are the same.
   Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
-           const TangentBasis* basis = nullptr);
+           const TangentBasis* basis = nullptr, SceneCache* cache = nullptr);
   ~Renderer();
 
   /// Unbiased estimate of the gated images: average over the samples of `range`.

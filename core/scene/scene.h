@@ -39,6 +39,7 @@ struct Shape {
   Rgb emission;  ///< uniform radiance on the normal's side; black when the shape is no emitter
   int first_vertex = 0, vertex_count = 0;
   int first_triangle = 0, triangle_count = 0;
+  bool deforms = false;  ///< parameters may move its vertices otherwise than as a rigid body
 };
 
 struct Scene {

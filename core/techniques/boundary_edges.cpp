@@ -1,18 +1,18 @@
 #include "core/techniques/boundary_edges.h"
 
-#include "core/geometry/mesh_intersections.h"
+#include <algorithm>
+
+#include "core/base/parallel.h"
 
 namespace isochron {
 namespace {
 
 /// Unit direction in the plane of face t, perpendicular to the edge, towards the face's third vertex.
 Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const Vec3& tangent) {
-  for (int v : scene.scene.triangles[t].vertex) {
-    if (v == edge.vertex[0] || v == edge.vertex[1]) continue;
-    const Vec3 d = scene.scene.positions[v] - scene.scene.positions[edge.vertex[0]];
-    return normalize(d - tangent * dot(d, tangent));
-  }
-  return {};
+  const auto& v = scene.scene.triangles[t].vertex;
+  const int i = v[0] == edge.vertex[0] ? 0 : v[1] == edge.vertex[0] ? 1 : 2;
+  const bool along = v[(i + 1) % 3] == edge.vertex[1];
+  return cross(scene.normal(t), along ? tangent : -tangent);
 }
 
 /// How often an edge is to be looked at from the camera: by its length in the image, and between two faces that are both
@@ -39,36 +39,67 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
 
 }  // namespace
 
-BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge) {
-  for (const Edge& e : scene.scene.edges) {
-    BoundaryEdge b;
-    for (int i = 0; i < 2; ++i) b.vertex[i] = e.vertex[i], b.face[i] = e.face[i];
-    b.origin = scene.scene.positions[e.vertex[0]];
-    b.end = scene.scene.positions[e.vertex[1]];
-    const double edge_length = length(b.end - b.origin);
-    bool degenerate = !(edge_length > 0);
-    for (int i = 0; i < b.faces(); ++i) degenerate |= !(scene.area(b.face[i]) > 0);
-    if (degenerate) continue;
-    const Vec3 tangent = (b.end - b.origin) / edge_length;
-    for (int i = 0; i < b.faces(); ++i) b.inward[i] = inward_direction(scene, b.face[i], e, tangent);
-    double angle = kPi;
-    if (b.faces() == 2) {
-      angle -= std::atan2(length(cross(b.inward[0], b.inward[1])), dot(b.inward[0], b.inward[1]));
-      if (angle < kCoplanarAngle) continue;
+BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const CrossingEdges* crossing)
+    : crossing_(crossing) {
+  update(scene, wedge);
+}
+
+void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
+  const std::size_t count = scene.scene.edges.size();
+  // What the camera looks at depends on whether points may follow others.
+  const bool all = revision_ == 0 || wedge != wedge_ || camera_possible_ != scene.flows.camera_possible();
+  edges_.resize(count);
+  moves_.resize(count);
+  primary_.weights.resize(count);
+  secondary_.weights.resize(count);
+  constexpr std::size_t kChunk = 4096;
+  std::vector<char> changed((count + kChunk - 1) / kChunk, 0);
+  parallel(static_cast<int>(changed.size()), [&](int chunk) {
+    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
+    for (std::size_t i = begin; i < std::min(begin + kChunk, count); ++i) {
+      const auto& face = scene.scene.edges[i].face;
+      if (!all && scene.changed(face[0]) <= revision_ && (face[1] < 0 || scene.changed(face[1]) <= revision_)) continue;
+      update_edge(scene, i, wedge);
+      changed[chunk] = 1;
     }
-    b.azimuths = wedge ? angle : kPi;
-    b.moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
-    if (b.moves || scene.flows.camera_possible())
-      if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
-    secondary_.add(b, edge_length * b.azimuths);
-  }
+  });
+  revision_ = scene.revision();
+  wedge_ = wedge;
+  camera_possible_ = scene.flows.camera_possible();
+  if (std::find(changed.begin(), changed.end(), 1) == changed.end()) return;
   if (scene.moving.geometry) add_mesh_intersections(scene, wedge);
-  primary_.finish();
-  secondary_.finish();
+  parallel(2, [&](int i) { finish(i == 0 ? primary_ : secondary_); });
+}
+
+void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool wedge) {
+  primary_.weights[i] = secondary_.weights[i] = 0;
+  const Edge& e = scene.scene.edges[i];
+  BoundaryEdge& b = edges_[i] = {};
+  for (int k = 0; k < 2; ++k) b.vertex[k] = e.vertex[k], b.face[k] = e.face[k];
+  b.origin = scene.scene.positions[e.vertex[0]];
+  b.end = scene.scene.positions[e.vertex[1]];
+  const double edge_length = length(b.end - b.origin);
+  bool degenerate = !(edge_length > 0);
+  for (int k = 0; k < b.faces(); ++k) degenerate |= !(scene.area(b.face[k]) > 0);
+  if (degenerate) return;
+  const Vec3 tangent = (b.end - b.origin) / edge_length;
+  for (int k = 0; k < b.faces(); ++k) b.inward[k] = inward_direction(scene, b.face[k], e, tangent);
+  double angle = kPi;
+  if (b.faces() == 2) {
+    angle -= std::atan2(length(cross(b.inward[0], b.inward[1])), dot(b.inward[0], b.inward[1]));
+    if (angle < kCoplanarAngle) return;
+  }
+  b.azimuths = wedge ? angle : kPi;
+  b.moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
+  moves_[i] = b.moves;
+  if (b.moves || scene.flows.camera_possible()) primary_.weights[i] = primary_weight(scene, b, b.azimuths);
+  secondary_.weights[i] = edge_length * b.azimuths;
 }
 
 void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {
-  for (const MeshIntersection& p : find_mesh_intersections(scene.scene, scene.caster)) {
+  const auto all =
+      crossing_ ? crossing_->find(scene.scene, scene.caster) : find_mesh_intersections(scene.scene, scene.caster);
+  for (const MeshIntersection& p : all) {
     BoundaryEdge b;
     b.origin = p.end[0];
     b.end = p.end[1];
@@ -81,7 +112,10 @@ void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedg
     const double angle = std::atan2(length(cross(b.inward[0], b.inward[1])), std::abs(dot(b.inward[0], b.inward[1])));
     b.azimuths = wedge ? angle : kPi;
     if (angle < kCoplanarAngle || !(b.moves || scene.flows.camera_possible())) continue;
-    if (const double weight = primary_weight(scene, b, b.azimuths); weight > 0) primary_.add(b, weight);
+    edges_.push_back(b);
+    moves_.push_back(b.moves);
+    primary_.weights.push_back(primary_weight(scene, b, b.azimuths));
+    secondary_.weights.push_back(0);
   }
 }
 
@@ -105,23 +139,22 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
   }
 }
 
-void BoundaryEdges::Choice::add(const BoundaryEdge& edge, double weight) {
-  edges.push_back(edge);
-  weights.push_back(weight);
-}
-
-void BoundaryEdges::Choice::finish() {
+void BoundaryEdges::finish(Choice& choice) const {
   double sum[2] = {0, 0};
-  for (std::size_t i = 0; i < edges.size(); ++i) sum[edges[i].moves] += weights[i];
-  if (sum[0] > 0 && sum[1] > 0)
-    for (std::size_t i = 0; i < edges.size(); ++i) weights[i] /= sum[edges[i].moves];
-  distribution = DiscreteDistribution(weights);
+  for (std::size_t i = 0; i < edges_.size(); ++i) sum[moves_[i]] += choice.weights[i];
+  if (sum[0] > 0 && sum[1] > 0) {
+    std::vector<double> shares = choice.weights;
+    for (std::size_t i = 0; i < edges_.size(); ++i) shares[i] /= sum[moves_[i]];
+    choice.distribution = DiscreteDistribution(shares);
+  } else {
+    choice.distribution = DiscreteDistribution(choice.weights);
+  }
 }
 
-BoundaryEdges::Place BoundaryEdges::Choice::place(double u) const {
-  const int i = distribution.sample(u);
-  prefetch(edges[i]);
-  return {&edges[i], u, distribution.below(i), distribution.probability(i)};
+BoundaryEdges::Place BoundaryEdges::place(const Choice& choice, double u) const {
+  const int i = choice.distribution.sample(u);
+  prefetch(edges_[i]);
+  return {&edges_[i], u, choice.distribution.below(i), choice.distribution.probability(i)};
 }
 
 BoundaryEdges::Sample::Sample(const Place& place) : Place(place), y(edge->point(s)), tangent(edge->end - edge->origin) {

@@ -2,6 +2,7 @@
 #pragma once
 #include "core/base/discrete_distribution.h"
 #include "core/base/large_array.h"
+#include "core/geometry/mesh_intersections.h"
 #include "core/paths/path_differential.h"
 #include "core/paths/prepared_scene.h"
 
@@ -29,7 +30,13 @@ static_assert(sizeof(BoundaryEdge) == 128);
 class BoundaryEdges {
  public:
   /// `wedge`: pick edges and azimuths by the wedge of grazing directions (see BoundaryTechniques).
-  explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true);
+  /// `crossing`: tells where to look for intersections of meshes, and outlives this; null: everywhere.
+  explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true, const CrossingEdges* crossing = nullptr);
+  BoundaryEdges(const BoundaryEdges&) = delete;
+  BoundaryEdges& operator=(const BoundaryEdges&) = delete;
+  /// Makes anew what PreparedScene::update has changed since; `scene` is the same object. The result is the same whatever there
+  /// was in between.
+  void update(const PreparedScene& scene, bool wedge);
 
   /// Which edge, and where on it. The edge itself is prefetched.
   struct Place {
@@ -50,13 +57,13 @@ class BoundaryEdges {
   /// outline, the angle between their faces; the same of static ones where points beside them may follow others, in equal
   /// shares. `u` in (0, 1).
   bool has_primary() const { return !primary_.distribution.empty(); }
-  Sample sample_primary(double u) const { return Sample(primary_.place(u)); }
+  Sample sample_primary(double u) const { return Sample(place(primary_, u)); }
   /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
   /// where what lies behind or before them moves) get equal shares.
   bool has_secondary() const { return !secondary_.distribution.empty(); }
   Sample sample_secondary(double u) const { return Sample(place_secondary(u)); }
   /// The same in two steps, for callers with other work to do while the edge is read from memory.
-  Place place_secondary(double u) const { return secondary_.place(u); }
+  Place place_secondary(double u) const { return place(secondary_, u); }
 
   /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
   /// both (no boundary) or the plane holds a face.
@@ -66,17 +73,24 @@ class BoundaryEdges {
   static void add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b, LocalDifferential& out);
 
  private:
-  /// Edges to pick from by weight; where there are both, moving and static ones get equal shares.
+  /// How often each of edges_ is picked: in proportion to a weight; where there are both, moving and static ones get equal
+  /// shares.
   struct Choice {
-    LargeArray<BoundaryEdge> edges;
     std::vector<double> weights;
     DiscreteDistribution distribution;
-    void add(const BoundaryEdge& edge, double weight);
-    void finish();
-    Place place(double u) const;
   };
-  Choice primary_, secondary_;
+  /// The weights of an edge of the scene, which becomes edges_[i].
+  void update_edge(const PreparedScene& scene, std::size_t i, bool wedge);
   void add_mesh_intersections(const PreparedScene& scene, bool wedge);
+  void finish(Choice& choice) const;
+  Place place(const Choice& choice, double u) const;
+
+  LargeArray<BoundaryEdge> edges_;   ///< those of the scene, then intersections of meshes
+  std::vector<std::uint8_t> moves_;  ///< of each
+  Choice primary_, secondary_;
+  const CrossingEdges* crossing_;
+  int revision_ = 0;  ///< of the scene
+  bool wedge_ = true, camera_possible_ = false;
 };
 
 }  // namespace isochron

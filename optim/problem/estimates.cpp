@@ -64,7 +64,7 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
   const int samples = problem.experiment().samples.primal;
   require_replicates("primal", samples);
   const Scene scene = problem.parameters().apply(theta);
-  const Renderer renderer(scene, problem.gates(), problem.image_estimator());
+  const Renderer renderer = problem.renderer(scene, problem.image_estimator());
   const Stream stream = problem.stream(Pass::primal);
   const bool independent = renderer.pixels_are_independent();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
@@ -93,7 +93,7 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
     if (spec.term(term) > 0) require_replicates(name(term), spec.term(term));  // before anything is rendered
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
-  const Renderer renderer(scene, problem.gates(), problem.estimator(spec.visibility, Purpose::images), &basis);
+  const Renderer renderer = problem.renderer(scene, problem.estimator(spec.visibility, Purpose::images), &basis);
   std::vector<DerivativeEstimate> components;
   const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return spec.term(t) > 0; });
   ProgressStage stage("rendering the derivatives", static_cast<int>(terms));

@@ -243,6 +243,9 @@ Scene Parameters::apply(const std::vector<double>& theta) const {
     const std::vector<CarriedPoint> centers = pivots(static_cast<int>(s), theta);
     for (int v = 0; v < shape.vertex_count; ++v)
       scene.positions[shape.first_vertex + v] = move(static_cast<int>(s), v, centers, theta, nullptr);
+    for (const Motion& motion : motions_[s])
+      scene.shapes[s].deforms |= motion.type == ParameterType::vertices ||
+                                 std::find(motion.slot.begin(), motion.slot.end(), -1) != motion.slot.end();
   }
   for (const Value& value : values_)
     for (int i = 0; i < value.numbers; ++i) {

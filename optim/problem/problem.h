@@ -11,6 +11,7 @@
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/render/measure_mix.h"
+#include "core/render/scene_cache.h"
 #include "core/scene/scene.h"
 #include "optim/experiment/experiment.h"
 #include "optim/problem/loss.h"
@@ -87,6 +88,9 @@ class Problem {
   /// Gated images at theta. Throws InputError where it cannot be rendered.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
+  /// A renderer of a scene that parameters() made. Scene and basis must outlive it.
+  Renderer renderer(const Scene& scene, const EstimatorOptions& options, const TangentBasis* basis = nullptr) const;
+
   /// The images that the optimisation aims at: rendered at the target values, with photon noise where it is
   /// asked for, or read from a file. Throws InputError when the file's shape is not that of this experiment's
   /// images.
@@ -124,6 +128,7 @@ class Problem {
   Scene scene_;
   GateSet gates_;
   std::unique_ptr<Parameters> parameters_;
+  std::unique_ptr<SceneCache> cache_;
   Preconditioner preconditioner_;
   PairPenalty penalty_;
   int evaluations_;                                                   ///< of the loss gradient

@@ -44,7 +44,7 @@ void add_half(const Problem& problem, const std::vector<double>& theta, std::uin
   const int group = std::max(1, static_cast<int>(std::min(kGroupBytes / bytes, 1e6)));
   for (int first = 0; first < unknowns; first += group) {
     const TangentBasis basis = select_columns(all, first, std::min(group, unknowns - first));
-    const Renderer renderer(scene, problem.gates(), problem.estimator(samples.visibility), &basis);
+    const Renderer renderer = problem.renderer(scene, problem.estimator(samples.visibility), &basis);
     for (Term term : kTerms) {
       if (samples.term(term) == 0) continue;
       const auto images = renderer.derive(term, problem.stream(pass_of(term), iteration), half_of(samples.term(term)));
@@ -79,7 +79,7 @@ void require_two_samples(const Problem& problem) {
 
 SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint32_t iteration) const {
   const Scene scene = problem_.parameters().apply(theta);
-  const Renderer renderer(scene, problem_.gates(), problem_.estimator());
+  const Renderer renderer = problem_.renderer(scene, problem_.estimator());
   SplitImage image =
       render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
   poll_();

@@ -1,0 +1,39 @@
+#include "core/render/scene_cache.h"
+
+#include <algorithm>
+
+namespace isochron {
+
+std::shared_ptr<ReadyScene> SceneCache::take(const Scene& scene, const TangentBasis* basis,
+                                             const FollowOptions& follow) {
+  std::unique_ptr<ReadyScene> ready;
+  {
+    const std::lock_guard lock(mutex_);
+    // One for images and one for derivatives is all that users go on asking for.
+    constexpr int kKinds = 2;
+    auto found =
+        std::find_if(idle_.begin(), idle_.end(), [&](const auto& each) { return each->scene.same_moves(basis); });
+    if (found == idle_.end() && made_ >= kKinds) found = idle_.begin();
+    if (found != idle_.end()) {
+      ready = std::move(*found);
+      idle_.erase(found);
+    } else {
+      ++made_;
+    }
+  }
+  // A hierarchy that is refitted depends on the scene that it was made for.
+  if (!ready) ready.reset(new ReadyScene{PreparedScene(at_first_, basis, follow, update_), std::nullopt});
+  ready->scene.update(scene, basis, follow);
+  return {ready.release(), [this](ReadyScene* used) {
+            const std::lock_guard lock(mutex_);
+            idle_.emplace_back(used);
+          }};
+}
+
+const CrossingEdges& SceneCache::crossing() {
+  const std::lock_guard lock(mutex_);
+  if (!crossing_) crossing_.emplace(at_first_);
+  return *crossing_;
+}
+
+}  // namespace isochron

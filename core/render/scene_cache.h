@@ -1,0 +1,39 @@
+// Scenes made ready for rendering, kept from one evaluation to the next, so that each pays for what has changed alone.
+#pragma once
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "core/paths/prepared_scene.h"
+#include "core/techniques/boundary_edges.h"
+
+namespace isochron {
+
+/// A scene, and the edges of its visibility term where these were asked for.
+struct ReadyScene {
+  PreparedScene scene;
+  std::optional<BoundaryEdges> edges;
+};
+
+/// Safe to share between threads.
+class SceneCache {
+ public:
+  /// Of scenes that have the topology of `at_first`, which must outlive this. `update`: of the rays' hierarchy.
+  SceneCache(const Scene& at_first, CasterUpdate update) : at_first_(at_first), update_(update) {}
+
+  /// The scene made ready; nobody else's until the pointer is gone. The same bits whatever was taken before.
+  std::shared_ptr<ReadyScene> take(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow);
+  /// Where intersections of meshes are to be looked for.
+  const CrossingEdges& crossing();
+
+ private:
+  const Scene& at_first_;
+  const CasterUpdate update_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<ReadyScene>> idle_;
+  int made_ = 0;
+  std::optional<CrossingEdges> crossing_;
+};
+
+}  // namespace isochron
