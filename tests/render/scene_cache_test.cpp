@@ -1,0 +1,144 @@
+// Scenes kept from one evaluation to the next: the same bits as scenes made anew, whatever was rendered in between, and work
+// only for what has moved.
+#include "core/render/scene_cache.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/render/support.h"
+
+namespace isochron::testing {
+namespace {
+
+/// The validation scene with a block that the floor cuts through: a line where meshes intersect.
+Scene small_box() {
+  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = 12;
+  return scene;
+}
+
+std::vector<Motion> motions(const Scene& scene) {
+  return {translate(scene, "block", {0.3, -1, 0.2}), rotate_y(scene, "panel", {0, 0, 0}),
+          change_material(scene, "block", "albedo"), change_emission(scene, "light")};
+}
+
+Scene at(const Scene& scene, const std::vector<Motion>& all, const std::vector<double>& theta) {
+  Scene moved = scene;
+  for (std::size_t i = 0; i < all.size(); ++i) all[i].apply(moved, theta[i]);
+  return moved;
+}
+
+/// Images and the gradient of every term, one after the other.
+std::vector<double> everything(const Renderer& renderer, const Scene& scene, const GateSet& gates) {
+  GatedImage image = renderer.render({1, 0, 0}, {0, 4});
+  std::vector<double> result = image.data;
+  GatedImage adjoint(scene.camera.width, scene.camera.height, gates.size(), image.channels);
+  for (std::size_t i = 0; i < adjoint.data.size(); ++i) adjoint.data[i] = 0.1 + static_cast<double>(i % 7);
+  for (const Term term : kTerms) {
+    std::vector<double> gradient(DofLayout(scene).size(), 0.0);
+    renderer.add_gradient(term, adjoint, {1, 0, 1}, {0, 4}, gradient);
+    result.insert(result.end(), gradient.begin(), gradient.end());
+  }
+  return result;
+}
+
+const std::vector<std::vector<double>> kPoints = {
+    {0, 0, 0, 0}, {0.1, 0.3, 0, 0}, {0.45, 0.3, 0, 0}, {0.45, 0.3, 0.1, 2}, {0, 0, 0, 0}, {-0.2, -0.1, 0.05, 1}};
+
+class Kept : public ::testing::TestWithParam<Sampling> {};
+
+TEST_P(Kept, GivesTheBitsOfAFreshOne) {
+  const Scene scene = small_box();
+  const std::vector<Motion> all = motions(scene);
+  const TangentBasis basis = make_basis(scene, all);
+  const GateSet gates(GateShape::boxcar(0.6), {5.0, 6.0});
+  const EstimatorOptions options{.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 8};
+  SceneCache cache(scene, CasterUpdate::rebuild);
+  for (const auto& theta : kPoints) {
+    const Scene moved = at(scene, all, theta);
+    EXPECT_EQ(everything(Renderer(moved, gates, options, &basis, &cache), moved, gates),
+              everything(Renderer(moved, gates, options, &basis), moved, gates));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
+                         [](const auto& test) { return test.param == Sampling::standard ? "Standard" : "Ellipsoidal"; });
+
+TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
+  const Scene scene = small_box();
+  const std::vector<Motion> all = motions(scene);
+  const TangentBasis basis = make_basis(scene, all);
+  const GateSet gates(GateShape::gaussian(0.3), {5.0, 6.0});
+  const EstimatorOptions options{.max_bounces = 3, .sampling = Sampling::standard};
+  SceneCache cache(scene, CasterUpdate::refit);
+  for (const auto& theta : kPoints) {
+    const Scene moved = at(scene, all, theta);
+    SceneCache fresh(scene, CasterUpdate::refit);
+    const auto kept = everything(Renderer(moved, gates, options, &basis, &cache), moved, gates);
+    EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis, &fresh), moved, gates));
+    // Rays meet the same triangles as those of a hierarchy made anew.
+    EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis), moved, gates));
+  }
+}
+
+TEST(KeptScenes, TwoAtATimeDoNotMeet) {
+  const Scene scene = small_box();
+  const std::vector<Motion> all = motions(scene);
+  const TangentBasis basis = make_basis(scene, all);
+  const GateSet gates(GateShape::gaussian(0.3), {5.0, 6.0});
+  const EstimatorOptions options{.max_bounces = 2, .sampling = Sampling::standard};
+  SceneCache cache(scene, CasterUpdate::rebuild);
+  const Scene a = at(scene, all, kPoints[1]), b = at(scene, all, kPoints[3]);
+  const Renderer first(a, gates, options, &basis, &cache);
+  const auto before = everything(first, a, gates);
+  {
+    const Renderer second(b, gates, options, &basis, &cache), images(b, gates, options, nullptr, &cache);
+    EXPECT_NE(everything(second, b, gates), before);
+    EXPECT_EQ(images.render({1, 0, 0}, {0, 4}).data, second.render({1, 0, 0}, {0, 4}).data);
+  }
+  EXPECT_EQ(everything(first, a, gates), before);
+}
+
+TEST(PreparedScene, TouchesWhatMovedAlone) {
+  const Scene scene = small_box();
+  const std::vector<Motion> all = motions(scene);
+  const TangentBasis basis = make_basis(scene, all);
+  PreparedScene prepared(scene, &basis);
+  const int before = prepared.revision();
+  prepared.update(at(scene, all, {0.1, 0, 0, 0}), &basis, {});
+  const int block = scene.find_shape("block");
+  for (std::size_t t = 0; t < scene.triangles.size(); ++t)
+    EXPECT_EQ(prepared.changed(static_cast<int>(t)) > before, scene.triangles[t].shape == block) << t;
+}
+
+// Boxes that turn and go through each other, one of them through itself as well.
+TEST(CrossingEdges, FindWhatAllEdgesFind) {
+  Scene scene;
+  scene.camera = {{0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 40, 8, 8};
+  add_shape(scene, "still", box({-1, -1, -1}, {1, 0, 1}), diffuse(Rgb(0.5)));
+  add_shape(scene, "turns", box({-0.4, -0.3, -0.3}, {0.4, 0.5, 0.3}), diffuse(Rgb(0.5)));
+  Mesh crossed = box({-0.2, 1, -0.2}, {0.2, 1.4, 0.2});
+  const Mesh other = box({-0.1, 1.1, -0.4}, {0.1, 1.2, 0.4});
+  const int first = static_cast<int>(crossed.positions.size());
+  crossed.positions.insert(crossed.positions.end(), other.positions.begin(), other.positions.end());
+  for (const auto& f : other.faces) crossed.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
+  add_shape(scene, "crossed", crossed, diffuse(Rgb(0.5)));
+  const CrossingEdges crossing(scene);
+  int found = 0;
+  for (int k = 0; k < 24; ++k) {
+    Scene moved = scene;
+    rotate_y(scene, "turns", {0.2, 0, 0}).apply(moved, 0.3 * k);
+    translate(scene, "crossed", {0.02, -0.11, 0.01}).apply(moved, k);
+    const RayCaster caster(moved);
+    const auto all = find_mesh_intersections(moved, caster), some = crossing.find(moved, caster);
+    ASSERT_EQ(all.size(), some.size());
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      EXPECT_EQ(all[i].triangle, some[i].triangle);
+      EXPECT_EQ(all[i].end, some[i].end);
+    }
+    found += static_cast<int>(all.size());
+  }
+  EXPECT_GT(found, 500);
+}
+
+}  // namespace
+}  // namespace isochron::testing
