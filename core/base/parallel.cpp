@@ -5,6 +5,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <mutex>
+
 #include "core/base/progress.h"
 
 namespace isochron {
@@ -12,10 +14,23 @@ namespace {
 
 int thread_count = 0;
 
+/// Kept from call to call, each of which would else hire its threads anew.
+tbb::task_arena& arena() {
+  static tbb::task_arena kept;
+  static int threads_of_kept = -1;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  if (threads_of_kept != thread_count) {
+    kept.terminate();
+    kept.initialize(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
+    threads_of_kept = thread_count;
+  }
+  return kept;
+}
+
 template <class F>
 void run(int count, const F& f) {
-  tbb::task_arena arena(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
-  arena.execute([&] {
+  arena().execute([&] {
     tbb::parallel_for(
         tbb::blocked_range<int>(0, count, 1),
         [&](const tbb::blocked_range<int>& range) {

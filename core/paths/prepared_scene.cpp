@@ -1,48 +1,10 @@
 #include "core/paths/prepared_scene.h"
 
-#include <limits>
 #include <utility>
 
 #include "core/base/parallel.h"
 
 namespace isochron {
-
-MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
-    : vertex(scene.positions.size(), 0),
-      triangle(scene.triangles.size(), 0),
-      material(scene.materials.size(), 0),
-      emission(scene.shapes.size(), 0) {
-  const DofLayout layout(scene);
-  const int first_number = layout.first_number[0];
-  number.assign(layout.first_number.back() - first_number, 0);
-  if (!basis || basis->columns == 0) return;
-  for (int v = 0; v < layout.vertices; ++v)
-    for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->moves(layout.vertex(v, axis));
-  for (int m = 0; m < layout.materials(); ++m) {
-    for (int k = 0; k < layout.numbers(m); ++k) {
-      const int dof = layout.number(m, k);
-      material[m] |= number[dof - first_number] = basis->moves(dof);
-    }
-    const int index = scene.materials[m].bsdf().index_number();
-    lengths |= index >= 0 && basis->moves(layout.number(m, index));
-  }
-  for (int s = 0; s < layout.shapes; ++s)
-    for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
-  for (std::size_t t = 0; t < triangle.size(); ++t) {
-    for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
-    geometry |= triangle[t] != 0;
-  }
-  lengths |= geometry;
-  any = !basis->entries.empty();
-  find_bounds(scene);
-}
-
-void MovingParts::find_bounds(const Scene& scene) {
-  bounds = {};
-  for (std::size_t t = 0; t < triangle.size(); ++t)
-    if (triangle[t])
-      for (int v : scene.triangles[t].vertex) bounds.add(scene.positions[v]);
-}
 
 PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow,
                              CasterUpdate of_caster)
@@ -122,7 +84,7 @@ void PreparedScene::update_shapes() {
     const Material& material = scene.materials[shape.material];
     const Bsdf& bsdf = material.bsdf();
     const double index = bsdf.transparent() ? material.number(bsdf.index_number()) : 0;
-    shapes_.push_back({&bsdf, shape.material, bsdf.two_sided(), index});
+    shapes_.push_back({&bsdf, shape.material, bsdf.two_sided(), index, shape.emission});
     if (index == 0 || shape.triangle_count == 0) continue;
     has_medium_ = true;
     least_index_ = std::min(least_index_, index);
@@ -147,35 +109,32 @@ void PreparedScene::update_record(int t) {
 }
 
 void PreparedScene::update_emitters() {
-  emitters.clear();
-  emitter_bounds_.clear();
-  camera_sees_emitters = false;
+  std::vector<int> triangles;
   std::vector<double> power;
+  std::vector<Bounds> boxes;
+  bool seen = false;
   emitting_shapes_.resize(scene.shapes.size(), 0);
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
     const bool emits = !shape.emission.is_black();
     if (!std::exchange(emitting_shapes_[s], emits) && !emits) continue;
+    Bounds box;
     for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
       TriangleRecord& record = records_[t];
       record.emits = emits && record.area > 0;
       if (!record.emits) continue;
-      emitters.push_back(t);
-      camera_sees_emitters |=
-          height_over(t, camera.position) > 0 &&
-          !camera.misses_image(record.origin, record.origin + record.edge[0], record.origin + record.edge[1]);
+      const Vec3 corners[] = {record.origin, record.origin + record.edge[0], record.origin + record.edge[1]};
+      for (const Vec3& corner : corners) box.add(corner);
+      seen |= height_over(t, camera.position) > 0 && !camera.misses_image(corners[0], corners[1], corners[2]);
+      triangles.push_back(t);
       power.push_back(record.area * shape.emission.max());
     }
+    if (emits) boxes.push_back(box);
   }
-  emitter_distribution_ = DiscreteDistribution(power);
-  for (std::size_t i = 0; i < shapes_.size(); ++i) {
-    const Shape& shape = scene.shapes[i];
-    if (shape.emission.is_black()) continue;
-    if (!emitters.empty()) shapes_[i].emitter_pdf = shape.emission.max() / emitter_distribution_.total();
-    Bounds bounds;
-    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) bounds.add(scene.positions[v]);
-    emitter_bounds_.push_back(bounds);
-  }
+  emitters = Emitters(std::move(triangles), power, std::move(boxes));
+  emitters.seen_by_camera = seen;
+  for (ShapeRecord& shape : shapes_)
+    if (!shape.emission.is_black() && !emitters.empty()) shape.emitter_pdf = shape.emission.max() / emitters.power();
 }
 
 const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {
@@ -191,12 +150,6 @@ const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {
     hierarchy.bvh = EllipsoidBvh(input);
   });
   return hierarchy.bvh;
-}
-
-double PreparedScene::distance_to_emitters(const Vec3& p) const {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const Bounds& bounds : emitter_bounds_) nearest = std::min(nearest, bounds.distance_squared(p));
-  return std::sqrt(nearest) * least_index_;
 }
 
 }  // namespace isochron

@@ -8,65 +8,19 @@
 #include <optional>
 #include <vector>
 
-#include "core/base/discrete_distribution.h"
 #include "core/base/large_array.h"
 #include "core/geometry/bounds.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
 #include "core/geometry/ray_caster.h"
+#include "core/paths/emitters.h"
+#include "core/paths/moving_parts.h"
+#include "core/paths/records.h"
 #include "core/paths/vertex_flow.h"
-#include "core/scene/camera_model.h"
 #include "core/scene/scene.h"
+#include "core/scene/sensors/pinhole.h"
 
 namespace isochron {
-
-/// A point on a triangle.
-struct SurfacePoint {
-  Vec3 p;
-  Vec3 n;  ///< unit face normal
-  int triangle = -1;
-};
-
-/// What paths ask of a triangle, side by side in memory: two cache lines, the first of which decides where a ray ends and how
-/// it goes on. On a fine mesh each is a wait for main memory.
-struct alignas(64) TriangleRecord {
-  Vec3 normal;  ///< unit; zero when the triangle has no area
-  Vec3 origin;  ///< corner 0
-  double area = 0;
-  int shape = -1;
-  bool emits = false;
-  bool moves = false;               ///< a path through the triangle can have a derivative
-  std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
-  Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
-  std::array<int, 3> vertex = {};
-};
-static_assert(sizeof(TriangleRecord) == 128);
-
-/// What paths ask of a shape.
-struct ShapeRecord {
-  const Bsdf* bsdf = nullptr;
-  int material = -1;
-  bool two_sided = false;
-  double index = 0;        ///< of refraction behind its faces; 0: opaque
-  double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
-};
-
-/// Which degrees of freedom move. Everything else is skipped by the derivative passes.
-struct MovingParts {
-  std::vector<std::uint8_t> vertex, triangle;
-  std::vector<std::uint8_t> material;  ///< any of its numbers
-  std::vector<std::uint8_t> number;    ///< as DofLayout counts them, from the first material's first on
-  std::vector<std::uint8_t> emission;  ///< per shape
-  bool any = false, geometry = false;
-  Bounds bounds;         ///< of the triangles with a vertex that moves
-  bool lengths = false;  ///< paths can change their length
-  MovingParts() = default;
-  MovingParts(const Scene& scene, const TangentBasis* basis);
-  /// Sets `bounds`; to be called again when vertices have moved.
-  void find_bounds(const Scene& scene);
-  /// Of a degree of freedom that is a material's.
-  bool number_moves(const DofLayout& layout, int dof) const { return number[dof - layout.first_number[0]] != 0; }
-};
 
 /// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
 class PreparedScene {
@@ -94,8 +48,7 @@ class PreparedScene {
   /// Of the triangles with a vertex that moves, and as much more as rays go astray by rounding; and of all vertices but x1
   /// that may follow or be followed.
   Bounds moving_bounds, flowing_bounds;
-  std::vector<int> emitters;          ///< triangles that emit
-  bool camera_sees_emitters = false;  ///< may, if nothing is in between
+  Emitters emitters;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -108,10 +61,9 @@ class PreparedScene {
   /// Whether its material reflects on both sides.
   bool two_sided(int triangle) const { return shapes_[shape_index(triangle)].two_sided; }
 
-  /// Radiance that leaves the point towards the unit direction w; black on the back of an emitter.
-  Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
-    return dot(x.n, w) > 0 ? shape_of(x.triangle).emission : Rgb();
-  }
+  /// Radiance that leaves the point of an emitter on the normal's side, and towards the unit direction w: none on the back.
+  const Rgb& emission(int triangle) const { return shapes_[shape_index(triangle)].emission; }
+  Rgb emitted(const SurfacePoint& x, const Vec3& w) const { return dot(x.n, w) > 0 ? emission(x.triangle) : Rgb(); }
 
   /// What the segment between x and y, which see each other, runs inside of: the shape of a transparent material with an end
   /// of the segment on the back of its face. Null outside. Opaque surfaces and the camera (triangle -1) know no medium: a
@@ -149,20 +101,16 @@ class PreparedScene {
       if (r.moving_corners >> i & 1) f(i, r.vertex[i]);
   }
 
-  /// Uniform by area x radiance over the emitters; `pdf` per area.
+  /// A point of an emitter, in proportion to area x radiance; `pdf` per area.
   SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const {
     const int t = pick_emitter(u0);
     pdf = emitter_pdf(t);
     return point_on_emitter(t, u1, u2);
   }
-  /// The same in three steps, each of which prefetches what the next one reads, so that other work can be done meanwhile;
-  /// the first is optional.
-  void prefetch_light(double u) const {
-    const int i = emitter_distribution_.prefetch(u);
-    __builtin_prefetch(&emitters[i]);
-  }
+  /// The same in steps, each of which prefetches what the next one reads, so that other work can be done meanwhile; the first,
+  /// Emitters::prefetch, is optional.
   int pick_emitter(double u) const {
-    const int t = emitters[emitter_distribution_.sample(u)];
+    const int t = emitters.pick(u);
     prefetch(t);
     return t;
   }
@@ -237,7 +185,7 @@ class PreparedScene {
   }
 
   /// Lower bound of the optical length of any path from p to an emitter.
-  double distance_to_emitters(const Vec3& p) const;
+  double distance_to_emitters(const Vec3& p) const { return emitters.distance(p) * least_index_; }
 
  private:
   /// Whether x is on a transparent face whose back the direction d leaves from.
@@ -267,8 +215,6 @@ class PreparedScene {
   mutable std::array<std::unique_ptr<LazyHierarchy>, 3> hierarchies_;  ///< by Part
   std::vector<ShapeRecord> shapes_;
   std::vector<char> emitting_shapes_;
-  std::vector<Bounds> emitter_bounds_;  ///< one per emitting shape
-  DiscreteDistribution emitter_distribution_;
   bool has_medium_ = false;
   double least_index_ = 1;
 };

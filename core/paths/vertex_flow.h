@@ -23,8 +23,8 @@
 #include <vector>
 
 #include "core/geometry/bounds.h"
-#include "core/scene/camera_model.h"
 #include "core/scene/scene.h"
+#include "core/scene/sensors/pinhole.h"
 
 namespace isochron {
 

@@ -1,27 +1,31 @@
-// Meshes are read by OpenMesh (mesh_file.cpp), after a check (mesh_check.cpp) for what OpenMesh would get
-// wrong without saying so: it takes what is not a number for zero, skips vertices, which shifts the indices
-// of those behind, passes on indices of vertices that do not exist, and takes colors or comments for data.
+// Readers of mesh files, one per format; mesh.h is what others use.
 #pragma once
-#include <optional>
+#include <array>
+#include <cstddef>
 #include <string>
 #include <vector>
 
+#include "core/base/vec.h"
+
 namespace isochron {
 
-/// What OpenMesh has to find in a file.
-struct CheckedMeshFile {
-  std::string contents;                 ///< of text and PLY only what OpenMesh has to see
-  bool binary = false;                  ///< of PLY or STL
-  std::optional<std::size_t> vertices;  ///< not known of STL: OpenMesh joins equal ones
-  std::size_t faces = 0;                ///< with three different corners; OpenMesh may drop others
+/// What a mesh file holds. Coordinates are rounded to float.
+struct PolygonMesh {
+  std::vector<Vec3> positions;
+  std::vector<int> corners;       ///< of all polygons
+  std::vector<std::size_t> ends;  ///< in `corners`, of each polygon
+
+  void add_vertex(const std::array<float, 3>& p) { positions.push_back({p[0], p[1], p[2]}); }
+  /// Leaves out polygons of fewer than three different corners.
+  void add_polygon(const std::vector<int>& polygon);
 };
 
-/// Checks that the file holds as much as it declares, that every coordinate is a finite float, and every
-/// index that of a vertex. `extension` is ".obj", ".off", ".ply" or ".stl". Throws InputError `FILE[:LINE]:
-/// what is wrong`, with lines counted from one.
-CheckedMeshFile check_mesh_file(const std::string& file, const std::string& extension, std::string contents);
-
-/// Whether three of the vertices differ.
-bool has_three_corners(const std::vector<int>& vertices);
+/// All throw InputError `FILE[:LINE]: what is wrong`, with lines counted from one, unless the file holds as much as it
+/// declares, every coordinate is a finite float, and every index that of a vertex.
+PolygonMesh read_obj(const std::string& file, const std::string& contents);
+PolygonMesh read_off(const std::string& file, const std::string& contents);
+PolygonMesh read_ply(const std::string& file, const std::string& contents);  ///< text or binary
+/// Text or binary. Vertices at equal positions are one.
+PolygonMesh read_stl(const std::string& file, const std::string& contents);
 
 }  // namespace isochron

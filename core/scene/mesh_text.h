@@ -1,4 +1,4 @@
-// Text files of meshes, word by word; part of the check in mesh_file.h.
+// Text files of meshes, word by word; for the readers of mesh_file.h.
 #pragma once
 #include <fmt/format.h>
 
@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "core/base/error.h"
@@ -15,16 +16,13 @@
 
 namespace isochron {
 
-/// A text file's lines and words, and what the formats have in common. The words asked for are copied, and
-/// only they reach OpenMesh: the rest, such as comments, colors or normals, it may take for something else.
+/// A text file's lines and words, and what the formats have in common.
 class MeshText {
  public:
   static constexpr long long kMostItems = std::numeric_limits<int>::max();
 
   MeshText(const std::string& file, const std::string& contents, char comment)
-      : file_(file), rest_(contents), comment_(comment) {
-    copy.reserve(contents.size());
-  }
+      : file_(file), rest_(contents), comment_(comment) {}
 
   bool next() {  ///< goes to the next line that is not blank; false at the end
     while (!rest_.empty()) {
@@ -33,8 +31,6 @@ class MeshText {
       ++line_;
       if (comment_ != '\0') current_ = current_.substr(0, current_.find(comment_));
       if (current_.find_first_not_of(kSpaces) == std::string_view::npos) continue;
-      if (!copy.empty() && copy.back() != '\n') copy += '\n';
-      line_start_ = copy.size();
       return true;
     }
     current_ = {};
@@ -47,8 +43,6 @@ class MeshText {
     current_.remove_prefix(std::min(current_.find_first_not_of(kSpaces), current_.size()));
     const std::string_view word = current_.substr(0, current_.find_first_of(kSpaces));
     current_.remove_prefix(word.size());
-    if (copy.size() > line_start_) copy += ' ';
-    copy += word;
     return word;
   }
   float number() {
@@ -89,25 +83,15 @@ class MeshText {
     }
     return corners;
   }
-  std::size_t check_face(const std::vector<int>& corners) {  ///< 1 where it counts in CheckedMeshFile::faces, else 0
+  void add_face(const std::vector<int>& corners, PolygonMesh& mesh) {
     if (corners.size() < 3) fail(fmt::format("a face of {} vertices (at least three)", corners.size()));
-    return has_three_corners(corners);
-  }
-  void rewrite(std::string_view word, std::string_view by) {  ///< of the copy's last word
-    copy.resize(copy.size() - word.size());
-    copy += by;
+    mesh.add_polygon(corners);
   }
   std::string_view rest() const { return rest_; }  ///< behind the line
-  void skip_line() { copy.resize(line_start_); }
   int line() const { return line_; }
   [[noreturn]] void fail(const std::string& what) const {
     throw InputError(fmt::format("{}:{}: {}", file_, line_, what));
   }
-  CheckedMeshFile found(std::optional<std::size_t> vertices, std::size_t faces) {
-    return {std::move(copy) + '\n', false, vertices, faces};
-  }
-
-  std::string copy;
 
  private:
   static constexpr std::string_view kSpaces = " \t\r\f\v";
@@ -116,10 +100,6 @@ class MeshText {
   std::string_view rest_, current_;
   char comment_;
   int line_ = 0;
-  std::size_t line_start_ = 0;  // in the copy
 };
-
-/// PLY, text or binary.
-CheckedMeshFile check_ply(const std::string& file, const std::string& contents);
 
 }  // namespace isochron

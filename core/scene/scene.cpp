@@ -5,11 +5,6 @@
 
 namespace isochron {
 
-bool coordinates_fit(const Vec3& p) {
-  return std::abs(p.x) <= kLargestCoordinate && std::abs(p.y) <= kLargestCoordinate &&
-         std::abs(p.z) <= kLargestCoordinate;
-}
-
 bool coordinates_fit(const Scene& scene) {
   return coordinates_fit(scene.camera.position) &&
          std::all_of(scene.positions.begin(), scene.positions.end(), [](const Vec3& p) { return coordinates_fit(p); });

@@ -5,16 +5,11 @@
 #include <vector>
 
 #include "core/base/vec.h"
+#include "core/scene/coordinates.h"
 #include "core/scene/materials/material.h"
+#include "core/scene/sensors/pinhole.h"
 
 namespace isochron {
-
-/// Pinhole camera. `fov` is in degrees, across the image's width; rows count from the top, columns from the left.
-struct Camera {
-  Vec3 position, look_at, up{0, 1, 0};
-  double fov = 40;
-  int width = 64, height = 64;
-};
 
 /// Vertex indices into Scene::positions, counter-clockwise seen from the side the normal points to.
 struct Triangle {
@@ -55,11 +50,7 @@ struct Scene {
   int find_material(const std::string& name) const;  ///< -1 when there is none
 };
 
-/// Largest coordinate of a vertex or the camera that can be rendered: Embree multiplies three of them in single precision,
-/// which overflows from 7e12 on, and ends the program where one exceeds 1.8e18.
-inline constexpr double kLargestCoordinate = 1e12;
-/// Whether they are at most that, and none is NaN.
-bool coordinates_fit(const Vec3& p);
+/// Of the camera and all vertices.
 bool coordinates_fit(const Scene& scene);
 
 /// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then those of

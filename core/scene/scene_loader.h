@@ -10,9 +10,6 @@ namespace isochron {
 /// Throws InputError `FILE:LINE:COLUMN: KEY: what is wrong (what is allowed)`, in one line.
 Scene load_scene(const std::string& file);
 
-/// An image's size.
-Field resolution_field(int& width, int& height);
-
 /// Tables of a scene file's keys, in Markdown.
 std::string scene_reference();
 

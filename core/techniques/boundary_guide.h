@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/films/sinks.h"
-#include "core/scene/camera_model.h"
+#include "core/scene/sensors/pinhole.h"
 
 namespace isochron {
 

@@ -9,7 +9,7 @@ void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
   worker_.start_at_camera(worker_.path);
   draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
   for (const TargetLength& target : targets_) {
-    if (scene_.camera_sees_emitters) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
+    if (scene_.emitters.seen_by_camera) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
     if (worker_.options.max_bounces >= 1) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
   }
 }
@@ -75,7 +75,7 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
       scene_.hierarchy(any_arc_contributes(y.triangle) ? PreparedScene::Part::all : PreparedScene::Part::moving);
   find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
 
-  const Rgb factor = throughput * scene_.shape_of(y.triangle).emission * (1 / pdf_y);
+  const Rgb factor = throughput * scene_.emission(y.triangle) * (1 / pdf_y);
   ArcPair chosen;
   const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
     const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
@@ -240,7 +240,7 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, d
   // About the foot of x in the plane, dA = r dr dphi with r the distance.
   const double area = arcs.total_span * distance;
   out.pdf = 1 / area;
-  out.value = throughput * f * scene_.shape_of(t).emission * (carried * area);
+  out.value = throughput * f * scene_.emission(t) * (carried * area);
   out.point = y;
 }
 

@@ -94,6 +94,7 @@ void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
   BoundaryEdges::Place place = place_from_camera(pixel, 1, rng);
   if (!worker_.start_camera_path(pixel, rng)) return;
   Path& path = worker_.path;
+  camera_densities_ = {};
   Rgb throughput(1.0);
   double tau = 0;
   if (at_length_) {
@@ -107,6 +108,9 @@ void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
     place = place_from_camera(pixel, bounce + 1, rng);
     if (!append_vertex(worker_, path, throughput, rng)) return;
+    const SurfacePoint &before = path.vertex[bounce - 1], &x = path.vertex[bounce];
+    camera_densities_.towards_light *= towards(before, x, path.back());
+    if (bounce > 1) camera_densities_.towards_camera *= back(before, x, path.back().p);
   }
 }
 
@@ -174,23 +178,25 @@ const LocalDifferential& SecondaryBoundary::with_following(const Segment& g, con
   return following_;
 }
 
-double SecondaryBoundary::camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k, int pixel) const {
+double SecondaryBoundary::towards(const SurfacePoint& before, const SurfacePoint& x, const SurfacePoint& after) const {
+  return scene_.bsdf_of(x.triangle).pdf(Scattering(before.p, x, after.p)) * solid_angle_to_area(x.p, after);
+}
+
+double SecondaryBoundary::back(const SurfacePoint& before, const SurfacePoint& x, const Vec3& after) const {
+  return scene_.bsdf_of(x.triangle).pdf(Scattering(before.p, x, after).reversed()) * solid_angle_to_area(x.p, before);
+}
+
+double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint& x1, int k, int pixel,
+                                           const WalkDensities& walk) const {
   if (!techniques_.from_camera) return 0;
-  double ratio = camera_over_edge_rate_ * worker_.pick.rate(pixel) * camera_warp(pixel, k).density(g.y.x()) /
-                 edge_warp().density(g.y.x());
-  ratio *= scene_.camera.image_area_per_solid_angle(normalize(x[1].p - x[0].p)) * solid_angle_to_area(x[0].p, x[1]) /
-           scene_.camera.pixels();
-  for (int j = 1; j < k; ++j)
-    ratio *= scene_.bsdf_of(x[j].triangle).pdf(Scattering(x[j - 1].p, x[j], x[j + 1].p)) *
-             solid_angle_to_area(x[j].p, x[j + 1]);
-  double from_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, x[k]);
-  for (int j = k; j > 1; --j) {
-    const Vec3& after = j == k ? g.y.y : x[j + 1].p;
-    from_edge *= scene_.bsdf_of(x[j].triangle).pdf(Scattering(x[j - 1].p, x[j], after).reversed()) *
-                 solid_angle_to_area(x[j].p, x[j - 1]);
-  }
+  const Vec3& eye = scene_.camera.position;
+  const double by_camera = camera_over_edge_rate_ * worker_.pick.rate(pixel) * camera_warp(pixel, k).density(g.y.x()) /
+                           edge_warp().density(g.y.x()) *
+                           scene_.camera.image_area_per_solid_angle(normalize(x1.p - eye)) *
+                           solid_angle_to_area(eye, x1) / scene_.camera.pixels() * walk.towards_light;
+  const double by_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, g.camera_end) * walk.towards_camera;
   // Within round-off of the next vertex a path may seem impossible both ways.
-  return ratio > 0 ? ratio / from_edge : 0;
+  return by_camera > 0 ? by_camera / by_edge : 0;
 }
 
 void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng) {
@@ -199,6 +205,7 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
   eye.p = camera.position;
   Rgb throughput(1.0);
   walk_.assign(1, g.camera_end);
+  WalkDensities densities;
   Vec3 from = g.w;  // unit, towards where the light comes from
   double walked = 0;
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
@@ -211,11 +218,11 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
       // Zero for a face seen edge-on, which has no flow along the pixel's ray either.
       const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
       if (!f.is_black() && importance > 0 && worker_.visible_from_camera(x)) {
-        camera_side_.assign(1, eye);
-        camera_side_.insert(camera_side_.end(), walk_.rbegin(), walk_.rend());
-        connections_.push_back(
-            {pixel, bounce, throughput * f * (importance * scale), walked + distance * scene_.index_between(x, eye),
-             camera_over_edge(g, camera_side_, bounce, pixel), bounce > 1 ? walk_[1] : SurfacePoint{}});
+        WalkDensities all = densities;
+        if (bounce > 1) all.towards_light *= towards(eye, x, walk_[bounce - 2]);
+        connections_.push_back({pixel, bounce, throughput * f * (importance * scale),
+                                walked + distance * scene_.index_between(x, eye),
+                                camera_over_edge(g, x, bounce, pixel, all), bounce > 1 ? walk_[1] : SurfacePoint{}});
       }
     }
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
@@ -225,6 +232,8 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
     walked += length(next->point.p - x.p) * scene_.index_between(x, next->point);
     const double others = g.r_d + g.r_s + length(next->point.p - camera.position);
     if (walked + others * scene_.least_index() > worker_.gates.upper()) return;
+    densities.towards_camera *= next->pdf * solid_angle_to_area(x.p, next->point);
+    if (bounce > 1) densities.towards_light *= towards(next->point, x, walk_[bounce - 2]);
     walk_.push_back(next->point);
   }
 }
@@ -304,9 +313,12 @@ bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throu
   ++worker_.rays;
   if (scene_.caster.occluded(scene_.offset_ray_origin(g.camera_end, g.w), g.offset_ray_origin(scene_.caster.offset())))
     return false;
+  WalkDensities densities = camera_densities_;
+  if (k > 1) densities.towards_camera *= back(path.vertex[k - 1], g.camera_end, g.y.y);
   const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x()));
-  connections_.assign(1, {pixel, k, throughput * f * factor, path.length.back(),
-                          camera_over_edge(g, path.vertex, k, pixel), k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
+  connections_.assign(
+      1, {pixel, k, throughput * f * factor, path.length.back(),
+          camera_over_edge(g, path.vertex[1], k, pixel, densities), k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
   return true;
 }
 

@@ -91,8 +91,16 @@ class SecondaryBoundary {
   /// The same on the path of connection c that goes on to `next` (none: triangle -1), with what D and S follow.
   const LocalDifferential& with_following(const Segment& g, const Connection& c, const SurfacePoint& next);
 
-  /// Density of finding the segment from the camera, over that of finding it from the edge. `x` holds x0 .. xk = D.
-  double camera_over_edge(const Segment& g, std::span<const SurfacePoint> x, int k, int pixel) const;
+  /// Of the vertices between x1 and D: densities per area of going on from one to the next by sampling the BSDF, multiplied.
+  struct WalkDensities {
+    double towards_light = 1, towards_camera = 1;
+  };
+  /// The factors of x between two neighbours, the one on the camera's side first: density of `after`, and of `before`.
+  double towards(const SurfacePoint& before, const SurfacePoint& x, const SurfacePoint& after) const;
+  double back(const SurfacePoint& before, const SurfacePoint& x, const Vec3& after) const;
+
+  /// Density of finding the segment from the camera, by a path on which D is vertex k, over that of finding it from the edge.
+  double camera_over_edge(const Segment& g, const SurfacePoint& x1, int k, int pixel, const WalkDensities& walk) const;
 
   /// Walks on from D, away from the light, and collects a connection to the camera at every vertex.
   void walk_to_camera(const Segment& g, double scale, Rng& rng);
@@ -126,7 +134,8 @@ class SecondaryBoundary {
   const double aimed_share_;            ///< of the directions from an edge
   LightSide light_side_;
   LocalDifferential camera_flow_, material_flow_, following_;
-  std::vector<SurfacePoint> walk_, camera_side_;
+  std::vector<SurfacePoint> walk_;
+  WalkDensities camera_densities_;  ///< of the worker's path, up to its last vertex but one
   std::vector<Connection> connections_;
   std::vector<CameraSide> before_;  ///< up to S, one per connection
 };

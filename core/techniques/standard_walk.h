@@ -62,7 +62,7 @@ class StandardWalk {
         const double pdf_bsdf = bsdf.pdf(s) * to_area;
         path_.push(scene, y, s.distance_i);
         if (visitor_.wants() && worker_.visible(x, y))
-          visitor_.take(throughput_ * f * scene.shape_of(y.triangle).emission *
+          visitor_.take(throughput_ * f * scene.emission(y.triangle) *
                         (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_bsdf)));
         path_.pop();
       }
@@ -102,7 +102,7 @@ class StandardWalk {
   /// are prefetched during a ray, the emitter itself before the next vertex.
   void draw_light(Rng& rng) {
     light_draw_ = rng.uniform();
-    worker_.scene.prefetch_light(light_draw_);
+    worker_.scene.emitters.prefetch(light_draw_);
   }
   void pick_light() { light_ = worker_.scene.pick_emitter(light_draw_); }
 

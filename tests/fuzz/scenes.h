@@ -1,7 +1,7 @@
 // The files that the fuzzed scenes and experiments may name.
 #pragma once
-#include "core/scene/camera_model.h"
 #include "core/scene/scene.h"
+#include "core/scene/sensors/pinhole.h"
 #include "tests/fuzz/harness.h"
 
 namespace isochron::fuzz {

@@ -1,8 +1,7 @@
-#include "core/scene/camera_model.h"
-
 #include <gtest/gtest.h>
 
 #include "core/base/random.h"
+#include "core/scene/sensors/pinhole.h"
 
 namespace isochron::testing {
 namespace {

@@ -41,8 +41,8 @@ std::vector<double> everything(const Renderer& renderer, const Scene& scene, con
   return result;
 }
 
-const std::vector<std::vector<double>> kPoints = {
-    {0, 0, 0, 0}, {0.1, 0.3, 0, 0}, {0.45, 0.3, 0, 0}, {0.45, 0.3, 0.1, 2}, {0, 0, 0, 0}, {-0.2, -0.1, 0.05, 1}};
+const std::vector<std::vector<double>> kPoints = {{0, 0, 0, 0},        {0.1, 0.3, 0, 0}, {0.45, 0.3, 0, 0},
+                                                  {0.45, 0.3, 0.1, 2}, {0, 0, 0, 0},     {-0.2, -0.1, 0.05, 1}};
 
 class Kept : public ::testing::TestWithParam<Sampling> {};
 
@@ -60,8 +60,9 @@ TEST_P(Kept, GivesTheBitsOfAFreshOne) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling::ellipsoidal),
-                         [](const auto& test) { return test.param == Sampling::standard ? "Standard" : "Ellipsoidal"; });
+INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
+  return test.param == Sampling::standard ? "Standard" : "Ellipsoidal";
+});
 
 TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
   const Scene scene = small_box();

@@ -156,7 +156,7 @@ TEST_F(MeshFile, CornersTwiceCostNoOtherTriangle) {
 }
 
 TEST_F(MeshFile, CommentsAndAttributesAreNotTakenForData) {
-  // Each of these makes OpenMesh alone lose or invent faces or vertices.
+  // Each of these makes common readers lose or invent faces or vertices.
   const std::vector<Vec3> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
   const std::vector<Face> faces{{0, 1, 2}, {1, 3, 2}};
   const auto expect_same = [&](const std::string& name, const std::string& contents) {
@@ -183,9 +183,8 @@ TEST_F(MeshFile, CommentsAndAttributesAreNotTakenForData) {
 }
 
 TEST_F(MeshFile, MeshesThatAreNoManifoldAreReadAsTheyAre) {
-  // An edge of three faces, a neighbor of opposite orientation, and a face that shares only a vertex. Where
-  // OpenMesh links faces it gives the third, the fourth and the last vertices of their own. The last vertex
-  // has no face.
+  // An edge of three faces, a neighbor of opposite orientation, and a face that shares only a vertex: a reader that links
+  // faces would give the third, the fourth and the last vertices of their own. The last vertex has no face.
   const std::vector<Vec3> positions{{0, 0, 0},   {0, 0, 1}, {1, 0, 0}, {0, 1, 0},
                                     {-1, -1, 0}, {5, 0, 1}, {5, 1, 1}, {9, 9, 9}};
   const std::vector<Face> faces{{0, 1, 2}, {1, 0, 3}, {0, 1, 4}, {0, 2, 4}, {1, 5, 6}};

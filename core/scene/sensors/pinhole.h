@@ -1,9 +1,24 @@
-// The pinhole camera's mapping between image plane, measured in pixels, and directions.
+// The pinhole camera: what files say of it, and its mapping between image plane, measured in pixels, and directions.
 #pragma once
 #include "core/base/constants.h"
-#include "core/scene/scene.h"
+#include "core/base/description.h"
+#include "core/base/vec.h"
 
 namespace isochron {
+
+/// `fov` is in degrees, across the image's width; rows count from the top, columns from the left.
+struct Camera {
+  Vec3 position, look_at, up{0, 1, 0};
+  double fov = 40;
+  int width = 64, height = 64;
+};
+
+/// Its keys.
+void describe(Keys& keys, Camera& camera);
+/// [width, height] of an image.
+Field resolution_field(int& width, int& height);
+/// A direction of a scene file, which becomes a unit vector.
+Field unit_direction(Vec3& variable);
 
 /// Image coordinates (u, v) run over [0, width) x [0, height), v downwards; one pixel is a unit square.
 class CameraModel {

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -15,14 +15,14 @@
 namespace isochron {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "what OpenMesh is given is little-endian");
-
 enum class Scalar { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 constexpr std::size_t kSize[] = {1, 1, 2, 2, 4, 4, 4, 8};
 
 struct Property {
-  bool list, kept;
+  bool list;
   Scalar count, type;  ///< count: of lists
+  int axis = -1;       ///< of a coordinate
+  bool corners = false;
 };
 
 struct Element {
@@ -35,7 +35,6 @@ struct Header {
   std::string format;
   std::vector<Element> elements;
   long long vertices = 0;
-  std::string kept;  ///< the header of what OpenMesh has to see
 };
 
 Scalar find_scalar(const MeshText& text, std::string_view word) {
@@ -56,14 +55,12 @@ void read_property(MeshText& text, Header& header, std::set<std::string>& known)
   property.type = find_scalar(text, type);
   std::string name(text.word());
   if (property.list && element.name == "face" && (name == "vertex_indices" || name == "vertex_index")) {
-    property.kept = true;
+    property.corners = true;
     name = "vertex_indices";
-    header.kept += "property list int int vertex_indices\n";
   } else if (!property.list && element.name == "vertex" && (name == "x" || name == "y" || name == "z")) {
-    property.kept = true;
-    header.kept += fmt::format("property float {}\n", name);
+    property.axis = name[0] - 'x';
   }
-  if (property.kept && !known.insert(name).second) text.fail(name + " stands here twice");
+  if ((property.corners || property.axis >= 0) && !known.insert(name).second) text.fail(name + " stands here twice");
   element.properties.push_back(property);
 }
 
@@ -84,7 +81,6 @@ Header read_header(MeshText& text) {
       header.elements.push_back({name, text.count(), {}});
       if (name != "vertex" && name != "face") continue;
       if (!known.insert("element " + name).second) text.fail("element " + name + " stands here twice");
-      header.kept += fmt::format("element {} {}\n", name, header.elements.back().count);
       if (name == "vertex") header.vertices = header.elements.back().count;
     } else if (keyword == "property") {
       read_property(text, header, known);
@@ -94,33 +90,29 @@ Header read_header(MeshText& text) {
   if (!known.contains("x") || !known.contains("y") || !known.contains("z"))
     text.fail("the header has no element vertex with properties x, y and z");
   if (!known.contains("vertex_indices")) text.fail("has no faces (an element face with property vertex_indices)");
-  const char* const format = header.format == "ascii" ? "ascii" : "binary_little_endian";
-  header.kept = fmt::format("ply\nformat {} 1.0\n{}end_header\n", format, header.kept);
   return header;
 }
 
-CheckedMeshFile check_text(MeshText& text, Header header) {
-  text.copy = std::move(header.kept);
-  std::size_t faces = 0;
+PolygonMesh read_text(MeshText& text, const Header& header) {
+  PolygonMesh mesh;
   for (const Element& element : header.elements) {
     for (long long i = 0; i < element.count; ++i) {
       text.require_next();
+      std::array<float, 3> point;
       for (const Property& property : element.properties) {
-        const std::size_t copied = text.copy.size();
-        if (property.kept && property.list) {
-          faces += text.check_face(text.face(header.vertices));
-        } else if (property.kept) {
-          text.number();
+        if (property.corners) {
+          text.add_face(text.face(header.vertices), mesh);
+        } else if (property.axis >= 0) {
+          point[static_cast<std::size_t>(property.axis)] = text.number();
         } else {
-          for (long long left = property.list ? text.count() : 1; left > 0; --left) {
+          for (long long left = property.list ? text.count() : 1; left > 0; --left)
             if (text.word().empty()) text.fail("the line ends too early");
-          }
-          text.copy.resize(copied);
         }
       }
+      if (element.name == "vertex") mesh.add_vertex(point);
     }
   }
-  return text.found(header.vertices, faces);
+  return mesh;
 }
 
 /// The numbers behind a binary file's header.
@@ -180,27 +172,16 @@ class Bytes {
   bool big_endian_;
 };
 
-template <class T>
-void append(std::string& bytes, T value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-CheckedMeshFile check_binary(const std::string& file, const Header& header, std::string_view rest) {
+PolygonMesh read_binary(const std::string& file, const Header& header, std::string_view rest) {
   Bytes bytes(file, rest, header.format == "binary_big_endian");
-  CheckedMeshFile found{header.kept, true, header.vertices, 0};
+  PolygonMesh mesh;
   std::vector<int> corners;
   for (const Element& element : header.elements) {
     if (element.properties.empty()) continue;
     for (long long i = 0; i < element.count; ++i) {
+      std::array<float, 3> point;
       for (const Property& property : element.properties) {
-        if (!property.kept) {
-          bytes.skip(property.list ? bytes.list_size(property.count) : 1, property.type);
-        } else if (!property.list) {
-          const float value = static_cast<float>(bytes.number(property.type));
-          if (!std::isfinite(value))
-            throw InputError(fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, i));
-          append(found.contents, value);
-        } else {
+        if (property.corners) {
           corners.clear();
           for (double left = bytes.list_size(property.count); left > 0; --left) {
             const double index = bytes.number(property.type);
@@ -210,22 +191,28 @@ CheckedMeshFile check_binary(const std::string& file, const Header& header, std:
           }
           if (corners.size() < 3)
             throw InputError(fmt::format("{}: face {} has {} vertices (at least three)", file, i, corners.size()));
-          append(found.contents, static_cast<std::int32_t>(corners.size()));
-          for (const int corner : corners) append(found.contents, static_cast<std::int32_t>(corner));
-          found.faces += has_three_corners(corners);
+          mesh.add_polygon(corners);
+        } else if (property.axis >= 0) {
+          const float value = static_cast<float>(bytes.number(property.type));
+          if (!std::isfinite(value))
+            throw InputError(fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, i));
+          point[static_cast<std::size_t>(property.axis)] = value;
+        } else {
+          bytes.skip(property.list ? bytes.list_size(property.count) : 1, property.type);
         }
       }
+      if (element.name == "vertex") mesh.add_vertex(point);
     }
   }
-  return found;
+  return mesh;
 }
 
 }  // namespace
 
-CheckedMeshFile check_ply(const std::string& file, const std::string& contents) {
+PolygonMesh read_ply(const std::string& file, const std::string& contents) {
   MeshText text(file, contents, '\0');
-  Header header = read_header(text);
-  return header.format == "ascii" ? check_text(text, std::move(header)) : check_binary(file, header, text.rest());
+  const Header header = read_header(text);
+  return header.format == "ascii" ? read_text(text, header) : read_binary(file, header, text.rest());
 }
 
 }  // namespace isochron

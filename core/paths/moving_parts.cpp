@@ -1,0 +1,42 @@
+#include "core/paths/moving_parts.h"
+
+namespace isochron {
+
+MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
+    : vertex(scene.positions.size(), 0),
+      triangle(scene.triangles.size(), 0),
+      material(scene.materials.size(), 0),
+      emission(scene.shapes.size(), 0) {
+  const DofLayout layout(scene);
+  const int first_number = layout.first_number[0];
+  number.assign(layout.first_number.back() - first_number, 0);
+  if (!basis || basis->columns == 0) return;
+  for (int v = 0; v < layout.vertices; ++v)
+    for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->moves(layout.vertex(v, axis));
+  for (int m = 0; m < layout.materials(); ++m) {
+    for (int k = 0; k < layout.numbers(m); ++k) {
+      const int dof = layout.number(m, k);
+      material[m] |= number[dof - first_number] = basis->moves(dof);
+    }
+    const int index = scene.materials[m].bsdf().index_number();
+    lengths |= index >= 0 && basis->moves(layout.number(m, index));
+  }
+  for (int s = 0; s < layout.shapes; ++s)
+    for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
+  for (std::size_t t = 0; t < triangle.size(); ++t) {
+    for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
+    geometry |= triangle[t] != 0;
+  }
+  lengths |= geometry;
+  any = !basis->entries.empty();
+  find_bounds(scene);
+}
+
+void MovingParts::find_bounds(const Scene& scene) {
+  bounds = {};
+  for (std::size_t t = 0; t < triangle.size(); ++t)
+    if (triangle[t])
+      for (int v : scene.triangles[t].vertex) bounds.add(scene.positions[v]);
+}
+
+}  // namespace isochron

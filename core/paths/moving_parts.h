@@ -1,0 +1,28 @@
+// What can have a derivative.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "core/geometry/bounds.h"
+#include "core/scene/scene.h"
+
+namespace isochron {
+
+/// Which degrees of freedom move. Everything else is skipped by the derivative passes.
+struct MovingParts {
+  std::vector<std::uint8_t> vertex, triangle;
+  std::vector<std::uint8_t> material;  ///< any of its numbers
+  std::vector<std::uint8_t> number;    ///< as DofLayout counts them, from the first material's first on
+  std::vector<std::uint8_t> emission;  ///< per shape
+  bool any = false, geometry = false;
+  Bounds bounds;         ///< of the triangles with a vertex that moves
+  bool lengths = false;  ///< paths can change their length
+  MovingParts() = default;
+  MovingParts(const Scene& scene, const TangentBasis* basis);
+  /// Sets `bounds`; to be called again when vertices have moved.
+  void find_bounds(const Scene& scene);
+  /// Of a degree of freedom that is a material's.
+  bool number_moves(const DofLayout& layout, int dof) const { return number[dof - layout.first_number[0]] != 0; }
+};
+
+}  // namespace isochron

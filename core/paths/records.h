@@ -1,0 +1,43 @@
+// What paths ask of a scene, side by side in memory.
+#pragma once
+#include <array>
+#include <cstdint>
+
+#include "core/base/vec.h"
+#include "core/scene/materials/bsdf.h"
+
+namespace isochron {
+
+/// A point on a triangle.
+struct SurfacePoint {
+  Vec3 p;
+  Vec3 n;  ///< unit face normal
+  int triangle = -1;
+};
+
+/// What paths ask of a triangle, side by side in memory: two cache lines, the first of which decides where a ray ends and how
+/// it goes on. On a fine mesh each is a wait for main memory.
+struct alignas(64) TriangleRecord {
+  Vec3 normal;  ///< unit; zero when the triangle has no area
+  Vec3 origin;  ///< corner 0
+  double area = 0;
+  int shape = -1;
+  bool emits = false;
+  bool moves = false;               ///< a path through the triangle can have a derivative
+  std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
+  Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
+  std::array<int, 3> vertex = {};
+};
+static_assert(sizeof(TriangleRecord) == 128);
+
+/// What paths ask of a shape.
+struct ShapeRecord {
+  const Bsdf* bsdf = nullptr;
+  int material = -1;
+  bool two_sided = false;
+  double index = 0;        ///< of refraction behind its faces; 0: opaque
+  Rgb emission;            ///< on the normal's side
+  double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
+};
+
+}  // namespace isochron
