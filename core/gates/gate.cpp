@@ -12,94 +12,13 @@
 namespace isochron {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Largest double below one: where a quantile is inverted, one itself would mean infinity.
 constexpr double kBelowOne = 1 - 0x1p-53;
 
-/// |x| / sigma at which the gaussian falls to 2^-53 of its peak: sqrt(106 ln 2).
-constexpr double kGaussianReach = 8.5717;
-
-void require_positive(double value, const char* name) {
-  if (!(value > 0 && std::isfinite(value))) {
-    throw InputError(std::string(name) + " must be positive and finite");
-  }
-}
-
-/// Variance of the standard normal cut to (-c, c). Integration by parts turns both moments into the positive
-/// series sum c^(2k) / (2k+1)!!, which loses no digits however short the interval.
-double truncated_variance(double c) {
-  double term = 1, sum = 0;
-  for (int k = 1; term > sum * 0x1p-60; ++k) {
-    term *= c * c / (2 * k + 1);
-    sum += term;
-  }
-  return sum / (1 + sum);
-}
-
 }  // namespace
 
-GateShape GateShape::steady() {
-  GateShape shape;
-  shape.lower_ = -kInfinity;
-  shape.upper_ = kInfinity;
-  shape.width_ = kInfinity;
-  return shape;
-}
-
-void GateShape::set_gaussian(double sigma, double cut) {
-  const double reach = cut / sigma;
-  sigma_ = sigma;
-  upper_ = cut;
-  lower_ = -cut;
-  peak_ = 1 / (sigma * std::sqrt(kTwoPi));
-  exponent_ = -0.5 * std::numbers::log2e / sigma / sigma;
-  slope_factor_ = -1 / sigma / sigma;
-  const double smooth = -std::expm1(-0.5 * reach * reach);
-  segments_.push_back({peak_ * smooth, {Side::Form::rayleigh, -sigma, smooth}, {Side::Form::rayleigh, sigma, smooth}});
-}
-
-GateShape GateShape::gaussian(double sigma) {
-  require_positive(sigma, "sigma");
-  GateShape shape;
-  shape.kind_ = GateKind::gaussian;
-  shape.set_gaussian(sigma, kGaussianReach * sigma);
-  shape.width_ = sigma;
-  shape.finish_parts();
-  return shape;
-}
-
-GateShape GateShape::truncated_gaussian(double sigma, double half_width) {
-  require_positive(sigma, "sigma");
-  require_positive(half_width, "half_width");
-  GateShape shape;
-  shape.kind_ = GateKind::truncated_gaussian;
-  const double c = half_width / sigma;
-  if (c >= kGaussianReach) {  // the cut is below double rounding: no jumps left
-    shape.set_gaussian(sigma, kGaussianReach * sigma);
-    shape.width_ = sigma;
-  } else {
-    shape.set_gaussian(sigma, half_width);
-    shape.outside_ = 0.5 * std::erfc(c * std::sqrt(0.5));
-    shape.mass_ = std::erf(c * std::sqrt(0.5));
-    shape.width_ = sigma * std::sqrt(truncated_variance(c));
-    shape.segments_.push_back(
-        {shape.peak_ * std::exp(-0.5 * c * c), {Side::Form::atom, -half_width, 0}, {Side::Form::atom, half_width, 0}});
-  }
-  shape.finish_parts();
-  return shape;
-}
-
-GateShape GateShape::boxcar(double width) {
-  require_positive(width, "width");
-  GateShape shape;
-  shape.kind_ = GateKind::boxcar;
-  shape.lower_ = -0.5 * width;
-  shape.upper_ = 0.5 * width;
-  shape.width_ = width / std::sqrt(12.0);
-  shape.peak_ = 1 / width;
-  shape.segments_.push_back({shape.peak_, {Side::Form::atom, shape.lower_, 0}, {Side::Form::atom, shape.upper_, 0}});
-  shape.finish_parts();
-  return shape;
+void GateShape::require_positive(double value, const char* name) {
+  if (!(value > 0 && std::isfinite(value))) throw InputError(std::string(name) + " must be positive and finite");
 }
 
 double GateShape::sample(double u) const {

@@ -108,6 +108,8 @@ class GateShape {
     Side side;
   };
 
+  /// Throws InputError, naming the argument.
+  static void require_positive(double value, const char* name);
   static double quantile(const Side& side, double u);
   void set_gaussian(double sigma, double cut);
   void index_table();

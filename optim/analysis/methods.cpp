@@ -57,7 +57,7 @@ Method automatic_method() {
 
 std::vector<Method> methods_for(const Experiment& experiment, const std::vector<double>& steps,
                                 std::vector<std::string>& notes) {
-  const bool steady = experiment.gates.kind == GateKind::steady;
+  const bool steady = experiment.gates.steady();
   std::vector<Method> methods{with_sampling("standard", Sampling::standard, true)};
   if (steady) {
     notes.push_back("steady gates: no ellipsoidal sampling");

@@ -146,17 +146,15 @@ Failure failure(const Direction& d, bool reference_resolved, double error_ratio)
 }
 
 GateSpec with_relative_width(const GateSpec& gates, double width) {
-  if (gates.kind == GateKind::steady)
-    throw InputError("gates.kind: steady gates have no width to vary (allowed: any other kind)");
+  if (gates.steady()) throw InputError("gates.kind: steady gates have no width to vary (allowed: any other kind)");
   GateSpec scaled = gates;
   const double factor = width / make_gates(gates).relative_width();
-  for (double* length : {&scaled.sigma, &scaled.width, &scaled.half_width}) *length *= factor;
-  for (double& offset : scaled.offsets) offset *= factor;
+  scaled.shape = gates.shape->stretched(factor);
   return scaled;
 }
 
 Stability map_stability(const Experiment& experiment, const StabilityOptions& options) {
-  if (experiment.gates.kind == GateKind::steady) with_relative_width(experiment.gates, 1);  // throws
+  if (experiment.gates.steady()) with_relative_width(experiment.gates, 1);  // throws
   if (!experiment.target.images.empty())
     throw InputError(experiment.file +
                      ": target.images: measured images have one width of gates (a target to be rendered)");

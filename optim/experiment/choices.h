@@ -6,14 +6,6 @@
 namespace isochron {
 
 template <>
-inline constexpr auto kChoices<GateKind> = std::to_array<Choice<GateKind>>(
-    {{GateKind::steady, "steady", "all light, whatever its length"},
-     {GateKind::gaussian, "gaussian", "a normal density of path length"},
-     {GateKind::boxcar, "boxcar", "constant within its width"},
-     {GateKind::truncated_gaussian, "truncated_gaussian", "zero beyond `half_width` from its centre"},
-     {GateKind::tabulated, "tabulated", "lines between the rows of a table"}});
-
-template <>
 inline constexpr auto kChoices<LengthUnit> = std::to_array<Choice<LengthUnit>>(
     {{LengthUnit::scene, "scene", "scene units"}, {LengthUnit::ns, "ns", ""}, {LengthUnit::ps, "ps", ""}});
 

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "core/base/error.h"
 #include "optim/experiment/choices.h"
@@ -34,26 +35,6 @@ Field centers(std::vector<double>& variable) {
   return {"list of numbers, or {start, stop, count}", "at least 0", read, [&variable] { return yaml_list(variable); }};
 }
 
-/// Rows of an offset and a value.
-Field table(GateSpec& gates, ExperimentFolder& folder) {
-  const auto read = [&](const YamlValue& value) {
-    for (const auto& row : folder.read_numbers(value, 2)) {
-      gates.offsets.push_back(row[0]);
-      gates.values.push_back(row[1]);
-    }
-  };
-  return {"text file", "rows of an offset and a value", read, [] { return std::string(); }};
-}
-
-void check_table(const GateSpec& gates, const YamlValue& value) {
-  const bool sorted = std::is_sorted(gates.offsets.begin(), gates.offsets.end());
-  const bool positive = std::all_of(gates.values.begin(), gates.values.end(), [](double v) { return v >= 0; }) &&
-                        std::any_of(gates.values.begin(), gates.values.end(), [](double v) { return v > 0; });
-  if (gates.offsets.size() < 2 || !sorted || !(gates.offsets.front() < gates.offsets.back()) || !positive)
-    value.fail("the table is no gate",
-               "two rows or more, offsets in rising order, values at least 0 and one of them above");
-}
-
 /// Path lengths are sums of doubles, each rounded to 1e-16 of itself, over thousands of segments at most: narrower gates
 /// see nothing but rounding, and in the end their peaks overflow.
 void require_resolved(const GateSet& gates, const YamlValue& value) {
@@ -69,7 +50,7 @@ void require_resolved(const GateSet& gates, const YamlValue& value) {
 }
 
 void check_gates(const GateSpec& gates, const YamlValue& value) {
-  if (gates.kind == GateKind::tabulated) check_table(gates, value);
+  gates.shape->check(value);
   const GateSet set = [&] {
     try {
       return make_gates(gates);
@@ -82,37 +63,40 @@ void check_gates(const GateSpec& gates, const YamlValue& value) {
 
 }  // namespace
 
+void GateSpec::choose(const std::string& other_kind) {
+  for (const GateKindEntry* each : gate_kinds())
+    if (other_kind == each->name) {
+      kind = each->name;
+      shape = each->make();
+      return;
+    }
+  throw std::logic_error("no kind of gate: " + other_kind);
+}
+
 void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
-  using enum GateKind;
-  const auto of = [&](std::initializer_list<GateKind> kinds) { return only(gates.kind, kinds); };
-  keys.value("kind", field::choice(gates.kind), "path-length importance: how much light of a length counts",
-             {.required = true});
+  std::vector<Keys::Kind> kinds;
+  for (const GateKindEntry* each : gate_kinds()) kinds.push_back({each->name, each->meaning});
+  const ReadNumbers read_numbers = [&folder](const YamlValue& value, std::size_t columns) {
+    return folder.read_numbers(value, columns);
+  };
+  const auto describe_kind = [&](Keys& inner, const std::string& kind) {
+    if (kind == gates.kind) return gates.shape->describe(inner, read_numbers);
+    GateSpec other;
+    other.choose(kind);
+    other.shape->describe(inner, read_numbers);
+  };
+  keys.kinds(
+      "kind", kinds, gates.kind, [&](const std::string& kind) { gates.choose(kind); }, describe_kind,
+      "path-length importance: how much light of a length counts");
+  const Only not_steady{!gates.steady(), "every kind but steady", ""};
+  keys.value("centers", centers(gates.centers),
+             "one per gate: lengths of whole paths, camera and light segments included",
+             {.required = true, .only = not_steady, .unit = "`unit`"});
   keys.value("unit", field::choice(gates.unit), "of all lengths here; of a time, how far light travels in it");
   const bool timed = gates.unit != LengthUnit::scene;
   keys.value(
       "scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
       {.required = timed, .unit = "metres", .unset = gates.scene_unit_m == 0, .otherwise = "required for ns, ps"});
-  keys.value("centers", centers(gates.centers),
-             "one per gate: lengths of whole paths, camera and light segments included",
-             {.required = true, .only = {gates.kind != steady, "every kind but steady"}, .unit = "`unit`"});
-  keys.value("sigma", field::positive(gates.sigma), "standard deviation",
-             {.required = true, .only = of({gaussian, truncated_gaussian}), .unit = "`unit`"});
-  keys.value("width", field::positive(gates.width), "from end to end",
-             {.required = true, .only = of({boxcar}), .unit = "`unit`"});
-  keys.value("half_width", field::positive(gates.half_width), "from the centre to either end",
-             {.required = true, .only = of({truncated_gaussian}), .unit = "`unit`"});
-  const bool from_file = keys.value("file", table(gates, folder), "in place of `offsets` and `values`",
-                                    {.only = of({tabulated}), .unit = "`unit`", .unset = true});
-  const Only in_line = from_file ? Only{false, "tables without a file"} : of({tabulated});
-  keys.value("offsets", field::numbers(gates.offsets), "from the centre, rising; an offset given twice is a jump",
-             {.required = true, .only = in_line, .unit = "`unit`"});
-  const auto same_count = [&](const YamlValue& value) {
-    if (gates.values.size() != gates.offsets.size())
-      value.fail(fmt::format("{} values are given", gates.values.size()),
-                 fmt::format("one for each of the {} offsets", gates.offsets.size()));
-  };
-  keys.value("values", field::checked(field::numbers(gates.values), same_count),
-             "one per offset, at least 0; scaled to an integral of 1", {.required = true, .only = in_line});
   keys.check([&](const YamlValue& value) { check_gates(gates, value); });
 }
 
@@ -122,25 +106,12 @@ double length_unit(const GateSpec& spec) {
 }
 
 GateSet make_gates(const GateSpec& spec) {
-  if (spec.kind == GateKind::steady) return GateSet(GateShape::steady(), {0.0});
-  const double scale = length_unit(spec);
-  const auto scaled = [&](std::vector<double> lengths) {
-    for (double& length : lengths) length *= scale;
-    return lengths;
-  };
-  const GateShape shape = [&] {
-    switch (spec.kind) {
-      case GateKind::gaussian:
-        return GateShape::gaussian(scale * spec.sigma);
-      case GateKind::boxcar:
-        return GateShape::boxcar(scale * spec.width);
-      case GateKind::truncated_gaussian:
-        return GateShape::truncated_gaussian(scale * spec.sigma, scale * spec.half_width);
-      default:
-        return GateShape::tabulated(scaled(spec.offsets), spec.values);
-    }
-  }();
-  return GateSet(shape, scaled(spec.centers));
+  const double unit = length_unit(spec);
+  const GateShape shape = spec.shape->shape(unit);
+  if (shape.is_steady()) return GateSet(shape, {0.0});
+  std::vector<double> centers = spec.centers;
+  for (double& center : centers) center *= unit;
+  return GateSet(shape, centers);
 }
 
 }  // namespace isochron

@@ -13,7 +13,7 @@ const char* name(LengthUnit unit) {
 }
 
 ExrNotes exr_notes(const GateSpec& spec) {
-  const bool steady = spec.kind == GateKind::steady;
+  const bool steady = spec.steady();
   return {{"isochron.gateCenters", steady ? "" : fmt::format("{}", fmt::join(spec.centers, " "))},
           {"isochron.gateUnit", name(spec.unit)},
           {"isochron.quantity", steady ? "radiance" : "radiance per scene unit of path length"}};

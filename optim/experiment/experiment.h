@@ -6,12 +6,13 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "core/base/description.h"
 #include "core/base/yaml_reader.h"
-#include "core/gates/gate.h"
+#include "core/gates/gate_description.h"
 #include "core/image/image.h"
 #include "core/render/renderer.h"
 
@@ -22,15 +23,15 @@ const char* name(LengthUnit unit);  ///< "scene units", "ns", "ps"
 
 /// Gates as written. All lengths are in `unit`; a time t is the length c t / scene_unit_m in scene units.
 struct GateSpec {
-  GateKind kind = GateKind::steady;
+  std::string kind = "steady";
+  std::shared_ptr<GateDescription> shape = gate_kinds()[0]->make();  ///< of that kind
   LengthUnit unit = LengthUnit::scene;
   double scene_unit_m = 0;      ///< metres per scene unit; > 0 where unit is a time, else unused
   std::vector<double> centers;  ///< steady: empty
-  double sigma = 0;             ///< gaussian, truncated_gaussian
-  double width = 0;             ///< boxcar
-  double half_width = 0;        ///< truncated_gaussian
-  std::vector<double> offsets,
-      values;  ///< tabulated: relative to the centre; read from `file` or given inline
+
+  bool steady() const { return kind == "steady"; }
+  /// Becomes another kind, with its defaults.
+  void choose(const std::string& other_kind);
 };
 
 /// Scene units per unit of the gates' lengths.

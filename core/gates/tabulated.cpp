@@ -1,11 +1,13 @@
 // The tabulated gate: checks, normalisation, and the quantile coupling of its derivative measure.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "core/base/error.h"
-#include "core/gates/gate.h"
+#include "core/gates/gate_description.h"
 
 namespace isochron {
 namespace {
@@ -20,6 +22,52 @@ void check_table(const std::vector<double>& offsets, const std::vector<double>& 
     if (i > 0 && offsets[i] < offsets[i - 1]) throw InputError(row + "offset below the one before");
   }
 }
+
+class Tabulated final : public GateDescription {
+ public:
+  void describe(Keys& keys, const ReadNumbers& read_numbers) override {
+    const auto read = [this, &read_numbers](const YamlValue& value) {
+      for (const auto& row : read_numbers(value, 2)) {
+        offsets_.push_back(row[0]);
+        values_.push_back(row[1]);
+      }
+    };
+    const Field table{"text file", "rows of an offset and a value", read, [] { return std::string(); }};
+    const bool from_file =
+        keys.value("file", table, "in place of `offsets` and `values`", {.unit = "`unit`", .unset = true});
+    const Only in_line = from_file ? Only{false, "tables without a file"} : Only{};
+    keys.value("offsets", field::numbers(offsets_), "from the centre, rising; an offset given twice is a jump",
+               {.required = true, .only = in_line, .unit = "`unit`"});
+    const auto same_count = [this](const YamlValue& value) {
+      if (values_.size() != offsets_.size())
+        value.fail(fmt::format("{} values are given", values_.size()),
+                   fmt::format("one for each of the {} offsets", offsets_.size()));
+    };
+    keys.value("values", field::checked(field::numbers(values_), same_count),
+               "one per offset, at least 0; scaled to an integral of 1", {.required = true, .only = in_line});
+  }
+  void check(const YamlValue& gates) const override {
+    const bool sorted = std::is_sorted(offsets_.begin(), offsets_.end());
+    const bool positive = std::all_of(values_.begin(), values_.end(), [](double v) { return v >= 0; }) &&
+                          std::any_of(values_.begin(), values_.end(), [](double v) { return v > 0; });
+    if (offsets_.size() < 2 || !sorted || !(offsets_.front() < offsets_.back()) || !positive)
+      gates.fail("the table is no gate",
+                 "two rows or more, offsets in rising order, values at least 0 and one of them above");
+  }
+  GateShape shape(double unit) const override {
+    std::vector<double> scaled = offsets_;
+    for (double& offset : scaled) offset *= unit;
+    return GateShape::tabulated(scaled, values_);
+  }
+  std::shared_ptr<GateDescription> stretched(double factor) const override {
+    auto copy = std::make_shared<Tabulated>(*this);
+    for (double& offset : copy->offsets_) offset *= factor;
+    return copy;
+  }
+
+ private:
+  std::vector<double> offsets_, values_;
+};
 
 }  // namespace
 
@@ -155,5 +203,9 @@ void GateShape::couple_quantiles(const std::vector<Piece>& plus, const std::vect
     }
   }
 }
+
+extern const GateKindEntry kTabulated;
+const GateKindEntry kTabulated{"tabulated", "lines between the rows of a table",
+                               []() -> std::shared_ptr<GateDescription> { return std::make_shared<Tabulated>(); }};
 
 }  // namespace isochron
