@@ -66,9 +66,10 @@ std::string table(const std::vector<Row>& rows) {
 std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
                        const Parameters& parameters) {
   const int rejected = state.safeguard.rejected + state.steps_rejected;
-  std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {}\n", name(result.status),
-                                 state.iteration, std::max(state.seconds, last.seconds),
-                                 rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice));
+  std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {} (row {} of log.csv)\n",
+                                 name(result.status), state.iteration, std::max(state.seconds, last.seconds),
+                                 rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice),
+                                 last.iteration);
   text += table(rows_of(parameters, state.theta));
   auto out = std::back_inserter(text);
   if (!std::isnan(last.loss)) {
@@ -80,8 +81,8 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
                        : ": it cannot be told from 0");
     const LossSpread spread = loss_spread(state.descent);
     if (!std::isnan(spread.noise_share))
-      fmt::format_to(out, "  noise makes {:.0f} % of the loss's variance over the last {} iterations\n",
-                     100 * spread.noise_share, spread.rows);
+      fmt::format_to(out, "  noise makes {:.0f} % of the loss's variance over the {} rows of log.csv up to row {}\n",
+                     100 * spread.noise_share, spread.rows, state.iteration);
     const auto rmse = [](double value) { return value > 0 ? fmt::format("{:.3g}", value) : "below the noise"; };
     fmt::format_to(out, "  image RMSE {} (at the start {})\n", rmse(last.image_rmse), rmse(state.image_rmse_initial));
   }
