@@ -135,7 +135,7 @@ int check(const CheckCommand& command) {
   HeavyTails tails;
   for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.effective_count);
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
-  spdlog::info("wrote {}/check.csv", folder);
+  say_written(folder, {"check.csv"});
   return wrong == 0 && blind == 0 && empty < comparisons ? 0 : 1;
 }
 

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <initializer_list>
 #include <iterator>
 
 namespace isochron {
@@ -90,8 +92,22 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
 }
 
 std::string files_to_look_at(const std::string& folder, bool plots) {
-  return fmt::format("  {}: summary.yaml, log.csv, final.exr beside target.exr and initial.exr{}\n", folder,
-                     plots ? ", PNGs of them, rmse.png" : "");
+  const auto present = [&](std::initializer_list<const char*> names) {
+    std::string text;
+    for (const char* name : names)
+      if (std::filesystem::exists(std::filesystem::path(folder) / name))
+        text += (text.empty() ? "" : ", ") + std::string(name);
+    return text;
+  };
+  std::string text;
+  const auto line = [&](const std::string& names, const char* what) {
+    if (!names.empty()) text += fmt::format("    {}: {}\n", what, names);
+  };
+  line(present({"summary.yaml", "log.csv", "final.exr", "target.exr", "initial.exr"}), "results");
+  line(present({"geometry/"}), "meshes");
+  if (plots) line(present({"final.png", "target.png", "initial.png", "residual.png", "rmse.png"}), "pictures");
+  line(present({"experiment.yaml", "inputs/", "checkpoint.yaml", "checkpoint.previous.yaml"}), "to resume");
+  return text.empty() ? text : fmt::format("  {}\n{}", folder, text);
 }
 
 }  // namespace isochron

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <limits>
 
 #include "optim/run/summary.h"
+#include "tests/optim/temporary_folder.h"
 
 namespace isochron {
 namespace {
@@ -56,15 +58,24 @@ TEST_F(Report, ShowsParametersErrorsAndNoise) {
             "  loss 0.0001 +- 0.0002 (at the start 0.5 +- 0.01): it cannot be told from 0\n"
             "  noise makes 22 % of the loss's variance over the 8 rows of log.csv up to row 12\n"
             "  image RMSE 0.01 (at the start 0.7)\n");
-  EXPECT_EQ(files_to_look_at("runs/x", false),
-            "  runs/x: summary.yaml, log.csv, final.exr beside target.exr and initial.exr\n");
-  EXPECT_NE(files_to_look_at("runs/x", true).find("rmse.png"), std::string::npos);
 
   const std::string summary = summary_yaml({RunStatus::converged, FinalChoice::average}, state_, last_, parameters);
   EXPECT_NE(summary.find("rejected_steps: 4\n"), std::string::npos) << summary;
   EXPECT_NE(summary.find("loss_noise_initial: 0.01\nloss_noise_final: 0.0002\nnoise_share: 0.21875\n"),
             std::string::npos)
       << summary;
+}
+
+TEST(ReportOfFiles, NamesWhatTheFolderHolds) {
+  const TemporaryFolder folder;
+  for (const char* name : {"summary.yaml", "log.csv", "final.exr", "residual.png", "experiment.yaml"})
+    folder.write(name, "");
+  std::filesystem::create_directory(folder.file("geometry"));
+  EXPECT_EQ(files_to_look_at(folder.path(), true), "  " + folder.path() +
+                                                       "\n    results: summary.yaml, log.csv, final.exr\n"
+                                                       "    meshes: geometry/\n    pictures: residual.png\n"
+                                                       "    to resume: experiment.yaml\n");
+  EXPECT_EQ(files_to_look_at(folder.path(), false).find("png"), std::string::npos);
 }
 
 TEST_F(Report, ManyComponentsAreOneRow) {
