@@ -42,7 +42,6 @@ void chart_solvers(const ChartCommand& command, const Problem& problem, const st
   display.end();
   write_file_atomically(folder + "/chart_solvers.csv", race_csv(race));
   fmt::print("{}", race_table(race));
-  spdlog::info("wrote {}/chart_solvers.csv", folder);
 }
 
 void chart_gradient(const ChartCommand& command, const Problem& problem, const std::string& folder) {
@@ -62,7 +61,6 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
   write_file_atomically(folder + "/chart.csv", chart_csv(chart));
   write_file_atomically(folder + "/chart_table.csv", chart_table_csv(chart));
   fmt::print("{}", chart_table(chart));
-  spdlog::info("wrote {0}/chart.csv and {0}/chart_table.csv", folder);
 }
 
 int chart(const ChartCommand& command) {
@@ -74,7 +72,12 @@ int chart(const ChartCommand& command) {
   make_output_folder(folder);
   catch_interrupts();
   (command.solvers ? chart_solvers : chart_gradient)(command, problem, folder);
-  return command.common.no_plots || draw_charts(folder) ? 0 : 1;
+  const bool plotted = !command.common.no_plots && draw_charts(folder);
+  std::vector<std::string> files = {"chart.csv", "chart_table.csv"};
+  if (command.solvers) files = {"chart_solvers.csv"};
+  if (plotted) files.push_back(command.solvers ? "chart_solvers.png" : "chart.png");
+  say_written(folder, files);
+  return command.common.no_plots || plotted ? 0 : 1;
 }
 
 }  // namespace

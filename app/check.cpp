@@ -42,15 +42,19 @@ std::vector<int> components_to_check(const Parameters& parameters, const Paramet
   return components;
 }
 
-/// Neither derivative nor finite difference has seen anything.
-bool is_empty(const Comparison& row) {
-  return row.total == 0 && row.standard_error == 0 && row.finite_difference == 0 && row.finite_difference_error == 0;
-}
-
 std::string verdict(const Comparison& row, int comparisons) {
-  const bool rare = row.effective_count < kFewestDeviations;
-  if (is_empty(row)) return "nothing";
-  return std::string(disagrees(row, comparisons) ? "DIFFERS" : "ok") + (rare ? " (rare hits)" : "");
+  const std::string rare = row.effective_count < kFewestDeviations ? " (rare hits)" : "";
+  switch (finding(row, comparisons)) {
+    case Finding::agrees:
+      return "ok" + rare;
+    case Finding::differs:
+      return "DIFFERS" + rare;
+    case Finding::difference_saw_nothing:
+      return "difference saw nothing";
+    case Finding::nothing:
+      return "nothing";
+  }
+  return {};
 }
 
 void print_table(const Problem& problem, const std::vector<Comparison>& table) {
@@ -105,13 +109,21 @@ int check(const CheckCommand& command) {
       throw std::runtime_error(fmt::format("the derivative by {} is not finite: values overflow", row.parameter));
   write_file_atomically(folder + "/check.csv", check_csv(problem, table));
   print_table(problem, table);
-  const auto wrong =
-      std::count_if(table.begin(), table.end(), [&](const Comparison& row) { return disagrees(row, comparisons); });
+  const auto count = [&](Finding what) {
+    return static_cast<int>(std::count_if(table.begin(), table.end(),
+                                          [&](const Comparison& row) { return finding(row, comparisons) == what; }));
+  };
+  const int wrong = count(Finding::differs), blind = count(Finding::difference_saw_nothing),
+            empty = count(Finding::nothing);
   fmt::print("{} of {} differ: |z| above the limit of Student's law (1 % chance of a false alarm in the whole table)\n",
              wrong, comparisons);
   if (wrong > 0)
     fmt::print("Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
-  const auto empty = static_cast<int>(std::count_if(table.begin(), table.end(), is_empty));
+  if (blind > 0)
+    fmt::print(
+        "{} of {}: no sample of the finite difference met what changes, so it says nothing of the derivative: repeat "
+        "with more samples, or a larger gradient.step\n",
+        blind, comparisons);
   if (empty > 0) {
     fmt::print("{} of {} compare nothing with nothing\n", empty, comparisons);
     const GatedImage image =
@@ -123,8 +135,8 @@ int check(const CheckCommand& command) {
   HeavyTails tails;
   for (const Comparison& row : table) tails.add(row.parameter, row.gate, row.effective_count);
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
-  spdlog::info("wrote {}/check.csv", folder);
-  return wrong == 0 && empty < comparisons ? 0 : 1;
+  say_written(folder, {"check.csv"});
+  return wrong == 0 && blind == 0 && empty < comparisons ? 0 : 1;
 }
 
 }  // namespace

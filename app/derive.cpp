@@ -27,6 +27,13 @@ struct DeriveCommand {
 /// Images held at a time; more unknowns are done in groups, each with the same random numbers.
 constexpr double kMostBytes = 1e9;
 
+std::vector<std::string> written(const Parameters& parameters, const Parameters::Block& block, const char* ending) {
+  std::vector<std::string> files;
+  for (int i = block.begin; i < block.begin + block.count; ++i)
+    files.push_back(parameters.component_names()[i] + ending);
+  return files;
+}
+
 int derive(const DeriveCommand& command) {
   begin_session(command.common);
   Problem problem(read_experiment(command.common), warn);
@@ -85,8 +92,11 @@ int derive(const DeriveCommand& command) {
     warn(warning.empty() ? "every derivative is zero: no parameter changes what the gates see" : warning);
   }
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
-  spdlog::info("wrote derivative images and {}/derive.csv", folder);
-  return command.common.no_plots || draw_plots(folder) ? 0 : 1;
+  const bool plotted = !command.common.no_plots && draw_plots(folder);
+  say_written(folder, written(parameters, block, ".exr"));
+  if (plotted) say_written(folder, written(parameters, block, ".png"));
+  say_written(folder, {"derive.csv"});
+  return command.common.no_plots || plotted ? 0 : 1;
 }
 
 }  // namespace

@@ -54,7 +54,7 @@ int gradient(const CommonOptions& options) {
   write_file_atomically(folder + "/gradient.yaml", fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds,
                                                                thread_count(options), estimate.gradient.replicates));
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
-  spdlog::info("wrote {}/gradient.csv", folder);
+  say_written(folder, {"gradient.csv", "gradient.yaml"});
   return 0;
 }
 

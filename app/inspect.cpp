@@ -168,7 +168,7 @@ int inspect_experiment(const InspectCommand& command) {
   print_advice(problem, inspection);
   write_file_atomically(folder + "/inspect.csv", inspection_csv(problem, inspection));
   write_file_atomically(folder + "/inspect.yaml", advice_yaml(experiment, inspection.advice.after));
-  spdlog::info("wrote {0}/inspect.csv and {0}/inspect.yaml", folder);
+  say_written(folder, {"inspect.csv", "inspect.yaml"});
   if (!command.apply) return 0;
   const Experiment before = load_experiment(command.common.file);
   const Experiment after = advised(before, inspection.advice.after);

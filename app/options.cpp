@@ -86,6 +86,14 @@ Parameters::Block chosen_parameter(const Parameters& parameters, const std::stri
   return {name, static_cast<int>(found - names.begin()), 1};
 }
 
+void say_written(const std::string& folder, const std::vector<std::string>& files) {
+  constexpr std::size_t kMostNamed = 16;
+  if (files.size() <= kMostNamed)
+    spdlog::info("wrote into {}: {}", folder, fmt::join(files, ", "));
+  else
+    spdlog::info("wrote {} files into {}: {} to {}", files.size(), folder, files.front(), files.back());
+}
+
 int thread_count(const CommonOptions& options) {
   return options.threads > 0 ? options.threads : static_cast<int>(std::thread::hardware_concurrency());
 }

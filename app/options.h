@@ -49,6 +49,9 @@ void add_parameter_option(CLI::App& command, std::string& name);
 /// Unknowns [begin, begin + count) that --parameter names; all for an empty name. Throws InputError.
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name);
 
+/// Names the files that a command wrote into its folder; of more than a few only the first and the last.
+void say_written(const std::string& folder, const std::vector<std::string>& files);
+
 /// Number of threads that renderers use.
 int thread_count(const CommonOptions& options);
 

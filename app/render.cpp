@@ -42,8 +42,11 @@ int render(const CommonOptions& options) {
   }
   write_file_atomically(folder + "/render.csv", table);
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
-  spdlog::info("wrote {0}/render.exr and {0}/render.csv", folder);
-  return options.no_plots || draw_plots(folder) ? 0 : 1;
+  const bool plotted = !options.no_plots && draw_plots(folder);
+  std::vector<std::string> files = {"render.exr", "render.csv"};
+  if (plotted) files.push_back("render.png");
+  say_written(folder, files);
+  return options.no_plots || plotted ? 0 : 1;
 }
 
 }  // namespace

@@ -56,8 +56,11 @@ int stability(const StabilityCommand& command) {
   display.end();
   write_file_atomically(folder + "/stability.csv", stability_csv(map));
   fmt::print("{}", stability_table(map));
-  spdlog::info("wrote {}/stability.csv", folder);
-  return command.common.no_plots || draw_charts(folder) ? 0 : 1;
+  const bool plotted = !command.common.no_plots && draw_charts(folder);
+  std::vector<std::string> files = {"stability.csv"};
+  if (plotted) files.push_back("stability.png");
+  say_written(folder, files);
+  return command.common.no_plots || plotted ? 0 : 1;
 }
 
 }  // namespace

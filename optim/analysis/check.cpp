@@ -19,6 +19,7 @@ constexpr double kRelativeWidth = 0.5;    ///< of the gates' standard deviation;
                                           ///< below 0.1 % even where a path lengthens by twice the step
 constexpr double kMostDegrees = 1;
 constexpr double kRelativeValue = 0.05;
+constexpr double kRoundings = 4;  ///< extrapolation weighs the smallest step's by 64 / 45, and three of them add up
 
 bool moves_geometry(ParameterType type) {
   return type == ParameterType::translation || type == ParameterType::rotation || type == ParameterType::vertices;
@@ -154,6 +155,14 @@ bool disagrees(const Comparison& row, int comparisons) {
   return !(std::abs(row.z) <= false_alarm_limit(comparisons, row.degrees));
 }
 
+Finding finding(const Comparison& row, int comparisons) {
+  const double difference = std::abs(row.finite_difference), error = row.finite_difference_error;
+  if (row.total == 0 && row.standard_error == 0 && difference == 0 && error == 0) return Finding::nothing;
+  if (!disagrees(row, comparisons)) return Finding::agrees;
+  const double rounding = kRoundings * row.rounding;
+  return difference <= rounding && error <= rounding ? Finding::difference_saw_nothing : Finding::differs;
+}
+
 double extrapolate(double whole, double half, double quarter) {
   return (64 * quarter - 20 * half + whole) / 45;
 }
@@ -219,7 +228,8 @@ std::vector<Comparison> check_derivative(const Problem& problem, const std::vect
       for (Term term : kTerms)
         if (estimate.component == name(term)) row.terms[static_cast<int>(term)] = estimate.gates[0].mean[g];
     row.finite_difference = difference.gates.mean[g];
-    row.finite_difference_error = std::hypot(difference.gates.standard_error[g], difference.rounding[g]);
+    row.rounding = difference.rounding[g];
+    row.finite_difference_error = std::hypot(difference.gates.standard_error[g], row.rounding);
     row.z = z_score(row.total, row.standard_error, row.finite_difference, row.finite_difference_error);
     const Statistics& ours = analytic.front().gates[0];
     const double all = std::hypot(row.standard_error, row.finite_difference_error);

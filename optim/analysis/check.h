@@ -16,7 +16,8 @@ struct Comparison {
   std::array<double, 3> terms{};  ///< in the order of kTerms; 0 where a term vanishes
   double total = 0, standard_error = 0;
   double finite_difference = 0, finite_difference_error = 0;
-  double z = 0;  ///< see z_score
+  double rounding = 0;  ///< what the rounding of images makes of the difference, part of its error
+  double z = 0;         ///< see z_score
   /// Of z under Student's law (Welch and Satterthwaite's formula), and of either side the smaller count (see Statistics).
   double degrees = std::numeric_limits<double>::infinity();
   double effective_count = std::numeric_limits<double>::infinity();
@@ -32,6 +33,17 @@ double false_alarm_limit(int comparisons, double degrees, double rate = 0.01);
 
 /// Whether one of so many comparisons disagrees: |z| above the limit for its degrees of freedom, or no number.
 bool disagrees(const Comparison& row, int comparisons);
+
+/// What one of so many comparisons says.
+enum class Finding {
+  agrees,
+  differs,
+  /// The two disagree, but none of the difference's samples changed by more than rounding: with common random numbers that
+  /// is what samples that missed all that changes look like, and their standard error knows nothing of what they missed.
+  difference_saw_nothing,
+  nothing,  ///< neither side has seen anything
+};
+Finding finding(const Comparison& row, int comparisons);
 
 /// Value at step 0 of central differences at the steps h, h/2 and h/4: Richardson's extrapolation, exact for
 /// polynomials of degree 6.

@@ -27,6 +27,19 @@ std::string existing_file(const YamlValue& value, const std::filesystem::path& f
   return path.string();
 }
 
+/// The scene loader's, whose messages here name both numbers and their range.
+Field resolution(std::array<int, 2>& size) {
+  Field field = resolution_field(size[0], size[1]);
+  const std::string allowed = fmt::format("{}, {}", field.type, field.allowed);
+  field.read = [read = field.read, allowed](const YamlValue& value) {
+    if (!value.is_list()) value.fail("is not a list", allowed);
+    const auto count = value.list().size();
+    if (count != 2) value.fail(fmt::format("a list of {}", count), allowed);
+    read(value);
+  };
+  return field;
+}
+
 void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
   keys.value("images", folder.file(target.images),
              "EXR file of measured images, one channel or three per gate; without it the target is rendered",
@@ -173,7 +186,7 @@ Field file_name(std::string& variable) {
 void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
   keys.value("name", file_name(e.name), "names the default output folder, `runs/NAME`", {.required = true});
   keys.value("scene", folder.file(e.scene), "the scene", {.required = true});
-  keys.value("resolution", resolution_field(e.resolution[0], e.resolution[1]),
+  keys.value("resolution", resolution(e.resolution),
              "in place of the scene's; the field of view stays across the width",
              {.unit = "pixels", .unset = e.resolution[0] == 0, .otherwise = "the camera's"});
   keys.map("gates", [&](Keys& inner) { describe(inner, e.gates, folder); }, "when the camera sees", {.required = true});

@@ -5,6 +5,7 @@
 #include "core/base/error.h"
 #include "optim/experiment/choices.h"
 #include "optim/experiment/description.h"
+#include "optim/experiment/key_hints.h"
 
 namespace isochron {
 
@@ -36,13 +37,28 @@ const char* program_version() {
   return ISOCHRON_VERSION;
 }
 
+namespace {
+
+/// A scene in place of an experiment is a mistake of its own: the keys that are missing would not tell.
+void reject_scene(const YamlValue& root) {
+  if (!root.is_map()) return;
+  YamlMap map = root.map();
+  if (map.find("scene") || map.find("gates") || !map.find("camera") || !map.find("shapes")) return;
+  const std::string file = std::filesystem::path(root.file()).filename().string();
+  root.fail("this is a scene, an experiment is needed",
+            fmt::format("a file beside it with scene: {} and gates, such as those in experiments/", file));
+}
+
+}  // namespace
+
 Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides) {
   const YamlValue root = open_yaml(file, overrides);
+  reject_scene(root);
   Experiment experiment;
   experiment.file = std::filesystem::absolute(file).string();
   experiment.target.max_bounces = -1;
   ExperimentFolder folder{std::filesystem::absolute(file).parent_path()};
-  read_keys(root, [&](Keys& keys) { describe(keys, experiment, folder); });
+  read_keys_with_hints(root, [&](Keys& keys) { describe(keys, experiment, folder); });
   if (experiment.target.max_bounces < 0) experiment.target.max_bounces = experiment.estimator.max_bounces;
   experiment.number_files = folder.number_files;
   return experiment;

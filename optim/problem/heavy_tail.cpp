@@ -41,9 +41,8 @@ std::string HeavyTails::warning() const {
   }
   if (entries_.size() > kMostNamed) names += fmt::format(" and {} more", entries_.size() - kMostNamed);
   return fmt::format(
-      "heavy tail in {}: a few rare samples make most of the variance (as many as {:.1f} of one size), so do not trust "
-      "the "
-      "standard error, nor a small one elsewhere; take many more samples or wider gates",
+      "heavy tail in {}: a few rare samples make nearly all of the noise (in effect {:.1f}), so the true error may be "
+      "far larger than the standard error; take many more samples or wider gates",
       names, smallest_);
 }
 

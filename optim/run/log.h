@@ -1,5 +1,7 @@
 // DIR/log.csv. Row i is the state before step i (i counts from 0), as seen by the random numbers of iteration
-// i; the last row is the final state, after which no step was made.
+// i, so that N iterations have the rows 0 to N. Where the final parameters are not those of row N, but an average or the best,
+// row N + 1 is of them. The last row of a finished run is therefore of the
+// final parameters.
 #pragma once
 #include <cstdio>
 #include <memory>
@@ -11,7 +13,7 @@
 namespace isochron {
 
 struct LogRow {
-  int iteration = 0;
+  int iteration = 0;         ///< one past the last one: of final parameters that no iteration had
   double seconds = 0;        ///< spent in iterations so far, this one included
   double loss = 0;           ///< can lie below 0, see loss.h
   double image_rmse = 0;     ///< see root_mean_square_error

@@ -1,7 +1,7 @@
 // The loop around an optimiser: evaluate, judge, step. Knows no files.
 //
-// Row i is the evaluation at the parameters before step i, with the random numbers of iteration i. At the end
-// one more row is evaluated where the final parameters are not those of the last row.
+// Row i is the evaluation at the parameters before step i, with the random numbers of iteration i: N steps have the rows 0
+// to N. At the end row N + 1 is evaluated where the final parameters are not those of row N.
 //
 // Final parameters: the mean over the last window where the loss has settled (see safeguard.h), over the last three quarters of
 // the iterations where those of the optimiser scatter and the loss no longer falls (see descent.h); those of the

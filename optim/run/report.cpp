@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
+#include <initializer_list>
 #include <iterator>
 
 namespace isochron {
@@ -66,9 +68,10 @@ std::string table(const std::vector<Row>& rows) {
 std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
                        const Parameters& parameters) {
   const int rejected = state.safeguard.rejected + state.steps_rejected;
-  std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {}\n", name(result.status),
-                                 state.iteration, std::max(state.seconds, last.seconds),
-                                 rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice));
+  std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {} (row {} of log.csv)\n",
+                                 name(result.status), state.iteration, std::max(state.seconds, last.seconds),
+                                 rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice),
+                                 last.iteration);
   text += table(rows_of(parameters, state.theta));
   auto out = std::back_inserter(text);
   if (!std::isnan(last.loss)) {
@@ -80,8 +83,8 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
                        : ": it cannot be told from 0");
     const LossSpread spread = loss_spread(state.descent);
     if (!std::isnan(spread.noise_share))
-      fmt::format_to(out, "  noise makes {:.0f} % of the loss's variance over the last {} iterations\n",
-                     100 * spread.noise_share, spread.rows);
+      fmt::format_to(out, "  noise makes {:.0f} % of the loss's variance over the {} rows of log.csv up to row {}\n",
+                     100 * spread.noise_share, spread.rows, state.iteration);
     const auto rmse = [](double value) { return value > 0 ? fmt::format("{:.3g}", value) : "below the noise"; };
     fmt::format_to(out, "  image RMSE {} (at the start {})\n", rmse(last.image_rmse), rmse(state.image_rmse_initial));
   }
@@ -89,8 +92,22 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
 }
 
 std::string files_to_look_at(const std::string& folder, bool plots) {
-  return fmt::format("  {}: summary.yaml, log.csv, final.exr beside target.exr and initial.exr{}\n", folder,
-                     plots ? ", PNGs of them, rmse.png" : "");
+  const auto present = [&](std::initializer_list<const char*> names) {
+    std::string text;
+    for (const char* name : names)
+      if (std::filesystem::exists(std::filesystem::path(folder) / name))
+        text += (text.empty() ? "" : ", ") + std::string(name);
+    return text;
+  };
+  std::string text;
+  const auto line = [&](const std::string& names, const char* what) {
+    if (!names.empty()) text += fmt::format("    {}: {}\n", what, names);
+  };
+  line(present({"summary.yaml", "log.csv", "final.exr", "target.exr", "initial.exr"}), "results");
+  line(present({"geometry/"}), "meshes");
+  if (plots) line(present({"final.png", "target.png", "initial.png", "residual.png", "rmse.png"}), "pictures");
+  line(present({"experiment.yaml", "inputs/", "checkpoint.yaml", "checkpoint.previous.yaml"}), "to resume");
+  return text.empty() ? text : fmt::format("  {}\n{}", folder, text);
 }
 
 }  // namespace isochron

@@ -14,7 +14,8 @@ namespace isochron {
 std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
                        const Parameters& parameters);
 
-/// One line: the files of a run's folder to look at; `plots`: whether they have been drawn.
+/// Lines that name what a run's folder holds: results, meshes, pictures where `plots` says that they have been drawn, and what
+/// a resumption needs.
 std::string files_to_look_at(const std::string& folder, bool plots);
 
 }  // namespace isochron

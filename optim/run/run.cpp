@@ -33,6 +33,21 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+/// Whether the folder's run has come to its end before.
+bool has_ended(const std::string& summary) {
+  const auto text = read_file(summary);
+  return text && text->starts_with("status: ") &&
+         !text->starts_with(fmt::format("status: {}\n", name(RunStatus::interrupted)));
+}
+
+/// What a resumption says that made no step.
+std::string nothing_left(const LoopResult& result, const std::string& folder) {
+  return fmt::format("nothing was left to do: the run had ended before{}\n",
+                     result.status == RunStatus::iterations_reached
+                         ? fmt::format(" (to go on, raise optimizer.iterations in {}/experiment.yaml)", folder)
+                         : "");
+}
+
 class Run {
  public:
   Run(const Problem& problem, const RunOptions& options)
@@ -43,6 +58,8 @@ class Run {
     const auto saved = load_checkpoint(options_.folder, parameters_, &warning);
     if (!warning.empty() && options_.warning) options_.warning(warning);
     if (saved) state_ = *saved;
+    const bool had_ended = has_ended(path("summary.yaml"));
+    const int first = state_.iteration;
     if (!saved) state_.theta = parameters_.initial();
     last_.loss = last_.loss_noise = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
     LoopResult result;
@@ -54,7 +71,9 @@ class Run {
       result.status = RunStatus::interrupted;
     }
     write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_));
-    if (options_.report) options_.report(run_report(result, state_, last_, parameters_));
+    if (options_.report)
+      options_.report((had_ended && state_.iteration == first ? nothing_left(result, options_.folder) : "") +
+                      run_report(result, state_, last_, parameters_));
     return result.status;
   }
 

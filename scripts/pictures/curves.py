@@ -35,6 +35,14 @@ def parameter_curves(log):
     return curves
 
 
+def gap_note(image_rmse):
+    """Why a curve of image_rmse has gaps, in one line; empty where it has none."""
+    gaps = int(np.sum(image_rmse == 0))
+    if not gaps:
+        return ""
+    return f"gaps ({gaps} of {len(image_rmse)} rows): squared error, unbiased, estimated below 0"
+
+
 def plot_log(path, experiment, quantity):
     """The images' error, and that of each parameter relative to where it began, over iterations."""
     log = read_log(path)
@@ -42,21 +50,23 @@ def plot_log(path, experiment, quantity):
     curves = parameter_curves(log)
     panels = []
     if np.any(np.nan_to_num(image) > 0):
-        panels.append(("Images against the target", f"RMSE ({quantity})", [("", image)]))
+        panels.append(("Images against the target", f"RMSE ({quantity})", [("", image)], gap_note(image)))
     if curves:
         left_out = f" ({MOST_CURVES} of {len(curves)})" if len(curves) > MOST_CURVES else ""
-        panels.append((f"Parameters against their targets{left_out}", "RMSE / RMSE at the start", curves[:MOST_CURVES]))
+        panels.append((f"Parameters against their targets{left_out}", "RMSE / RMSE at the start", curves[:MOST_CURVES],
+                       ""))
     if not panels:
         return
     figure, axes = plt.subplots(1, len(panels), figsize=(5 * len(panels), 3.8), squeeze=False, layout="constrained")
-    for ax, (title, unit, lines) in zip(axes[0], panels):
+    for ax, (title, unit, lines, note) in zip(axes[0], panels):
         for label, values in lines:
-            shown = values > 0  # zero cannot be drawn on a logarithmic axis, and is rare enough
-            x = log["iteration"][shown]
-            ax.plot(x, values[shown], marker="." if len(x) <= 100 else None, lw=1.2, label=label)
+            shown = values > 0  # zero cannot be drawn on a logarithmic axis; gap_note tells of those of the images
+            few = np.sum(shown) <= 100 or note  # points between two gaps would not show without a marker
+            ax.plot(log["iteration"], np.where(shown, values, np.nan), marker="." if few else None,
+                    markersize=6 if np.sum(shown) <= 100 else 2, lw=1.2, label=label)
         set_scale(ax, np.concatenate([values for _, values in lines]))
         ax.set_title(title, fontsize=10)
-        ax.set_xlabel("iteration")
+        ax.set_xlabel(f"iteration\n{note}" if note else "iteration", fontsize=9)
         ax.set_ylabel(unit, fontsize=9)
         ax.xaxis.set_major_locator(matplotlib.ticker.MaxNLocator(integer=True))
         ax.grid(True, which="both", lw=0.4, alpha=0.4)

@@ -10,7 +10,7 @@ import yaml
 from matplotlib import colors
 
 import exr
-from pictures import reading, sheets
+from pictures import curves, reading, sheets
 
 from .measure import ROOT, program, values
 
@@ -73,6 +73,8 @@ def _curves(figure, log):
         axes.semilogy(log["iteration"], np.where(log[column] > 0, log[column], np.nan), lw=1,
                       color={"image_rmse": "tab:blue", "param_rmse": "tab:red"}[column])
         axes.set_title(title, fontsize=8)
+        if column == "image_rmse" and (note := curves.gap_note(log[column])):
+            axes.set_xlabel(note, fontsize=6)
         axes.tick_params(which="both", labelsize=7)
         axes.grid(True, which="both", lw=0.4, alpha=0.4)
     axes.set_xlabel("iteration", fontsize=8)

@@ -181,6 +181,32 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   for (const char* key : {"seconds: ", "threads: ", "repeats: 8\n"}) EXPECT_NE(cost.find(key), std::string::npos);
 }
 
+TEST_F(Program, EveryFileWrittenIsNamed) {
+  const std::string file = folder_.file("tiny.yaml");
+  const std::vector<std::vector<std::string>> commands = {
+      {"render"},
+      {"render", "--no-plots"},
+      {"derive"},
+      {"derive", "--parameter", "height", "--no-plots"},
+      {"gradient", "--no-plots"},
+      {"check", "--samples", "16"},
+      {"inspect", "--seconds", "0.5"},
+      {"chart", "--seconds", "1"},
+      {"run", "--set", "optimizer.iterations=1"},
+  };
+  for (std::vector<std::string> command : commands) {
+    const std::string name = command[0] + std::to_string(command.size()), out = folder_.file(name);
+    command.insert(command.begin() + 1, {file, "-o", out});
+    const Result result = run(command);
+    EXPECT_EQ(result.status, 0) << result.errors;
+    const std::string shown = result.errors + folder_.read("stdout");
+    for (const auto& entry : std::filesystem::directory_iterator(out)) {
+      const std::string written = entry.path().filename().string();
+      EXPECT_TRUE(written == ".lock" || shown.find(written) != std::string::npos) << written << " of " << shown;
+    }
+  }
+}
+
 TEST_F(Program, CheckAgreesWithFiniteDifferences) {
   const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
   // False alarm: 1 %, seed fixed.

@@ -87,6 +87,25 @@ TEST_F(Program, InterruptedLeavesACheckpointAndSaysHowToGoOn) {
   }
 }
 
+TEST_F(Program, ResumingAFinishedRunSaysThatNothingWasLeft) {
+  ASSERT_EQ(run(run_command("out")).status, 0);
+  const std::string before = log("out");
+  const auto resumed = [&] {
+    const Result result = run({"resume", folder_.file("out"), "--no-plots"});
+    EXPECT_EQ(result.status, 0) << result.errors;
+    return folder_.read("stdout");
+  };
+  EXPECT_EQ(
+      resumed().rfind("nothing was left to do: the run had ended before (to go on, raise optimizer.iterations in " +
+                          folder_.file("out") + "/experiment.yaml)\niterations_reached after 6 iterations, ",
+                      0),
+      0u);
+  EXPECT_EQ(log("out"), before);
+  folder_.write("out/experiment.yaml", replaced(folder_.read("out/experiment.yaml"), "iterations: 6", "iterations: 8"));
+  EXPECT_EQ(resumed().rfind("iterations_reached after 8 iterations, ", 0), 0u);
+  EXPECT_EQ(rows("out"), 9);
+}
+
 TEST_F(Program, DamagedCheckpointFallsBack) {
   ASSERT_EQ(run(run_command("whole")).status, 0);
   ASSERT_EQ(run(run_command("damaged")).status, 0);

@@ -108,6 +108,39 @@ TEST_F(CheckTiny, RareHitsAreFlagged) {
             kFewestDeviations);
 }
 
+TEST_F(CheckTiny, ADifferenceThatSawNothingIsNoVerdict) {
+  Comparison row;
+  EXPECT_EQ(finding(row, 4), Finding::nothing);
+  row.total = 2;
+  row.standard_error = 0.1;
+  row.rounding = 1e-15;
+  const auto of = [&](double difference, double error) {
+    row.finite_difference = difference;
+    row.finite_difference_error = error;
+    row.z = z_score(row.total, row.standard_error, difference, error);
+    return finding(row, 4);
+  };
+  EXPECT_EQ(of(0, 0), Finding::difference_saw_nothing);
+  EXPECT_EQ(of(-2e-15, 1e-15), Finding::difference_saw_nothing) << "as is rounding";
+  EXPECT_EQ(of(1e-9, 1e-9), Finding::differs);
+  EXPECT_EQ(of(0, 1e-3), Finding::differs);
+  EXPECT_EQ(of(2.1, 0), Finding::agrees);
+  row.standard_error = 2;
+  EXPECT_EQ(of(0, 0), Finding::agrees) << "the derivative is not told from zero either";
+}
+
+/// A step so small that no path changes sides of a shadow edge: of the last gates, where only shadows change, nothing is seen.
+TEST_F(CheckTiny, ATinyStepMissesShadowEdges) {
+  std::vector<std::string> notes;
+  const Problem problem(check_experiment(load_experiment(file_, {"gates={kind: boxcar, centers: [4.5, 6], width: 0.5}",
+                                                                 "gradient={step: 1e-6}", "samples.primal=64"}),
+                                         notes));
+  const auto rows = check_derivative(problem, problem.parameters().initial(), 0, [] {});
+  EXPECT_GT(rows[1].rounding, 0);
+  EXPECT_EQ(finding(rows[0], 2), Finding::differs);
+  EXPECT_EQ(finding(rows[1], 2), Finding::difference_saw_nothing);
+}
+
 TEST_F(CheckTiny, TermsAndStepsFollowTheExperiment) {
   std::vector<std::string> notes;
   const Problem boxcar(

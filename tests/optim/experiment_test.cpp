@@ -111,7 +111,8 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "10:42: optimizer.learning_rate: 0 is out of range (a number above 0)"},
       {"iterations: 6", "iterations: -1", "10:60: optimizer.iterations: -1 is out of range"},
       {"seed: 3", "seed: -3", "11:7: seed: -3 is out of range"},
-      {"seed: 3", "resolution: [8]", "11:13: resolution: a list of 1 ([width, height])"},
+      {"seed: 3", "resolution: [8]", "11:13: resolution: a list of 1 ([width, height], 1 to 32768 each)"},
+      {"seed: 3", "resolution: 8x8", "11:13: resolution: is not a list ([width, height], 1 to 32768 each)"},
       {"seed: 3", "resolution: [8, 0]", "11:17: resolution[1]: 0 is out of range (an integer from 1 to 32768)"},
       {"seed: 7}", "max_bounces: -1}", "8:36: target.max_bounces: -1 is out of range"},
       {"seed: 3", "gradient: {method: exact}",
@@ -144,6 +145,55 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
   const std::string canonical = std::filesystem::canonical(folder.path()).string();
   EXPECT_EQ(table_error("table.txt"), canonical + "/table.txt:4:3: 'x' is not a finite number");
   EXPECT_EQ(table_error("wide.txt"), canonical + "/wide.txt:1:1: 3 numbers in this row (allowed: 2)");
+}
+
+TEST(Experiment, MessagesAboutMapsNameTheirKeys) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string gates = "gates: {kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}\n";
+  const Case cases[] = {
+      {"iterations: 6", "stop: 5", "10:54: optimizer.stop: is not a map (keys and values; its keys: window)"},
+      {"iterations: 6", "stop: {}", "10:54: optimizer.stop.window: is missing (keys here: window)"},
+      {"iterations: 6", "decay: {start: 5}",
+       "10:55: optimizer.decay.half_life: is missing (keys here: half_life, start)"},
+      {"seed: 7}", "noise: 100}", "8:30: target.noise: is not a map (keys and values; its keys: photons)"},
+      {"seed: 7}", "noise: {}}", "8:30: target.noise.photons: is missing (keys here: photons)"},
+      {"type: translation, shape: block, direction: [0, 1, 0]",
+       "type: vertices, shape: block, direction: normal, smoothing: 3",
+       "6:80: parameters[0].smoothing: is not a map (keys and values; its keys: diffusion, slopes)"},
+      {"shape: block, ", "",
+       "6:5: parameters[0].shape: is missing (keys here: name, type, shape, selection, direction, "
+       "initial, target, lower, upper, scale)"},
+      {"seed: 3", "loss: huber", "11:7: loss: is not a map (keys and values; its keys: kind, scale)"},
+      {"seed: 3", "loss: {scale: 1}", "11:7: loss.kind: is missing (keys here: kind, scale)"},
+      {"  - {name: power, type: emission, shape: lamp, initial: 8, target: 10}", "  - power",
+       "7:5: parameters[1]: is not a map (keys and values; its keys: name, type, shape, material, "},
+      {gates, "", "1:1: gates: is missing (a map with the keys kind, unit, scene_unit_m, centers, "},
+      {"name: tiny\n", "", "1:1: name: is missing"},
+  };
+  for (const Case& c : cases) {
+    const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
+    try {
+      load_experiment(file);
+      ADD_FAILURE() << "accepted: " << c.to;
+    } catch (const InputError& error) {
+      EXPECT_EQ(std::string(error.what()).substr(0, file.size() + 1 + c.message.size()), file + ":" + c.message);
+    }
+  }
+}
+
+TEST(Experiment, ASceneIsNotAnExperiment) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  try {
+    load_experiment(folder.file("scene.yaml"));
+    ADD_FAILURE() << "accepted";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.what(),
+              folder.file("scene.yaml") +
+                  ":1:1: this is a scene, an experiment is needed (a file beside it with scene: scene.yaml "
+                  "and gates, such as those in experiments/)");
+  }
 }
 
 TEST(Experiment, OverridesAreCheckedLikeTheFile) {

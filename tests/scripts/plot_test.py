@@ -107,6 +107,14 @@ class PlotTest(unittest.TestCase):
             np.testing.assert_allclose(values, [1, 0.5])
         self.assert_drawn("rmse.png")
 
+    def test_gaps_in_the_error_of_the_images_are_explained(self):
+        rows = "".join(f"{i},1,{e},{max(e, 0)},0.3,2,0.3\n" for i, e in enumerate((1, 0.5, -0.1, 0.2, -0.2)))
+        (self.folder / "log.csv").write_text(HEADER + rows)
+        image = reading.read_log(self.folder / "log.csv")["image_rmse"]
+        self.assertEqual(curves.gap_note(image), "gaps (2 of 5 rows): squared error, unbiased, estimated below 0")
+        self.assertEqual(curves.gap_note(image[:2]), "")
+        self.assert_drawn("rmse.png")
+
     def test_black_and_not_finite_pixels(self):
         exr.write(self.folder / "black.exr", images(2, value=0.0))
         broken = images(2)
