@@ -195,7 +195,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     const int s = scene.shape_index(x[count - 1].triangle);
     if (scene.moving.emission[s])
       for (int c = 0; c < 3; ++c)
-        if (const double radiance = scene.scene.shapes[s].emission[c]; radiance > 0)
+        if (const double radiance = scene.scene.shapes[s].emission.radiance[c]; radiance > 0)
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
   }
   if (!coloured) {

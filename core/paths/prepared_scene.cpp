@@ -116,7 +116,7 @@ void PreparedScene::update_emitters() {
   emitting_shapes_.resize(scene.shapes.size(), 0);
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
-    const bool emits = !shape.emission.is_black();
+    const bool emits = shape.emission.emits();
     if (!std::exchange(emitting_shapes_[s], emits) && !emits) continue;
     Bounds box;
     for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
@@ -127,14 +127,14 @@ void PreparedScene::update_emitters() {
       for (const Vec3& corner : corners) box.add(corner);
       seen |= height_over(t, camera.position) > 0 && !camera.misses_image(corners[0], corners[1], corners[2]);
       triangles.push_back(t);
-      power.push_back(record.area * shape.emission.max());
+      power.push_back(record.area * shape.emission.power());
     }
     if (emits) boxes.push_back(box);
   }
   emitters = Emitters(std::move(triangles), power, std::move(boxes));
   emitters.seen_by_camera = seen;
   for (ShapeRecord& shape : shapes_)
-    if (!shape.emission.is_black() && !emitters.empty()) shape.emitter_pdf = shape.emission.max() / emitters.power();
+    if (shape.emission.emits() && !emitters.empty()) shape.emitter_pdf = shape.emission.power() / emitters.power();
 }
 
 const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {

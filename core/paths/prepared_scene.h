@@ -61,9 +61,10 @@ class PreparedScene {
   /// Whether its material reflects on both sides.
   bool two_sided(int triangle) const { return shapes_[shape_index(triangle)].two_sided; }
 
-  /// Radiance that leaves the point of an emitter on the normal's side, and towards the unit direction w: none on the back.
-  const Rgb& emission(int triangle) const { return shapes_[shape_index(triangle)].emission; }
-  Rgb emitted(const SurfacePoint& x, const Vec3& w) const { return dot(x.n, w) > 0 ? emission(x.triangle) : Rgb(); }
+  /// Radiance that leaves the point of an emitter towards the unit direction w.
+  Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
+    return shapes_[shape_index(x.triangle)].emission.towards(x.n, w);
+  }
 
   /// What the segment between x and y, which see each other, runs inside of: the shape of a transparent material with an end
   /// of the segment on the back of its face. Null outside. Opaque surfaces and the camera (triangle -1) know no medium: a

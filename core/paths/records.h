@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/base/vec.h"
+#include "core/scene/emitters/area.h"
 #include "core/scene/materials/bsdf.h"
 
 namespace isochron {
@@ -35,8 +36,8 @@ struct ShapeRecord {
   const Bsdf* bsdf = nullptr;
   int material = -1;
   bool two_sided = false;
-  double index = 0;        ///< of refraction behind its faces; 0: opaque
-  Rgb emission;            ///< on the normal's side
+  double index = 0;  ///< of refraction behind its faces; 0: opaque
+  AreaEmitter emission;
   double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
 };
 

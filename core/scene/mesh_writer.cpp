@@ -48,4 +48,9 @@ std::string to_obj(const Scene& scene, const Shape& shape) {
   return text;
 }
 
+std::span<const MeshFormat> mesh_formats() {
+  static constexpr MeshFormat kFormats[] = {{"ply", "binary", to_ply}, {"obj", "text", to_obj}};
+  return kFormats;
+}
+
 }  // namespace isochron

@@ -1,4 +1,5 @@
 #pragma once
+#include <span>
 #include <string>
 
 #include "core/scene/scene.h"
@@ -9,5 +10,13 @@ namespace isochron {
 /// faces in the order and orientation of Scene::triangles. In double precision; read_mesh rounds to float.
 std::string to_ply(const Scene& scene, const Shape& shape);  ///< binary, little-endian
 std::string to_obj(const Scene& scene, const Shape& shape);  ///< with all digits
+
+/// All of them.
+struct MeshFormat {
+  const char* name;  ///< in experiments, and of the files' ends
+  const char* meaning;
+  std::string (*write)(const Scene&, const Shape&);
+};
+std::span<const MeshFormat> mesh_formats();
 
 }  // namespace isochron

@@ -6,6 +6,7 @@
 
 #include "core/base/vec.h"
 #include "core/scene/coordinates.h"
+#include "core/scene/emitters/area.h"
 #include "core/scene/materials/material.h"
 #include "core/scene/sensors/pinhole.h"
 
@@ -31,7 +32,7 @@ struct Shape {
   std::string name;
   std::string file;
   int material = 0;
-  Rgb emission;  ///< uniform radiance on the normal's side; black when the shape is no emitter
+  AreaEmitter emission;
   int first_vertex = 0, vertex_count = 0;
   int first_triangle = 0, triangle_count = 0;
   bool deforms = false;  ///< parameters may move its vertices otherwise than as a rigid body

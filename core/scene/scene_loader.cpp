@@ -123,7 +123,7 @@ Mesh read_shape_mesh(const ShapeKeys& keys, bool solid, std::vector<Edge>& edges
 void add_shape(const ShapeKeys& keys, Scene& scene) {
   Shape shape = keys.shape;
   const bool transparent = scene.materials[shape.material].bsdf().transparent();
-  if (transparent && !shape.emission.is_black())
+  if (transparent && shape.emission.emits())
     keys.places.at("emission")
         .fail(fmt::format("a shape of {} emits nothing", scene.materials[shape.material].kind()), "leave it out");
   const YamlValue& file = keys.places.at("file");
@@ -172,8 +172,7 @@ void describe(Keys& keys, ShapeKeys& entry, Scene& scene) {
   keys.value("file", field::checked(field::text(shape.file), find_file),
              "mesh (OBJ, PLY, OFF, STL), relative to the scene file", {.required = true});
   keys.value("material", material_name(scene, shape.material), "of all its faces", {.required = true});
-  keys.value("emission", field::color(shape.emission, NumberRange::non_negative(), scene.grey),
-             "radiance, on the normal's side");
+  keys.value("emission", shape.emission.field(scene.grey), "radiance, on the normal's side");
   keys.map("transform", [&](Keys& inner) { describe(inner, entry.transform); }, "of the mesh", {.otherwise = "none"});
   keys.check([&](const YamlValue&) { add_shape(entry, scene); });
 }
@@ -196,7 +195,7 @@ void describe(Keys& keys, Scene& scene) {
     const YamlValue& value = places.at("shapes");
     if (scene.shapes.empty()) value.fail("has no shape", "at least one");
     const bool lit = std::any_of(scene.shapes.begin(), scene.shapes.end(),
-                                 [](const Shape& shape) { return !shape.emission.is_black(); });
+                                 [](const Shape& shape) { return shape.emission.emits(); });
     if (!lit) value.fail("no shape emits light", "emission above 0 on at least one");
   });
 }

@@ -75,7 +75,7 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
       scene_.hierarchy(any_arc_contributes(y.triangle) ? PreparedScene::Part::all : PreparedScene::Part::moving);
   find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
 
-  const Rgb factor = throughput * scene_.emission(y.triangle) * (1 / pdf_y);
+  const Rgb factor = throughput * (1 / pdf_y);
   ArcPair chosen;
   const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
     const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
@@ -208,7 +208,7 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t
   if (!(carried > 0) || f.is_black()) return;
   const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n);
   out.pdf = 1 / area;
-  out.value = factor * f * (carried * area);
+  out.value = factor * scene_.emitted(y, -s.w_i) * f * (carried * area);
   out.point = q;
 }
 
@@ -240,7 +240,7 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, d
   // About the foot of x in the plane, dA = r dr dphi with r the distance.
   const double area = arcs.total_span * distance;
   out.pdf = 1 / area;
-  out.value = throughput * f * scene_.emission(t) * (carried * area);
+  out.value = throughput * f * scene_.emitted(y, -w) * (carried * area);
   out.point = y;
 }
 

@@ -62,7 +62,7 @@ class StandardWalk {
         const double pdf_bsdf = bsdf.pdf(s) * to_area;
         path_.push(scene, y, s.distance_i);
         if (visitor_.wants() && worker_.visible(x, y))
-          visitor_.take(throughput_ * f * scene.emission(y.triangle) *
+          visitor_.take(throughput_ * f * scene.emitted(y, -s.w_i) *
                         (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_bsdf)));
         path_.pop();
       }

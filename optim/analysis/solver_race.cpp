@@ -16,9 +16,6 @@
 namespace isochron {
 namespace {
 
-constexpr OptimizerMethod kMethods[] = {OptimizerMethod::adam, OptimizerMethod::lbfgs,
-                                        OptimizerMethod::levenberg_marquardt};
-
 /// L-BFGS's first trial step over Adam's step: whole ones threw it off the cube in two runs of three.
 constexpr double kFirstStep = 0.5;
 
@@ -63,10 +60,10 @@ void require_error(const Problem& problem) {
 Race race_solvers(const Experiment& experiment, const GatedImage& target, const RaceOptions& options) {
   Race result;
   result.error = options.error;
-  const double each = options.core_seconds / static_cast<double>(std::size(kMethods) * options.seeds);
-  ProgressStage stage("racing the optimisers", static_cast<int>(std::size(kMethods)) * options.seeds);
-  for (OptimizerMethod method : kMethods) {
-    options.progress(name_of(method));
+  const double each = options.core_seconds / static_cast<double>(kChoices<OptimizerMethod>.size() * options.seeds);
+  ProgressStage stage("racing the optimisers", static_cast<int>(kChoices<OptimizerMethod>.size()) * options.seeds);
+  for (const auto& [method, name, meaning] : kChoices<OptimizerMethod>) {
+    options.progress(name);
     for (int s = 0; s < options.seeds; ++s) {
       Experiment own = experiment;
       own.optimizer.method = method;

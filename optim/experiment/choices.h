@@ -10,18 +10,6 @@ inline constexpr auto kChoices<LengthUnit> = std::to_array<Choice<LengthUnit>>(
     {{LengthUnit::scene, "scene", "scene units"}, {LengthUnit::ns, "ns", ""}, {LengthUnit::ps, "ps", ""}});
 
 template <>
-inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterType>>(
-    {{ParameterType::translation, "translation", "along `direction`, scene units"},
-     {ParameterType::rotation, "rotation", "about `axis`, degrees"},
-     {ParameterType::vertices, "vertices", "each on its own, along `direction`, scene units"},
-     {ParameterType::emission, "emission", "radiance of a shape that emits"}});
-
-template <>
-inline constexpr auto kChoices<VertexDirection> =
-    std::to_array<Choice<VertexDirection>>({{VertexDirection::normal, "normal", "each along its normal, as loaded"},
-                                            {VertexDirection::free, "free", "three unknowns per vertex"}});
-
-template <>
 inline constexpr auto kChoices<Sampling> = std::to_array<Choice<Sampling>>(
     {{Sampling::automatic, "auto", "whichever suits the gates' width, or both combined"},
      {Sampling::standard, "standard", "paths of any length"},
@@ -47,17 +35,5 @@ inline constexpr auto kChoices<LossKind> = std::to_array<Choice<LossKind>>(
     {{LossKind::squared, "squared", "its square"},
      {LossKind::huber, "huber", "beyond `scale`, residuals pull like their size, not its square"},
      {LossKind::cauchy, "cauchy", "large residuals hardly pull"}});
-
-template <>
-inline constexpr auto kChoices<OptimizerMethod> = std::to_array<Choice<OptimizerMethod>>(
-    {{OptimizerMethod::adam, "adam", "for many unknowns, few samples, long runs"},
-     {OptimizerMethod::lbfgs, "lbfgs", "for smooth problems of some hundred unknowns"},
-     {OptimizerMethod::levenberg_marquardt, "levenberg_marquardt", "for few unknowns"}});
-
-template <>
-inline constexpr auto kChoices<GeometryFormat> =
-    std::to_array<Choice<GeometryFormat>>({{GeometryFormat::ply, "ply", "binary"},
-                                           {GeometryFormat::obj, "obj", ""},
-                                           {GeometryFormat::none, "none", "no meshes"}});
 
 }  // namespace isochron

@@ -16,8 +16,6 @@ namespace {
 
 constexpr int kMostSamples = 1 << 30;
 constexpr int kMostBounces = 10000;
-constexpr int kMostIterations = std::numeric_limits<int>::max() - 2;
-
 std::string existing_file(const YamlValue& value, const std::filesystem::path& folder) {
   const std::string text = value.text();
   std::error_code none;  // such as of names that are too long
@@ -97,41 +95,6 @@ void describe(Keys& keys, LossSpec& loss) {
   keys.value("kind", field::choice(loss.kind), "what counts of a pixel's residual", {.required = true});
   keys.value("scale", field::positive(loss.scale), "residuals beyond it count for less",
              {.only = only(loss.kind, {LossKind::huber, LossKind::cauchy}), .unit = "RMS of the target"});
-}
-
-void describe(Keys& keys, OptimizerSpec& optimizer) {
-  const auto of = [&](OptimizerMethod method) { return only(optimizer.method, {method}); };
-  keys.value("method", field::choice(optimizer.method), "how the unknowns are found");
-  keys.value("learning_rate", field::positive(optimizer.learning_rate),
-             "adam: largest step of an iteration, about; lbfgs: first trial step; halved whenever the loss rises",
-             {.unit = "the parameter's `scale`"});
-  keys.value("iterations", field::integer(optimizer.iterations, 0, kMostIterations), "at most");
-  keys.value("tolerance", field::non_negative(optimizer.tolerance),
-             "converged once the images' RMSE is at most this; 0: never", {.unit = "RMS of the target"});
-  const auto stop = [&](Keys& inner) {
-    // Two losses are the least that have a standard error.
-    inner.value("window", field::integer(optimizer.stop_window, 2, 100000), "iterations that are averaged",
-                {.required = true});
-  };
-  keys.map("stop", stop,
-           "converged once the loss falls by less than its standard error; the result is the mean over the last window",
-           {.unset = optimizer.stop_window == 0});
-  RateDecay& decay = optimizer.decay;
-  const auto halving = [&](Keys& inner) {
-    inner.value("half_life", field::positive(decay.half_life), "iterations after which steps are half as long",
-                {.required = true});
-    inner.value("start", field::integer(decay.start, 0, kMostIterations), "the iteration that it begins with");
-  };
-  keys.map("decay", halving, "steps shrink, so that the noise that they carry averages out",
-           {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
-  keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
-             "line searches of an iteration, all on the same random numbers", {.only = of(OptimizerMethod::lbfgs)});
-}
-
-void describe(Keys& keys, OutputSpec& output) {
-  keys.value("geometry", field::choice(output.geometry),
-             "format of the meshes of the shapes that move: initial, final and, where known, target");
-  keys.value("every", field::integer(output.every, 0), "and those of every so many; 0: none", {.unit = "iterations"});
 }
 
 void check_parameters(const Experiment& experiment) {

@@ -15,6 +15,9 @@
 #include "core/gates/gate_description.h"
 #include "core/image/image.h"
 #include "core/render/renderer.h"
+#include "optim/experiment/optimizer_spec.h"
+#include "optim/experiment/output_spec.h"
+#include "optim/experiment/parameter_spec.h"
 
 namespace isochron {
 
@@ -45,51 +48,6 @@ GateSet make_gates(const GateSpec& spec);
 /// `spec`, separated by spaces; none where steady), isochron.gateUnit (scene units, ns, ps), isochron.quantity (what a
 /// pixel's value is).
 ExrNotes exr_notes(const GateSpec& spec);
-
-enum class ParameterType { translation, rotation, vertices, material, emission };
-enum class VertexDirection { fixed, normal, free };
-/// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
-/// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
-enum class PivotKind { fixed, center, follow };
-
-/// Which vertices of a shape a parameter moves: all, a list of indices, or those inside a box.
-struct Selection {
-  enum class Kind { all, list, box } kind = Kind::all;
-  std::vector<int> indices;  ///< within the shape, after vertices at one position were welded; counted from 0
-  Vec3 min, max;             ///< world space of the scene file, borders included
-};
-
-/// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
-/// file; those of materials and emission replace what the scene file says.
-struct ParameterSpec {
-  std::string name;
-  ParameterType type = ParameterType::translation;
-  std::string shape;     ///< translation, rotation, vertices, emission
-  std::string material;  ///< material
-  std::string quantity;  ///< material: which of its quantities, as `type` in the file
-  Selection selection;
-  VertexDirection direction_kind = VertexDirection::fixed;
-  Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
-  Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
-  PivotKind pivot_kind = PivotKind::fixed;
-  Vec3 pivot;  ///< rotation; of follow: where the point is in the scene as loaded; of center: unused
-  std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
-                                                      ///< empty (all but initial)
-
-  double scale = 0;  ///< in units of the parameter, see parameters.h; 0: the default of its type
-
-  /// Of type vertices, see smoothing.h; 0: none.
-  double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
-  double slopes = 0;     ///< weight of the penalty on uneven offsets, in units of the target's mean square
-
-  /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
-  std::map<std::string, YamlValue> where;
-  /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
-  [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
-};
-
-/// Its type as files name it.
-std::string type_name(const ParameterSpec& spec);
 
 struct TargetSpec {
   std::string images;  ///< absolute path of an EXR; empty: render at the target values
@@ -123,37 +81,6 @@ enum class LossKind { squared, huber, cauchy };
 struct LossSpec {
   LossKind kind = LossKind::squared;
   double scale = 1;  ///< in units of the target's root mean square
-};
-
-enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
-
-/// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
-struct RateDecay {
-  int start = 0;
-  double half_life = 0;  ///< 0: steps do not shrink
-  double factor(int iteration) const {
-    return half_life > 0 && iteration > start ? std::exp2((start - iteration) / half_life) : 1;
-  }
-};
-
-struct OptimizerSpec {
-  OptimizerMethod method = OptimizerMethod::adam;
-  /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
-  /// levenberg_marquardt: without meaning.
-  double learning_rate = 0.02;
-  int iterations = 100;
-  double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
-  int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
-  RateDecay decay;           ///< adam
-  int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
-};
-
-enum class GeometryFormat { ply, obj, none };
-
-/// What a run writes besides images and tables: see geometry_files.h.
-struct OutputSpec {
-  GeometryFormat geometry = GeometryFormat::ply;
-  int every = 0;  ///< meshes of every so many iterations besides the first and the last; 0: of none
 };
 
 struct Experiment {

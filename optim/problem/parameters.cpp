@@ -253,7 +253,7 @@ Scene Parameters::apply(const std::vector<double>& theta) const {
       if (value.material >= 0)
         scene.materials[value.material].set_number(value.index + i, t);
       else
-        scene.shapes[value.index].emission[i] = t;
+        scene.shapes[value.index].emission.radiance[i] = t;
     }
   return scene;
 }

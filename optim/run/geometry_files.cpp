@@ -30,7 +30,7 @@ bool all_known(const Scene& scene, const Shape& shape) {
 
 GeometryFiles::GeometryFiles(const std::string& folder, const OutputSpec& output, const Parameters& parameters)
     : folder_(folder + "/geometry"), output_(output), parameters_(parameters) {
-  if (output.geometry == GeometryFormat::none) return;
+  if (output.geometry == "none") return;
   const Scene& scene = parameters.scene();
   for (const int shape : parameters.moving_shapes()) {
     const std::string stem = file_name(scene.shapes[shape].name);
@@ -46,13 +46,15 @@ GeometryFiles::GeometryFiles(const std::string& folder, const OutputSpec& output
 
 void GeometryFiles::write(const std::string& moment, const std::vector<double>& theta) const {
   if (files_.empty()) return;
-  const bool ply = output_.geometry == GeometryFormat::ply;
+  const auto formats = mesh_formats();
+  const MeshFormat& format = *std::find_if(formats.begin(), formats.end(),
+                                           [&](const MeshFormat& each) { return output_.geometry == each.name; });
   const Scene scene = parameters_.apply(theta);
   for (const File& file : files_) {
     const Shape& shape = scene.shapes[file.shape];
     if (!all_known(scene, shape)) continue;
-    write_file_atomically(fmt::format("{}/{}_{}.{}", folder_, moment, file.name, ply ? "ply" : "obj"),
-                          ply ? to_ply(scene, shape) : to_obj(scene, shape));
+    write_file_atomically(fmt::format("{}/{}_{}.{}", folder_, moment, file.name, format.name),
+                          format.write(scene, shape));
   }
 }
 

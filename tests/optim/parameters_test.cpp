@@ -86,7 +86,8 @@ std::vector<double> dofs(const Scene& scene) {
   for (const Vec3& p : scene.positions) all.insert(all.end(), {p.x, p.y, p.z});
   for (const Material& m : scene.materials)
     for (int k = 0; k < m.numbers(); ++k) all.push_back(m.number(k));
-  for (const Shape& s : scene.shapes) all.insert(all.end(), {s.emission.r, s.emission.g, s.emission.b});
+  for (const Shape& s : scene.shapes)
+    for (int c = 0; c < 3; ++c) all.push_back(s.emission.radiance[c]);
   return all;
 }
 

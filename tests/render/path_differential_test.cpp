@@ -120,7 +120,7 @@ std::vector<double> all_dofs(const Scene& scene) {
   for (int m = 0; m < layout.materials(); ++m)
     for (int k = 0; k < layout.numbers(m); ++k) dofs[layout.number(m, k)] = scene.materials[m].number(k);
   for (int s = 0; s < layout.shapes; ++s)
-    for (int c = 0; c < 3; ++c) dofs[layout.emission(s, c)] = scene.shapes[s].emission[c];
+    for (int c = 0; c < 3; ++c) dofs[layout.emission(s, c)] = scene.shapes[s].emission.radiance[c];
   return dofs;
 }
 

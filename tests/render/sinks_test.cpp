@@ -19,7 +19,7 @@ Scene make_scene(bool grey) {
   if (!grey) {
     replace_material(scene, "grey", diffuse({0.5, 0.2, 0.7}));
     replace_material(scene, "block", retroreflector({0.3, 0.1, 0.4}, {0.1, 0.5, 0.3}, 0.4));
-    scene.shapes[scene.find_shape("light")].emission = {15, 12, 4};
+    scene.shapes[scene.find_shape("light")].emission = Rgb{15, 12, 4};
   }
   return scene;
 }

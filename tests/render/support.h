@@ -73,7 +73,7 @@ inline Motion change_material(const Scene& scene, const std::string& material, c
 inline Motion change_emission(const Scene& scene, const std::string& shape) {
   const int s = scene.find_shape(shape);
   return {[=](Scene& target, double t) {
-            for (int c = 0; c < 3; ++c) target.shapes[s].emission[c] += t;
+            for (int c = 0; c < 3; ++c) target.shapes[s].emission.radiance[c] += t;
           },
           [=](const Scene& source, std::vector<std::pair<int, double>>& out) {
             for (int c = 0; c < 3; ++c) out.emplace_back(DofLayout(source).emission(s, c), 1.0);

@@ -86,13 +86,13 @@ TEST_F(SceneLoader, LoadsEverything) {
   const Shape &floor = scene.shapes[0], &lamp = scene.shapes[1];
   EXPECT_EQ(floor.file, folder.path("meshes/quad.obj"));
   EXPECT_EQ(floor.material, 1);
-  EXPECT_TRUE(floor.emission.is_black());
+  EXPECT_FALSE(floor.emission.emits());
   EXPECT_EQ(floor.first_vertex, 0);
   EXPECT_EQ(floor.vertex_count, 4);
   EXPECT_EQ(floor.first_triangle, 0);
   EXPECT_EQ(floor.triangle_count, 2);
   EXPECT_EQ(lamp.material, 0);
-  EXPECT_EQ(lamp.emission, Rgb(10));
+  EXPECT_EQ(lamp.emission.radiance, Rgb(10));
   EXPECT_EQ(lamp.first_vertex, 4);
   EXPECT_EQ(lamp.vertex_count, 3);
   EXPECT_EQ(lamp.first_triangle, 2);
@@ -209,7 +209,7 @@ TEST_F(SceneLoader, DirectionsOfAnyLength) {
 
 TEST_F(SceneLoader, ColoursAndDefaults) {
   EXPECT_FALSE(load_scene(with("emission: 10", "emission: [1, 2, 3]")).grey);
-  EXPECT_EQ(load_scene(with("emission: 10", "emission: [1, 2, 3]")).shapes[1].emission, Rgb(1, 2, 3));
+  EXPECT_EQ(load_scene(with("emission: 10", "emission: [1, 2, 3]")).shapes[1].emission.radiance, Rgb(1, 2, 3));
   EXPECT_FALSE(load_scene(with("albedo: 0.6", "albedo: [0.5, 0.5, 0.5]")).grey);
   EXPECT_FALSE(load_scene(with("reflectance: 0.9", "reflectance: [1, 0, 0]")).grey);
   EXPECT_EQ(load_scene(with("  up: [0, 1, 0]\n", "")).camera.up, (Vec3{0, 1, 0}));

@@ -1,0 +1,70 @@
+// The optimisers: their names and keys in experiment files.
+#pragma once
+#include <cmath>
+#include <limits>
+
+#include "core/base/description.h"
+
+namespace isochron {
+
+inline constexpr int kMostIterations = std::numeric_limits<int>::max() - 2;
+
+enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
+
+template <>
+inline constexpr auto kChoices<OptimizerMethod> = std::to_array<Choice<OptimizerMethod>>(
+    {{OptimizerMethod::adam, "adam", "for many unknowns, few samples, long runs"},
+     {OptimizerMethod::lbfgs, "lbfgs", "for smooth problems of some hundred unknowns"},
+     {OptimizerMethod::levenberg_marquardt, "levenberg_marquardt", "for few unknowns"}});
+
+/// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
+struct RateDecay {
+  int start = 0;
+  double half_life = 0;  ///< 0: steps do not shrink
+  double factor(int iteration) const {
+    return half_life > 0 && iteration > start ? std::exp2((start - iteration) / half_life) : 1;
+  }
+};
+
+struct OptimizerSpec {
+  OptimizerMethod method = OptimizerMethod::adam;
+  /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
+  /// levenberg_marquardt: without meaning.
+  double learning_rate = 0.02;
+  int iterations = 100;
+  double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
+  int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
+  RateDecay decay;           ///< adam
+  int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
+};
+
+inline void describe(Keys& keys, OptimizerSpec& optimizer) {
+  const auto of = [&](OptimizerMethod method) { return only(optimizer.method, {method}); };
+  keys.value("method", field::choice(optimizer.method), "how the unknowns are found");
+  keys.value("learning_rate", field::positive(optimizer.learning_rate),
+             "adam: largest step of an iteration, about; lbfgs: first trial step; halved whenever the loss rises",
+             {.unit = "the parameter's `scale`"});
+  keys.value("iterations", field::integer(optimizer.iterations, 0, kMostIterations), "at most");
+  keys.value("tolerance", field::non_negative(optimizer.tolerance),
+             "converged once the images' RMSE is at most this; 0: never", {.unit = "RMS of the target"});
+  const auto stop = [&](Keys& inner) {
+    // Two losses are the least that have a standard error.
+    inner.value("window", field::integer(optimizer.stop_window, 2, 100000), "iterations that are averaged",
+                {.required = true});
+  };
+  keys.map("stop", stop,
+           "converged once the loss falls by less than its standard error; the result is the mean over the last window",
+           {.unset = optimizer.stop_window == 0});
+  RateDecay& decay = optimizer.decay;
+  const auto halving = [&](Keys& inner) {
+    inner.value("half_life", field::positive(decay.half_life), "iterations after which steps are half as long",
+                {.required = true});
+    inner.value("start", field::integer(decay.start, 0, kMostIterations), "the iteration that it begins with");
+  };
+  keys.map("decay", halving, "steps shrink, so that the noise that they carry averages out",
+           {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
+  keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
+             "line searches of an iteration, all on the same random numbers", {.only = of(OptimizerMethod::lbfgs)});
+}
+
+}  // namespace isochron

@@ -1,0 +1,25 @@
+// What a run writes besides images and tables: see geometry_files.h.
+#pragma once
+#include <string>
+
+#include "core/base/description.h"
+#include "core/scene/mesh_writer.h"
+
+namespace isochron {
+
+struct OutputSpec {
+  std::string geometry = "ply";  ///< a format of mesh_formats(), or none
+  int every = 0;                 ///< meshes of every so many iterations besides the first and the last; 0: of none
+};
+
+inline void describe(Keys& keys, OutputSpec& output) {
+  std::vector<std::pair<std::string, std::string>> formats;
+  for (const MeshFormat& format : mesh_formats()) formats.emplace_back(format.name, format.meaning);
+  formats.emplace_back("none", "no meshes");
+  const auto choose = [&output, formats](int i) { output.geometry = formats[i].first; };
+  keys.value("geometry", field::choice(formats, choose, [&output] { return output.geometry; }),
+             "format of the meshes of the shapes that move: initial, final and, where known, target");
+  keys.value("every", field::integer(output.every, 0), "and those of every so many; 0: none", {.unit = "iterations"});
+}
+
+}  // namespace isochron

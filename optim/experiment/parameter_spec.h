@@ -1,0 +1,68 @@
+// Parameters: what an experiment says of each, and the names of their types.
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/base/description.h"
+
+namespace isochron {
+
+enum class ParameterType { translation, rotation, vertices, material, emission };
+enum class VertexDirection { fixed, normal, free };
+/// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
+/// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
+enum class PivotKind { fixed, center, follow };
+
+/// Which vertices of a shape a parameter moves: all, a list of indices, or those inside a box.
+struct Selection {
+  enum class Kind { all, list, box } kind = Kind::all;
+  std::vector<int> indices;  ///< within the shape, after vertices at one position were welded; counted from 0
+  Vec3 min, max;             ///< world space of the scene file, borders included
+};
+
+/// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
+/// file; those of materials and emission replace what the scene file says.
+struct ParameterSpec {
+  std::string name;
+  ParameterType type = ParameterType::translation;
+  std::string shape;     ///< translation, rotation, vertices, emission
+  std::string material;  ///< material
+  std::string quantity;  ///< material: which of its quantities, as `type` in the file
+  Selection selection;
+  VertexDirection direction_kind = VertexDirection::fixed;
+  Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
+  Vec3 axis;       ///< rotation, by the right-hand rule; only its direction matters
+  PivotKind pivot_kind = PivotKind::fixed;
+  Vec3 pivot;  ///< rotation; of follow: where the point is in the scene as loaded; of center: unused
+  std::vector<double> initial, target, lower, upper;  ///< one value for all components or one each; may be
+                                                      ///< empty (all but initial)
+
+  double scale = 0;  ///< in units of the parameter, see parameters.h; 0: the default of its type
+
+  /// Of type vertices, see smoothing.h; 0: none.
+  double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
+  double slopes = 0;     ///< weight of the penalty on uneven offsets, in units of the target's mean square
+
+  /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
+  std::map<std::string, YamlValue> where;
+  /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
+  [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
+};
+
+/// Its type as files name it.
+std::string type_name(const ParameterSpec& spec);
+
+template <>
+inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterType>>(
+    {{ParameterType::translation, "translation", "along `direction`, scene units"},
+     {ParameterType::rotation, "rotation", "about `axis`, degrees"},
+     {ParameterType::vertices, "vertices", "each on its own, along `direction`, scene units"},
+     {ParameterType::emission, "emission", "radiance of a shape that emits"}});
+
+template <>
+inline constexpr auto kChoices<VertexDirection> =
+    std::to_array<Choice<VertexDirection>>({{VertexDirection::normal, "normal", "each along its normal, as loaded"},
+                                            {VertexDirection::free, "free", "three unknowns per vertex"}});
+
+}  // namespace isochron
