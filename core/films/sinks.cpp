@@ -4,6 +4,10 @@ namespace isochron {
 
 void PrimalSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
   const Rgb weighted = value * use.value;
+  if (film_.channels() == 1) {
+    gates_.for_each_value(length, [&](int g, double w) { *film_.at(pixel, g) += w * weighted.r; });
+    return;
+  }
   gates_.for_each_value(length, [&](int g, double w) {
     double* out = film_.at(pixel, g);
     for (int c = 0; c < film_.channels(); ++c) out[c] += w * weighted[c];

@@ -4,12 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/base/constants.h"
-
 namespace isochron {
 namespace {
-
-constexpr double kCentralFrom = 0.02425;
 
 /// Polynomial with its leading coefficient first.
 template <std::size_t N>
@@ -19,33 +15,36 @@ double horner(const std::array<double, N>& coefficients, double x) {
   return p;
 }
 
-/// Acklam's rational approximation, relative error 1.15e-9.
-double approximate_quantile(double tail, double from_half) {
-  constexpr std::array kTailUp{-7.784894002430293e-03, -3.223964580411365e-01, -2.400758277161838e+00,
-                               -2.549732539343734e+00, 4.374664141464968e+00,  2.938163982698783e+00};
-  constexpr std::array kTailDown{7.784695709041462e-03, 3.224671290700398e-01, 2.445134137142996e+00,
-                                 3.754408661907416e+00, 1.0};
-  constexpr std::array kCentreUp{-3.969683028665376e+01, 2.209460984245205e+02,  -2.759285104469687e+02,
-                                 1.383577518672690e+02,  -3.066479806614716e+01, 2.506628277459239e+00};
-  constexpr std::array kCentreDown{-5.447609879822406e+01, 1.615858368580409e+02,  -1.556989798598866e+02,
-                                   6.680131188771972e+01,  -1.328068155288572e+01, 1.0};
-  if (tail < kCentralFrom) {
-    const double q = std::sqrt(-2 * std::log(tail));
-    return horner(kTailUp, q) / horner(kTailDown, q);
-  }
-  const double r = from_half * from_half;
-  return horner(kCentreUp, r) * from_half / horner(kCentreDown, r);
-}
+// Coefficients of Wichura's rational approximations (1988, algorithm AS 241, PPND16), relative error 1e-16.
+constexpr std::array kCentreUp{2509.0809287301226727, 33430.575583588128105, 67265.770927008700853,
+                               45921.953931549871457, 13731.693765509461125, 1971.5909503065514427,
+                               133.14166789178437745, 3.387132872796366608};
+constexpr std::array kCentreDown{
+    5226.495278852854561,  28729.085735721942674, 39307.89580009271061,  21213.794301586595867,
+    5394.1960214247511077, 687.1870074920579083,  42.313330701600911252, 1.0};
+constexpr std::array kMiddleUp{7.7454501427834140764e-4, 0.0227238449892691845833, 0.24178072517745061177,
+                               1.27045825245236838258,   3.64784832476320460504,   5.7694972214606914055,
+                               4.6303378461565452959,    1.42343711074968357734};
+constexpr std::array kMiddleDown{
+    1.05075007164441684324e-9, 5.475938084995344946e-4, 0.0151986665636164571966, 0.14810397642748007459,
+    0.68976733498510000455,    1.6763848301838038494,   2.05319162663775882187,   1.0};
+constexpr std::array kTailUp{2.01033439929228813265e-7, 2.71155556874348757815e-5, 0.0012426609473880784386,
+                             0.026532189526576123093,   0.29656057182850489123,    1.7848265399172913358,
+                             5.4637849111641143699,     6.6579046435011037772};
+constexpr std::array kTailDown{
+    2.04426310338993978564e-15, 1.4215117583164458887e-7, 1.8463183175100546818e-5, 7.868691311456132591e-4,
+    0.0148753612908506148525,   0.13692988092273580531,   0.59983220655588793769,   1.0};
 
 }  // namespace
 
 double normal_quantile_lower(double tail, double from_half) {
-  const double x = approximate_quantile(tail, from_half);
-  // One Halley step on the side where the residual keeps its relative accuracy.
-  const double scaled = x * std::sqrt(0.5);
-  const double residual = tail < kCentralFrom ? 0.5 * std::erfc(-scaled) - tail : 0.5 * std::erf(scaled) - from_half;
-  const double step = residual * std::sqrt(kTwoPi) * std::exp(0.5 * x * x);
-  return x - step / (1 + 0.5 * x * step);
+  if (std::abs(from_half) <= 0.425) {
+    const double r = 0.180625 - from_half * from_half;
+    return from_half * horner(kCentreUp, r) / horner(kCentreDown, r);
+  }
+  const double r = std::sqrt(-std::log(tail));
+  if (r <= 5) return -horner(kMiddleUp, r - 1.6) / horner(kMiddleDown, r - 1.6);
+  return -horner(kTailUp, r - 5) / horner(kTailDown, r - 5);
 }
 
 }  // namespace isochron

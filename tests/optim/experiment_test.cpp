@@ -168,7 +168,7 @@ TEST(Experiment, MessagesAboutMapsNameTheirKeys) {
       {"seed: 3", "loss: {scale: 1}", "11:7: loss.kind: is missing (keys here: kind, scale)"},
       {"  - {name: power, type: emission, shape: lamp, initial: 8, target: 10}", "  - power",
        "7:5: parameters[1]: is not a map (keys and values; its keys: name, type, shape, material, "},
-      {gates, "", "1:1: gates: is missing (a map with the keys kind, unit, scene_unit_m, centers, "},
+      {gates, "", "1:1: gates: is missing (a map with the keys kind, centers, unit, scene_unit_m"},
       {"name: tiny\n", "", "1:1: name: is missing"},
   };
   for (const Case& c : cases) {

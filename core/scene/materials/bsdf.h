@@ -10,6 +10,7 @@
 
 #include "core/base/constants.h"
 #include "core/base/description.h"
+#include "core/base/sincos_2pi.h"
 #include "core/base/vec.h"
 
 namespace isochron {
@@ -145,6 +146,10 @@ struct Frame {
 };
 
 /// Cosine-weighted about n: density cos / pi.
-Vec3 sample_cosine(const Vec3& n, double u0, double u1);
+inline Vec3 sample_cosine(const Vec3& n, double u0, double u1) {
+  const double r = std::sqrt(u0);
+  const SineCosine phi = sincos_2pi(u1);
+  return Frame(n).to_world({r * phi.cosine, r * phi.sine, std::sqrt(1 - u0)});
+}
 
 }  // namespace isochron
