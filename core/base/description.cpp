@@ -159,7 +159,7 @@ class Reader final : public Keys {
     return found.has_value();
   }
   void map(const std::string& name, const Describe& describe, const std::string&, const KeyOptions& options) override {
-    if (const auto found = find(name, options)) read_keys(*found, describe);
+    if (const auto found = find(name, options, &describe)) read_map(*found, describe);
   }
   void named(const std::string& name, const std::vector<std::string>&, const DescribeNamed& describe,
              const std::string&, const KeyOptions& options) override {
@@ -202,15 +202,26 @@ class Reader final : public Keys {
     const auto found = find(name, options);
     if (!found) return;
     std::size_t i = 0;
-    for (const YamlValue& entry : found->list()) read_keys(entry, [&](Keys& keys) { describe(keys, i++); });
+    for (const YamlValue& entry : found->list()) read_map(entry, [&](Keys& keys) { describe(keys, i); }), ++i;
   }
-  std::optional<YamlValue> find(const std::string& name, const KeyOptions& options) {
+  static std::string names_of(const Describe& describe) {
+    NameList list;
+    describe(list);
+    return fmt::format("{}", fmt::join(list.names, ", "));
+  }
+  static void read_map(const YamlValue& value, const Describe& describe) {
+    if (!value.is_map()) value.fail("is not a map", "keys and values; its keys: " + names_of(describe));
+    read_keys(value, describe);
+  }
+  /// `inner`: what describes the map that is looked for.
+  std::optional<YamlValue> find(const std::string& name, const KeyOptions& options, const Describe* inner = nullptr) {
     const Only& only = options.only;
     if (!only.here) {
       map_.explain(name, "belongs to " + only.to + (only.not_to.empty() ? "" : ", not to " + only.not_to));
       return {};
     }
-    const auto found = options.required ? map_.require(name) : map_.find(name);
+    auto found = map_.find(name);
+    if (!found && options.required) found = map_.require(name, inner ? "a map with the keys " + names_of(*inner) : "");
     if (found && places_) places_->emplace(name, *found);
     return found;
   }

@@ -207,7 +207,7 @@ std::optional<YamlValue> YamlMap::find(const std::string& key) {
   return {};
 }
 
-YamlValue YamlMap::require(const std::string& key) {
+YamlValue YamlMap::require(const std::string& key, const std::string& allowed) {
   if (std::optional<YamlValue> value = find(key)) return *value;
   std::vector<std::string> unread;
   for (const Entry& entry : entries_) {
@@ -216,7 +216,7 @@ YamlValue YamlMap::require(const std::string& key) {
   const std::string near = nearest_word(key, unread);
   YamlValue missing = value_;
   missing.key_ = child(value_.key_, key);
-  missing.fail("is missing" + (near.empty() ? "" : ", is '" + near + "' a misspelling of it?"));
+  missing.fail("is missing" + (near.empty() ? "" : ", is '" + near + "' a misspelling of it?"), allowed);
 }
 
 std::vector<std::pair<std::string, YamlValue>> YamlMap::entries() {

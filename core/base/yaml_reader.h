@@ -77,7 +77,8 @@ class YamlValue {
 /// A map that remembers which keys were asked for, whether present or not: those are the allowed ones.
 class YamlMap {
  public:
-  YamlValue require(const std::string& key);              ///< throws when the key is missing
+  /// Throws when the key is missing; `allowed`: what belongs there.
+  YamlValue require(const std::string& key, const std::string& allowed = "");
   std::optional<YamlValue> find(const std::string& key);  ///< empty when the key is missing
   /// What reject_unknown says of this key where it was not asked for, such as "belongs to gaussian, not to boxcar".
   void explain(const std::string& key, const std::string& why) { explained_.emplace_back(key, why); }

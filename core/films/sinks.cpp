@@ -87,10 +87,10 @@ void AdjointSink::scatter(const Rgb& weight, double slope_weight) {
   if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
   for (const VertexGradient& v : differential_->vertices)
     for (int axis = 0; axis < 3; ++axis)
-      if (const int dof = layout_.vertex(v.vertex, axis); basis_.moves(dof))
+      if (const int dof = layout_.vertex(v.vertex, axis); basis_.differentiates(dof))
         gradient_.add(dof, (v.channel < 0 ? sum : weight[v.channel]) * v.log_f[axis] + slope_weight * v.length[axis]);
   for (const ScalarGradient& s : differential_->scalars)
-    if (basis_.moves(s.dof))
+    if (basis_.differentiates(s.dof))
       gradient_.add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
 }
 

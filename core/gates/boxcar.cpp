@@ -32,13 +32,12 @@ GateShape GateShape::boxcar(double width) {
   shape.upper_ = 0.5 * width;
   shape.width_ = width / std::sqrt(12.0);
   shape.peak_ = 1 / width;
-  shape.segments_.push_back({shape.peak_, {Side::Form::atom, shape.lower_, 0}, {Side::Form::atom, shape.upper_, 0}});
+  shape.segments_.push_back({shape.peak_, {Side::Form::dirac, shape.lower_, 0}, {Side::Form::dirac, shape.upper_, 0}});
   shape.finish_parts();
   return shape;
 }
 
 extern const GateKindEntry kBoxcar;
-const GateKindEntry kBoxcar{"boxcar", "constant within its width",
-                            []() -> std::shared_ptr<GateDescription> { return std::make_shared<Boxcar>(); }};
+const GateKindEntry kBoxcar{"boxcar", "constant within its width", make_gate<Boxcar>};
 
 }  // namespace isochron

@@ -46,7 +46,7 @@ double GateShape::quantile(const Side& side, double u) {
       return side.from + u * (side.to - side.from);
     case Side::Form::rayleigh:
       return side.from * std::sqrt(-2 * std::log1p(-u * side.to));
-    case Side::Form::atom:
+    case Side::Form::dirac:
       break;
   }
   return side.from;
@@ -63,10 +63,10 @@ CoupledPair GateShape::sample_pair(PairPart part, double u) const {
   CoupledPair pair;
   pair.plus = quantile(segment.plus, rest);
   pair.minus = quantile(segment.minus, rest);
-  pair.plus_is_jump = segment.plus.form == Side::Form::atom;
-  pair.minus_is_jump = segment.minus.form == Side::Form::atom;
-  pair.has_plus = pair.plus_is_jump == (part == PairPart::atoms);
-  pair.has_minus = pair.minus_is_jump == (part == PairPart::atoms);
+  pair.plus_is_jump = segment.plus.form == Side::Form::dirac;
+  pair.minus_is_jump = segment.minus.form == Side::Form::dirac;
+  pair.has_plus = pair.plus_is_jump == (part == PairPart::dirac);
+  pair.has_minus = pair.minus_is_jump == (part == PairPart::dirac);
   return pair;
 }
 
@@ -78,10 +78,10 @@ void GateShape::finish_parts() {
     target.cumulative.push_back(target.mass);
   };
   for (int i = 0; i < static_cast<int>(segments_.size()); ++i) {
-    const bool plus = segments_[i].plus.form == Side::Form::atom;
-    const bool minus = segments_[i].minus.form == Side::Form::atom;
+    const bool plus = segments_[i].plus.form == Side::Form::dirac;
+    const bool minus = segments_[i].minus.form == Side::Form::dirac;
     if (!plus || !minus) add(PairPart::smooth, i);
-    if (plus || minus) add(PairPart::atoms, i);
+    if (plus || minus) add(PairPart::dirac, i);
   }
   for (Part& part : parts_) {
     for (double& c : part.cumulative) c /= part.mass;

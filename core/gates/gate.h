@@ -15,17 +15,17 @@ namespace isochron {
 struct CoupledPair {
   double plus = 0, minus = 0;
   bool has_plus = false, has_minus = false;
-  bool plus_is_jump = false, minus_is_jump = false;  ///< an atom of dW: reported under path_length
+  bool plus_is_jump = false, minus_is_jump = false;  ///< at a jump of the gate: reported under path_length
 };
 
 enum class GateKind { steady, gaussian, boxcar, truncated_gaussian, tabulated };
 
 /// Which part of dW a pair is drawn from. A side of the other part is absent from the pair, so that each part is the same
-/// for every way of sampling and can be left out by itself; where an atom and a slope balance each other, as at the jump of a
+/// for every way of sampling and can be left out by itself; where a jump and a slope balance each other, as at the jump of a
 /// sawtooth, either comes alone.
 enum class PairPart {
   smooth,  ///< the continuous part: W', reported under `interior`
-  atoms    ///< the jumps of the gate, reported under `path_length`
+  dirac    ///< the jumps of the gate, reported under `path_length`
 };
 
 /// One gate shape centred at zero, with the four operations of theory section 3. Lengths in scene units,
@@ -88,9 +88,9 @@ class GateShape {
  private:
   /// One sign of dW on a stretch of the quantile axis.
   struct Side {
-    /// atom: all at `from`. uniform: from -> to as the quantile runs 0 -> 1. rayleigh: from * rho, where rho
+    /// dirac: all at `from`. uniform: from -> to as the quantile runs 0 -> 1. rayleigh: from * rho, where rho
     /// follows the Rayleigh law cut where its distribution function is `to`.
-    enum class Form { atom, uniform, rayleigh } form = Form::atom;
+    enum class Form { dirac, uniform, rayleigh } form = Form::dirac;
     double from = 0, to = 0;
   };
   struct Segment {

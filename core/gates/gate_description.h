@@ -34,5 +34,9 @@ struct GateKindEntry {
   std::shared_ptr<GateDescription> (*make)();
 };
 std::span<const GateKindEntry* const> gate_kinds();
+template <class T>
+std::shared_ptr<GateDescription> make_gate() {
+  return std::make_shared<T>();
+}
 
 }  // namespace isochron

@@ -100,19 +100,18 @@ GateShape GateShape::truncated_gaussian(double sigma, double half_width) {
     shape.outside_ = 0.5 * std::erfc(c * std::sqrt(0.5));
     shape.mass_ = std::erf(c * std::sqrt(0.5));
     shape.width_ = sigma * std::sqrt(truncated_variance(c));
-    shape.segments_.push_back(
-        {shape.peak_ * std::exp(-0.5 * c * c), {Side::Form::atom, -half_width, 0}, {Side::Form::atom, half_width, 0}});
+    shape.segments_.push_back({shape.peak_ * std::exp(-0.5 * c * c),
+                               {Side::Form::dirac, -half_width, 0},
+                               {Side::Form::dirac, half_width, 0}});
   }
   shape.finish_parts();
   return shape;
 }
 
 extern const GateKindEntry kGaussian;
-const GateKindEntry kGaussian{"gaussian", "a normal density of path length",
-                              []() -> std::shared_ptr<GateDescription> { return std::make_shared<Gaussian>(); }};
+const GateKindEntry kGaussian{"gaussian", "a normal density of path length", make_gate<Gaussian>};
 extern const GateKindEntry kTruncatedGaussian;
-const GateKindEntry kTruncatedGaussian{
-    "truncated_gaussian", "zero beyond `half_width` from its centre",
-    []() -> std::shared_ptr<GateDescription> { return std::make_shared<TruncatedGaussian>(); }};
+const GateKindEntry kTruncatedGaussian{"truncated_gaussian", "zero beyond `half_width` from its centre",
+                                       make_gate<TruncatedGaussian>};
 
 }  // namespace isochron

@@ -29,7 +29,6 @@ GateShape GateShape::steady() {
 }
 
 extern const GateKindEntry kSteady;
-const GateKindEntry kSteady{"steady", "all light, whatever its length",
-                            []() -> std::shared_ptr<GateDescription> { return std::make_shared<Steady>(); }};
+const GateKindEntry kSteady{"steady", "all light, whatever its length", make_gate<Steady>};
 
 }  // namespace isochron

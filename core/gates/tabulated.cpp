@@ -154,13 +154,13 @@ void GateShape::couple_table() {
     if (change > 0) plus.push_back({change, side});
     if (change < 0) minus.push_back({-change, side});
   };
-  add(values_.front(), {Side::Form::atom, lower_, 0});
+  add(values_.front(), {Side::Form::dirac, lower_, 0});
   for (int i = 0; i <= last_interval_; ++i) {
     const bool jump = offsets_[i] == offsets_[i + 1];
-    const Side side{jump ? Side::Form::atom : Side::Form::uniform, offsets_[i], offsets_[i + 1]};
+    const Side side{jump ? Side::Form::dirac : Side::Form::uniform, offsets_[i], offsets_[i + 1]};
     add(values_[i + 1] - values_[i], side);
   }
-  add(-values_.back(), {Side::Form::atom, upper_, 0});
+  add(-values_.back(), {Side::Form::dirac, upper_, 0});
   couple_quantiles(plus, minus);
 }
 
@@ -205,7 +205,6 @@ void GateShape::couple_quantiles(const std::vector<Piece>& plus, const std::vect
 }
 
 extern const GateKindEntry kTabulated;
-const GateKindEntry kTabulated{"tabulated", "lines between the rows of a table",
-                               []() -> std::shared_ptr<GateDescription> { return std::make_shared<Tabulated>(); }};
+const GateKindEntry kTabulated{"tabulated", "lines between the rows of a table", make_gate<Tabulated>};
 
 }  // namespace isochron

@@ -33,14 +33,14 @@ class FixedStack {
 /// boundary segment, the point that the walk looks from); its triangle is -1 for the camera.
 struct Path {
   FixedStack<SurfacePoint> vertex;
-  FixedStack<double> length;  ///< length[k]: optical, from vertex 0 to vertex k, plus what length[0] starts with
-  FixedStack<char> moves;     ///< moves[k]: some vertex up to k can have a derivative
+  FixedStack<double> length;      ///< length[k]: optical, from vertex 0 to vertex k, plus what length[0] starts with
+  FixedStack<char> has_gradient;  ///< has_gradient[k]: some vertex up to k can have a derivative
 
-  explicit Path(int max_bounces) : vertex(max_bounces + 3), length(max_bounces + 3), moves(max_bounces + 3) {}
+  explicit Path(int max_bounces) : vertex(max_bounces + 3), length(max_bounces + 3), has_gradient(max_bounces + 3) {}
   void start(const SurfacePoint& origin, double length_so_far) {
     vertex.start(origin);
     length.start(length_so_far);
-    moves.start(0);
+    has_gradient.start(0);
   }
   void push(const PreparedScene& scene, const SurfacePoint& x) {
     push(scene, x, isochron::length(x.p - vertex.back().p));
@@ -48,13 +48,13 @@ struct Path {
   /// `distance`: of x from the last vertex, geometric.
   void push(const PreparedScene& scene, const SurfacePoint& x, double distance) {
     length.push_back(length.back() + distance * scene.index_between(back(), x));
-    moves.push_back(moves.back() || scene.moves(x.triangle));
+    has_gradient.push_back(has_gradient.back() || scene.has_gradient(x.triangle));
     vertex.push_back(x);
   }
   void pop() {
     vertex.pop_back();
     length.pop_back();
-    moves.pop_back();
+    has_gradient.pop_back();
   }
   const SurfacePoint& back() const { return vertex.back(); }
   int size() const { return static_cast<int>(vertex.size()); }
@@ -62,8 +62,8 @@ struct Path {
 
 /// Whether the path x0 ... x(last) of `path`, followed by a point on an emitter's triangle, can have a gradient.
 inline bool path_has_gradient(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
-  return path.moves[last] || scene.has_moving_vertex(emitter_triangle) ||
-         scene.moving.emission[scene.shape_index(emitter_triangle)];
+  return path.has_gradient[last] || scene.has_moving_vertex(emitter_triangle) ||
+         scene.differentiable.emission[scene.shape_index(emitter_triangle)];
 }
 
 /// Directions at a scattering vertex x towards its neighbours `before` (camera side) and `after` (light side).

@@ -154,7 +154,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     g[k + 1].length += g_length;
     if (medium) {
       const int dof = scene.layout.number(medium->material, medium->bsdf->index_number());
-      if (scene.moving.number_moves(scene.layout, dof)) out.scalars.push_back({dof, -1, 0, squared * inverse});
+      if (scene.differentiable.has_number(scene.layout, dof)) out.scalars.push_back({dof, -1, 0, squared * inverse});
     }
     if (length_only || k == 0) continue;
     const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
@@ -175,7 +175,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     for (int k = 1; k + 1 < count; ++k) {
       const int m = scene.shape_of(x[k].triangle).material;
       const Bsdf& bsdf = scene.bsdf_of(x[k].triangle);
-      if (!bsdf.depends_on_directions() && !scene.moving.material[m]) continue;
+      if (!bsdf.depends_on_directions() && !scene.differentiable.material[m]) continue;
       const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
       const BsdfDerivative derivative = bsdf.derivative(s);
       if (derivative.coloured) {
@@ -187,13 +187,13 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
       } else {
         add_bsdf(derivative.by_directions[0], s, g[k - 1], g[k], g[k + 1]);
       }
-      if (!scene.moving.material[m]) continue;
+      if (!scene.differentiable.material[m]) continue;
       for (int i = 0; i < scene.layout.numbers(m); ++i)
-        if (const int dof = scene.layout.number(m, i); scene.moving.number_moves(scene.layout, dof))
+        if (const int dof = scene.layout.number(m, i); scene.differentiable.has_number(scene.layout, dof))
           add_scalar(dof, derivative.by_number[i], out);
     }
     const int s = scene.shape_index(x[count - 1].triangle);
-    if (scene.moving.emission[s])
+    if (scene.differentiable.emission[s])
       for (int c = 0; c < 3; ++c)
         if (const double radiance = scene.scene.shapes[s].emission.radiance[c]; radiance > 0)
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});

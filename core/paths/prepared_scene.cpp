@@ -40,11 +40,11 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   scene.shapes = source.shapes;
   std::vector<char> moved_shapes(scene.shapes.size(), 0);
   const std::vector<char> moved = move_vertices(source.positions, moved_shapes);
-  const bool same_pattern = !first && same_moves(basis);
+  const bool same_pattern = !first && same_columns(basis);
   if (same_pattern) {
-    moving.find_bounds(scene);
+    differentiable.find_bounds(scene);
   } else {
-    moving = MovingParts(scene, basis);
+    differentiable = Differentiable(scene, basis);
     pattern_ = basis ? basis->row_begin : std::vector<int>();
   }
   update_shapes();
@@ -66,13 +66,13 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   }
   update_emitters();
   flows.update(*this, follow);
-  moving_bounds = moving.bounds.grown(caster.offset());
+  moving_bounds = differentiable.bounds.grown(caster.offset());
   flowing_bounds = flows.near().grown(caster.offset());
   if (any_changed)
     for (auto& hierarchy : hierarchies_) hierarchy = std::make_unique<LazyHierarchy>();
 }
 
-bool PreparedScene::same_moves(const TangentBasis* basis) const {
+bool PreparedScene::same_columns(const TangentBasis* basis) const {
   return basis ? basis->row_begin == pattern_ : pattern_.empty();
 }
 
@@ -104,8 +104,8 @@ void PreparedScene::update_record(int t) {
   // A triangle that the parameters have flattened to nothing has a zero normal: no ray or ellipse meets it.
   record.normal = doubled > 0 ? normal / doubled : Vec3();
   record.moving_corners = 0;
-  for (int k = 0; k < 3; ++k) record.moving_corners |= (moving.vertex[v[k]] != 0) << k;
-  record.moves = record.moving_corners || moving.material[shapes_[record.shape].material];
+  for (int k = 0; k < 3; ++k) record.moving_corners |= (differentiable.vertex[v[k]] != 0) << k;
+  record.has_gradient = record.moving_corners || differentiable.material[shapes_[record.shape].material];
 }
 
 void PreparedScene::update_emitters() {
@@ -143,7 +143,7 @@ const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {
     std::vector<EllipsoidBvh::Input> input;
     for (std::size_t i = 0; i < scene.triangles.size(); ++i) {
       const TriangleRecord& record = records_[i];
-      if ((part == Part::moving && !record.moves) || (part == Part::emitting && !record.emits)) continue;
+      if ((part == Part::moving && !record.has_gradient) || (part == Part::emitting && !record.emits)) continue;
       const auto& v = record.vertex;
       input.push_back({{scene.positions[v[0]], scene.positions[v[1]], scene.positions[v[2]]}, static_cast<int>(i)});
     }

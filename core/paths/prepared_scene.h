@@ -13,8 +13,8 @@
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
 #include "core/geometry/ray_caster.h"
+#include "core/paths/differentiable.h"
 #include "core/paths/emitters.h"
-#include "core/paths/moving_parts.h"
 #include "core/paths/records.h"
 #include "core/paths/vertex_flow.h"
 #include "core/scene/scene.h"
@@ -33,7 +33,7 @@ class PreparedScene {
   /// For `source`, which has the topology of the scene at first. The result is the same whatever there was in between.
   void update(const Scene& source, const TangentBasis* basis, const FollowOptions& follow);
   /// Whether the last update had a basis that moved the same.
-  bool same_moves(const TangentBasis* basis) const;
+  bool same_columns(const TangentBasis* basis) const;
   /// Counts updates. changed(t): the last one that moved the triangle, or changed whether it, its vertices or its material
   /// move.
   int revision() const { return revision_; }
@@ -42,7 +42,7 @@ class PreparedScene {
   Scene scene;  ///< a copy
   CameraModel camera;
   DofLayout layout;
-  MovingParts moving;
+  Differentiable differentiable;
   VertexFlows flows;
   RayCaster caster;
   /// Of the triangles with a vertex that moves, and as much more as rays go astray by rounding; and of all vertices but x1
@@ -91,7 +91,7 @@ class PreparedScene {
   double area(int triangle) const { return records_[triangle].area; }
   bool emits(int triangle) const { return records_[triangle].emits; }
   /// Whether a path through the triangle can have a derivative because of it.
-  bool moves(int triangle) const { return records_[triangle].moves; }
+  bool has_gradient(int triangle) const { return records_[triangle].has_gradient; }
   /// Whether one of its vertices moves.
   bool has_moving_vertex(int triangle) const { return records_[triangle].moving_corners != 0; }
   /// f(corner, vertex) for each of the triangle's vertices that move.

@@ -52,10 +52,10 @@ bool is_flat(const PreparedScene& scene, const Edge& edge) {
 /// piece whose dark side is inside.
 bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int>& body_of_vertex) {
   const Scene& scene = prepared.scene;
-  const MovingParts& moving = prepared.moving;
+  const Differentiable& differentiable = prepared.differentiable;
   int body = -1;
   for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
-    if (!moving.triangle[t]) continue;
+    if (!differentiable.triangle[t]) continue;
     const int i = static_cast<int>(t), own = body_of_vertex[scene.triangles[t].vertex[0]];
     if (prepared.two_sided(i) || prepared.transparent(i)) return false;
     if (body < 0) body = own;
@@ -63,7 +63,8 @@ bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int
   }
   bool open = false, flat = true;
   for (const Edge& edge : scene.edges) {
-    const bool moves[2] = {moving.triangle[edge.face[0]] != 0, edge.face[1] >= 0 && moving.triangle[edge.face[1]]};
+    const bool moves[2] = {differentiable.triangle[edge.face[0]] != 0,
+                           edge.face[1] >= 0 && differentiable.triangle[edge.face[1]]};
     if (!moves[0] && !moves[1]) continue;
     if (!moves[0] || !moves[1]) {
       open = true;
@@ -96,26 +97,26 @@ VertexFlows::VertexFlows(const Scene& scene) {
 void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& options) {
   const Scene& scene = prepared.scene;
   const CameraModel& camera = prepared.camera;
-  const MovingParts& moving = prepared.moving;
+  const Differentiable& differentiable = prepared.differentiable;
   position_ = camera.position;
   forward_ = camera.forward;
   radius_ = options.radius_in_pixels * camera.pixel_size();
   camera_possible_ = follows_bodies_ = false;
-  near_ = moving.bounds;
-  if (!moving.geometry) return;
+  near_ = differentiable.bounds;
+  if (!differentiable.geometry) return;
   if (options.radius_in_pixels > 0) {
     // x1 is within s of the box, and its own depth enters s.
     constexpr double kLargest = 0.5;
-    const Vec3 farthest{camera.forward.x > 0 ? moving.bounds.high.x : moving.bounds.low.x,
-                        camera.forward.y > 0 ? moving.bounds.high.y : moving.bounds.low.y,
-                        camera.forward.z > 0 ? moving.bounds.high.z : moving.bounds.low.z};
+    const Vec3 farthest{camera.forward.x > 0 ? differentiable.bounds.high.x : differentiable.bounds.low.x,
+                        camera.forward.y > 0 ? differentiable.bounds.high.y : differentiable.bounds.low.y,
+                        camera.forward.z > 0 ? differentiable.bounds.high.z : differentiable.bounds.low.z};
     const double depth = std::max(0.0, dot(camera.forward, farthest - camera.position));
     const double margin =
         radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
-    camera_near_ = moving.bounds.grown(margin);
+    camera_near_ = differentiable.bounds.grown(margin);
     camera_possible_ = !sees_nothing_of_itself(prepared, body_of_vertex_);
     for (std::size_t t = 0; t < scene.triangles.size() && !camera_possible_; ++t)
-      camera_possible_ = !moving.triangle[t] && bounds_of(scene, scene.triangles[t]).overlaps(camera_near_);
+      camera_possible_ = !differentiable.triangle[t] && bounds_of(scene, scene.triangles[t]).overlaps(camera_near_);
   }
   if (options.bodies > 0) find_near_bodies(prepared, options.bodies);
 }
@@ -127,7 +128,7 @@ void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies)
   std::vector<char> moves(count, 0), near(count);
   for (std::size_t v = 0; v < positions.size(); ++v) {
     bounds[body_of_vertex_[v]].add(positions[v]);
-    moves[body_of_vertex_[v]] |= prepared.moving.vertex[v] != 0;
+    moves[body_of_vertex_[v]] |= prepared.differentiable.vertex[v] != 0;
   }
   body_radius_.resize(count);
   for (std::size_t i = 0; i < count; ++i) body_radius_[i] = bodies * 0.5 * length(bounds[i].high - bounds[i].low);
@@ -139,7 +140,7 @@ void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies)
     }
   if (!(largest > 0)) return;  // no two bodies are close enough
   follows_bodies_ = true;
-  near_ = prepared.moving.bounds.grown(largest);
+  near_ = prepared.differentiable.bounds.grown(largest);
   // Of a pair within `largest` of each other one is in near_.
   for (std::size_t i = 0; i < count; ++i) near[i] = bounds[i].overlaps(near_.grown(largest));
   find_patches(prepared, near);

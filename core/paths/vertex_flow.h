@@ -1,24 +1,11 @@
-// How the vertices of a path flow when the scene moves.
+// The velocities of path vertices when a parameter changes (theory sections 2 and 8).
 //
-// Theory section 2 keeps x1, the point that the camera sees, on its pixel ray (the pixel flow) and lets every other
-// vertex move with its material. Where something that moves comes close to something that does not, both ends of a
-// segment of length r then differ by a velocity that does not fall with r, the geometry term between them changes like
-// 1 / r, and samples have no variance: along lines of contact, in corners that the camera sees, in moving glass. Any
-// tangential velocity t_k may be added to a vertex, if its divergence counts in the interior term and what it carries
-// across boundaries in the visibility term (theory section 8). So vertices follow their neighbours on the path.
-//
-// x_k, k >= 2, follows the material points of neighbours x_j that belong to other bodies (connected meshes):
-//     t_k = P_k sum_j a_j (v_j - v_k),   w_j = (1 - |x_k - x_j|^2 / s^2)^2 within s, else 0,
-// with P_k the projection into the plane of x_k, v material velocities and s the least of the distance from x_k to the
-// creases and borders of its flat patch, so that nothing is carried across those, and `follow` times the radius of the
-// smaller of the two bodies. Where x_j may follow x_k as well, the one on the larger patch comes first and the weight of
-// the other gets the factor (1 - w) of the first: as r falls, at least one weight is 1 and the velocities agree. Two
-// neighbours share x_k by a_1 = w_1 (1 - w_2) / (1 - w_1 w_2) and likewise a_2: as it comes close to either, it follows
-// that one alone. Neighbours that stand still count, too, else x_k would follow one and leave the other.
-//
-// x1 has no crease to mind, for boundaries in the image are all looked for. With w_1 as above, but s some pixels' width at
-// its depth, and w_2 the weight by which x2 follows it:
-//     v_1 = pixel flow + w_1 P_1 ((1 - w_2) v_2 + w_2 v_1 - pixel flow)    with v the material velocities on the right.
+// Plain velocities: x1, the point that the camera sees, stays on its pixel's ray; every other vertex moves with its material.
+// Where something that moves comes close to something that does not, samples then have no variance (section 8). So a vertex
+// x_k also follows the material points of its neighbours on the path, by a tangential velocity
+//     t_k = P_k sum_j a_j (v_j - v_k)        P_k: projection into the plane of x_k, v: material velocities
+// whose divergence counts in the interior term and what it carries across edges in the visibility term. Section 8 has the
+// weights a_j, their gradients, and the rules for x1.
 #pragma once
 #include <vector>
 
@@ -29,7 +16,7 @@
 namespace isochron {
 
 struct LocalDifferential;
-struct MovingParts;
+struct Differentiable;
 struct SurfacePoint;
 class PreparedScene;
 

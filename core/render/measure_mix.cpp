@@ -76,7 +76,7 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
     double sum = 0;
     for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e)
       sum += sign[basis.entries[e].column] * basis.entries[e].coefficient;
-    if (basis.moves(static_cast<int>(row))) one.entries.push_back({0, sum});
+    if (basis.differentiates(static_cast<int>(row))) one.entries.push_back({0, sum});
     one.row_begin.push_back(static_cast<int>(one.entries.size()));
   }
   return one;

@@ -49,10 +49,10 @@ int Passes::partitions_for(SampleRange range, std::size_t values) const {
 }
 
 bool Passes::has(Term term) const {
-  if (!scene.moving.any || scene.emitters.empty()) return false;
+  if (!scene.differentiable.any || scene.emitters.empty()) return false;
   if (term == Term::interior) return true;
-  if (term == Term::visibility) return scene.moving.geometry;
-  return scene.moving.lengths && gates.shape().pair_mass(PairPart::atoms) > 0;
+  if (term == Term::visibility) return scene.differentiable.geometry;
+  return scene.differentiable.lengths && gates.shape().pair_mass(PairPart::dirac) > 0;
 }
 
 void Passes::prepare(Term term) const {
@@ -77,7 +77,7 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
     run_paths(worker, mix.interior, mix.interior_rates, lengths, pass, partition);
   } else if (term == Term::path_length) {
     lengths.pairs = true;
-    lengths.part = PairPart::atoms;
+    lengths.part = PairPart::dirac;
     lengths.coupled = options.antithetic;
     run_paths(worker, 1, mix.path_length_rates, lengths, pass, partition);
   } else {
@@ -87,7 +87,7 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
 }
 
 bool Passes::interior_pairs() const {
-  return mix.interior > 0 && options.antithetic && scene.moving.lengths;
+  return mix.interior > 0 && options.antithetic && scene.differentiable.lengths;
 }
 
 void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths,

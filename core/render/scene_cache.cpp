@@ -12,7 +12,7 @@ std::shared_ptr<ReadyScene> SceneCache::take(const Scene& scene, const TangentBa
     // One for images and one for derivatives is all that users go on asking for.
     constexpr int kKinds = 2;
     auto found =
-        std::find_if(idle_.begin(), idle_.end(), [&](const auto& each) { return each->scene.same_moves(basis); });
+        std::find_if(idle_.begin(), idle_.end(), [&](const auto& each) { return each->scene.same_columns(basis); });
     if (found == idle_.end() && made_ >= kKinds) found = idle_.begin();
     if (found != idle_.end()) {
       ready = std::move(*found);

@@ -79,7 +79,7 @@ struct TangentBasis {
   std::vector<int> row_begin;  ///< size: dofs + 1
   std::vector<Entry> entries;
 
-  bool moves(int dof) const { return row_begin[dof] != row_begin[dof + 1]; }
+  bool differentiates(int dof) const { return row_begin[dof] != row_begin[dof + 1]; }
   /// Transpose product: gradient over dofs -> gradient over columns.
   std::vector<double> transpose_apply(const std::vector<double>& dof_gradient) const;
 };

@@ -67,7 +67,7 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
   wedge_ = wedge;
   camera_possible_ = scene.flows.camera_possible();
   if (std::find(changed.begin(), changed.end(), 1) == changed.end()) return;
-  if (scene.moving.geometry) add_mesh_intersections(scene, wedge);
+  if (scene.differentiable.geometry) add_mesh_intersections(scene, wedge);
   parallel(2, [&](int i) { finish(i == 0 ? primary_ : secondary_); });
 }
 
@@ -90,7 +90,7 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
     if (angle < kCoplanarAngle) return;
   }
   b.azimuths = wedge ? angle : kPi;
-  b.moves = scene.moving.vertex[e.vertex[0]] || scene.moving.vertex[e.vertex[1]];
+  b.moves = scene.differentiable.vertex[e.vertex[0]] || scene.differentiable.vertex[e.vertex[1]];
   moves_[i] = b.moves;
   if (b.moves || scene.flows.camera_possible()) primary_.weights[i] = primary_weight(scene, b, b.azimuths);
   secondary_.weights[i] = edge_length * b.azimuths;
@@ -125,7 +125,7 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
   if (!edge.is_mesh_intersection()) {
     const double share[2] = {1 - point.s, point.s};
     for (int i = 0; i < 2; ++i)
-      if (scene.moving.vertex[edge.vertex[i]]) out.vertices.push_back({edge.vertex[i], n_b * share[i], {}});
+      if (scene.differentiable.vertex[edge.vertex[i]]) out.vertices.push_back({edge.vertex[i], n_b * share[i], {}});
     return;
   }
   // The line stays in both planes: n_b = a n_0 + c n_1 moves by a n_0 . (velocity of face 0) + c n_1 . (velocity of face 1).
@@ -151,13 +151,13 @@ void BoundaryEdges::finish(Choice& choice) const {
   }
 }
 
-BoundaryEdges::Place BoundaryEdges::place(const Choice& choice, double u) const {
+BoundaryEdges::Pick BoundaryEdges::pick(const Choice& choice, double u) const {
   const int i = choice.distribution.sample(u);
   prefetch(edges_[i]);
   return {&edges_[i], u, choice.distribution.below(i), choice.distribution.probability(i)};
 }
 
-BoundaryEdges::Sample::Sample(const Place& place) : Place(place), y(edge->point(s)), tangent(edge->end - edge->origin) {
+BoundaryEdges::Sample::Sample(const Pick& picked) : Pick(picked), y(edge->point(s)), tangent(edge->end - edge->origin) {
   const double inverse = 1 / length(tangent);
   tangent *= inverse;
   pdf = share * inverse;

@@ -39,31 +39,31 @@ class BoundaryEdges {
   void update(const PreparedScene& scene, bool wedge);
 
   /// Which edge, and where on it. The edge itself is prefetched.
-  struct Place {
+  struct Pick {
     const BoundaryEdge* edge = nullptr;
     double s = 0;                 ///< fraction along the edge
     double begin = 0, share = 0;  ///< the edge takes the numbers from `begin` to `begin` + `share`
     /// The number that gives this point.
     double x() const { return begin + s * share; }
   };
-  struct Sample : Place {
+  struct Sample : Pick {
     Vec3 y;
     Vec3 tangent;    ///< unit, from the edge's origin to its end
     double pdf = 0;  ///< per length
     Sample() = default;
-    explicit Sample(const Place& place);
+    explicit Sample(const Pick& picked);
   };
   /// Edges and intersections of meshes that the camera may see moving, by their length in the image and, inside of an
   /// outline, the angle between their faces; the same of static ones where points beside them may follow others, in equal
   /// shares. `u` in (0, 1).
   bool has_primary() const { return !primary_.distribution.empty(); }
-  Sample sample_primary(double u) const { return Sample(place(primary_, u)); }
+  Sample sample_primary(double u) const { return Sample(pick(primary_, u)); }
   /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
   /// where what lies behind or before them moves) get equal shares.
   bool has_secondary() const { return !secondary_.distribution.empty(); }
-  Sample sample_secondary(double u) const { return Sample(place_secondary(u)); }
+  Sample sample_secondary(double u) const { return Sample(pick_secondary(u)); }
   /// The same in two steps, for callers with other work to do while the edge is read from memory.
-  Place place_secondary(double u) const { return place(secondary_, u); }
+  Pick pick_secondary(double u) const { return pick(secondary_, u); }
 
   /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
   /// both (no boundary) or the plane holds a face.
@@ -83,7 +83,7 @@ class BoundaryEdges {
   void update_edge(const PreparedScene& scene, std::size_t i, bool wedge);
   void add_mesh_intersections(const PreparedScene& scene, bool wedge);
   void finish(Choice& choice) const;
-  Place place(const Choice& choice, double u) const;
+  Pick pick(const Choice& choice, double u) const;
 
   LargeArray<BoundaryEdge> edges_;   ///< those of the scene, then intersections of meshes
   std::vector<std::uint8_t> moves_;  ///< of each

@@ -91,22 +91,22 @@ void SecondaryBoundary::sample_from_edge(double scale, Rng& rng) {
 
 void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
   // Each edge is drawn, and so prefetched, before the ray is traced to the vertex that needs it.
-  BoundaryEdges::Place place = place_from_camera(pixel, 1, rng);
+  BoundaryEdges::Pick pick = pick_from_camera(pixel, 1, rng);
   if (!worker_.start_camera_path(pixel, rng)) return;
   Path& path = worker_.path;
   camera_densities_ = {};
   Rgb throughput(1.0);
   double tau = 0;
   if (at_length_) {
-    const double pick = rng.uniform(), u = rng.uniform();
-    tau = worker_.pick.sample_length(pixel, pick, u).value_or(0);
+    const double gate_pick = rng.uniform(), u = rng.uniform();
+    tau = worker_.pick.sample_length(pixel, gate_pick, u).value_or(0);
   }
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
     if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
-    connect_edge(pixel, throughput * scale, place, rng);
+    connect_edge(pixel, throughput * scale, pick, rng);
     if (at_length_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
-    place = place_from_camera(pixel, bounce + 1, rng);
+    pick = pick_from_camera(pixel, bounce + 1, rng);
     if (!append_vertex(worker_, path, throughput, rng)) return;
     const SurfacePoint &before = path.vertex[bounce - 1], &x = path.vertex[bounce];
     camera_densities_.towards_light *= towards(before, x, path.back());
@@ -238,15 +238,15 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
   }
 }
 
-BoundaryEdges::Place SecondaryBoundary::place_from_camera(int pixel, int bounces, Rng& rng) const {
-  return edges_.place_secondary(camera_warp(pixel, bounces).sample(rng.uniform()));
+BoundaryEdges::Pick SecondaryBoundary::pick_from_camera(int pixel, int bounces, Rng& rng) const {
+  return edges_.pick_secondary(camera_warp(pixel, bounces).sample(rng.uniform()));
 }
 
-void SecondaryBoundary::connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Place& place, Rng& rng) {
+void SecondaryBoundary::connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Pick& pick, Rng& rng) {
   Segment g;
-  g.y = BoundaryEdges::Sample(place);
+  g.y = BoundaryEdges::Sample(pick);
   if (join_camera_path(g, pixel, throughput)) finish(g, Found::from_camera, rng);
-  worker_.sink.note_guide(camera_table(pixel, worker_.path.size() - 1), place.x());
+  worker_.sink.note_guide(camera_table(pixel, worker_.path.size() - 1), pick.x());
 }
 
 void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng) {

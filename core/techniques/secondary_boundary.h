@@ -106,10 +106,10 @@ class SecondaryBoundary {
   void walk_to_camera(const Segment& g, double scale, Rng& rng);
 
   /// Of an edge point for D at vertex `bounces` of a path through the pixel.
-  BoundaryEdges::Place place_from_camera(int pixel, int bounces, Rng& rng) const;
+  BoundaryEdges::Pick pick_from_camera(int pixel, int bounces, Rng& rng) const;
 
   /// D is the last vertex of the worker's path: tries the edge point.
-  void connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Place& place, Rng& rng);
+  void connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Pick& pick, Rng& rng);
 
   /// As `connect_edge`, for light straight from an emitter on paths of length tau.
   void connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng);

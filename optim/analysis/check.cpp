@@ -174,7 +174,7 @@ Experiment check_experiment(Experiment experiment, std::vector<std::string>& not
     throw InputError(fmt::format("samples: {} is too few for a standard error (allowed: at least 2)", samples));
   const bool motion = std::any_of(experiment.parameters.begin(), experiment.parameters.end(),
                                   [](const ParameterSpec& p) { return moves_geometry(p.type); });
-  const bool jumps = make_gates(experiment.gates).shape().pair_mass(PairPart::atoms) > 0;
+  const bool jumps = make_gates(experiment.gates).shape().pair_mass(PairPart::dirac) > 0;
   const auto set = [&](int& term, const char* name, bool needed) {
     if (term == 0 && needed)
       notes.push_back(fmt::format("the experiment leaves out the {} term; checked with {} samples", name, samples));

@@ -5,7 +5,6 @@
 #include "core/base/error.h"
 #include "optim/experiment/choices.h"
 #include "optim/experiment/description.h"
-#include "optim/experiment/key_hints.h"
 
 namespace isochron {
 
@@ -58,7 +57,7 @@ Experiment load_experiment(const std::string& file, const std::vector<std::strin
   experiment.file = std::filesystem::absolute(file).string();
   experiment.target.max_bounces = -1;
   ExperimentFolder folder{std::filesystem::absolute(file).parent_path()};
-  read_keys_with_hints(root, [&](Keys& keys) { describe(keys, experiment, folder); });
+  read_keys(root, [&](Keys& keys) { describe(keys, experiment, folder); });
   if (experiment.target.max_bounces < 0) experiment.target.max_bounces = experiment.estimator.max_bounces;
   experiment.number_files = folder.number_files;
   return experiment;

@@ -83,9 +83,8 @@ inline GateSet narrow_gates() {
   return {GateShape::gaussian(0.03), {6}};
 }
 
-/// The block's (or ball's) translation along x: one column.
-inline TangentBasis translation(const Scene& scene) {
-  const Shape& block = scene.shapes.back();
+/// A shape's translation along x: one column.
+inline TangentBasis translation(const Scene& scene, const Shape& block) {
   TangentBasis basis;
   basis.columns = 1;
   basis.row_begin.push_back(0);
@@ -96,6 +95,10 @@ inline TangentBasis translation(const Scene& scene) {
     basis.row_begin.push_back(static_cast<int>(basis.entries.size()));
   }
   return basis;
+}
+/// That of the block (or ball).
+inline TangentBasis translation(const Scene& scene) {
+  return translation(scene, scene.shapes.back());
 }
 
 /// Every coordinate of every vertex of the block (or ball): a column each.

@@ -42,13 +42,13 @@ TEST(SamplePair, IntegratesTheDerivativeMeasure) {
   for (const auto& [name, gate] : finite_gates()) {
     for (const TestFunction& t : kFunctions) {
       const double expected = -integrate(gate, [&](double x) { return t.slope(x) * gate.value(x); });
-      const double got = pair_term(gate, PairPart::smooth, t) + pair_term(gate, PairPart::atoms, t);
+      const double got = pair_term(gate, PairPart::smooth, t) + pair_term(gate, PairPart::dirac, t);
       EXPECT_NEAR(got, expected, 2e-5) << name << ", h = " << t.name;
     }
   }
 }
 
-// The continuous part is W', the atoms are what is left: what standard sampling takes by the gate's slope, and what
+// The continuous part is W', the Dirac parts are what is left: what standard sampling takes by the gate's slope, and what
 // ellipsoidal sampling takes in pairs, are the same term.
 TEST(SamplePair, PartsAreTheSlopeAndTheJumps) {
   for (const auto& [name, gate] : finite_gates()) {
@@ -56,9 +56,9 @@ TEST(SamplePair, PartsAreTheSlopeAndTheJumps) {
       const double expected = -integrate(gate, [&](double x) { return t.slope(x) * gate.value(x); });
       const double smooth = integrate(gate, [&](double x) { return t.h(x) * gate.derivative(x); });
       // The narrow gate's two halves are 1e3 times larger than their sum, hence the scale.
-      const double scale = 1 + gate.pair_mass(PairPart::smooth) + gate.pair_mass(PairPart::atoms);
+      const double scale = 1 + gate.pair_mass(PairPart::smooth) + gate.pair_mass(PairPart::dirac);
       EXPECT_NEAR(pair_term(gate, PairPart::smooth, t), smooth, 2e-5 * scale) << name << ", h = " << t.name;
-      EXPECT_NEAR(smooth + pair_term(gate, PairPart::atoms, t), expected, 2e-5 * scale) << name << ", h = " << t.name;
+      EXPECT_NEAR(smooth + pair_term(gate, PairPart::dirac, t), expected, 2e-5 * scale) << name << ", h = " << t.name;
     }
   }
 }
@@ -67,13 +67,13 @@ TEST(SamplePair, PartsAreTheSlopeAndTheJumps) {
 // W rises or falls.
 TEST(SamplePair, SidesAreTheJordanParts) {
   for (const auto& [name, gate] : finite_gates()) {
-    for (const PairPart part : {PairPart::smooth, PairPart::atoms}) {
+    for (const PairPart part : {PairPart::smooth, PairPart::dirac}) {
       if (gate.pair_mass(part) == 0) continue;
       for (int i = 0; i < 1000; ++i) {
         const CoupledPair p = gate.sample_pair(part, (i + 0.5) / 1000);
         EXPECT_TRUE(p.has_plus || p.has_minus);
-        EXPECT_EQ(p.has_plus, p.plus_is_jump == (part == PairPart::atoms));
-        EXPECT_EQ(p.has_minus, p.minus_is_jump == (part == PairPart::atoms));
+        EXPECT_EQ(p.has_plus, p.plus_is_jump == (part == PairPart::dirac));
+        EXPECT_EQ(p.has_minus, p.minus_is_jump == (part == PairPart::dirac));
         if (!p.plus_is_jump) {
           EXPECT_GT(gate.derivative(p.plus), 0) << name << ' ' << p.plus;
         }
@@ -94,12 +94,12 @@ TEST(SamplePair, SidesAreTheJordanParts) {
 
 TEST(SamplePair, MassesInClosedForm) {
   const auto masses = [](const GateShape& gate) {
-    return std::array<double, 2>{gate.pair_mass(PairPart::smooth), gate.pair_mass(PairPart::atoms)};
+    return std::array<double, 2>{gate.pair_mass(PairPart::smooth), gate.pair_mass(PairPart::dirac)};
   };
-  const auto expect = [&](const GateShape& gate, double smooth, double atoms) {
+  const auto expect = [&](const GateShape& gate, double smooth, double dirac) {
     const auto m = masses(gate);
     EXPECT_NEAR(m[0], smooth, 1e-14);
-    EXPECT_NEAR(m[1], atoms, 1e-14);
+    EXPECT_NEAR(m[1], dirac, 1e-14);
   };
   const double peak = 1 / (0.3 * std::sqrt(kTwoPi)), edge = peak * std::exp(-0.5);
   expect(GateShape::steady(), 0, 0);
@@ -109,7 +109,7 @@ TEST(SamplePair, MassesInClosedForm) {
   expect(GateShape::truncated_gaussian(0.3, 3), peak, 0);
   expect(GateShape::tabulated({-0.5, 0, 0.5}, {0, 1, 0}), 2, 0);
   expect(GateShape::tabulated({-0.5, 0.1, 0.5}, {3, 3, 3}), 0, 1);
-  expect(GateShape::tabulated({0, 0, 1}, {0, 1, 0}), 2, 2);  // an atom against a slope
+  expect(GateShape::tabulated({0, 0, 1}, {0, 1, 0}), 2, 2);  // a jump against a slope
   // What has no continuous part must not ask for a pass over it, however the rounding falls.
   EXPECT_EQ(
       GateShape::tabulated({0, 0.3, 0.3, 0.9, 0.9, 1}, {0.1, 0.1, 0.7, 0.7, 0.2, 0.2}).pair_mass(PairPart::smooth), 0);
@@ -123,10 +123,10 @@ TEST(SamplePair, OrientationAndCoupling) {
     EXPECT_EQ(p.minus, -p.plus);
     EXPECT_NEAR(-std::expm1(-0.5 * p.minus * p.minus / 0.09), u, 1e-14);  // Rayleigh
   }
-  const CoupledPair box = GateShape::boxcar(0.8).sample_pair(PairPart::atoms, 0.7);
+  const CoupledPair box = GateShape::boxcar(0.8).sample_pair(PairPart::dirac, 0.7);
   EXPECT_EQ(box.plus, -0.4);
   EXPECT_EQ(box.minus, 0.4);
-  const CoupledPair saw = GateShape::tabulated({0, 0, 1}, {0, 1, 0}).sample_pair(PairPart::atoms, 0.7);
+  const CoupledPair saw = GateShape::tabulated({0, 0, 1}, {0, 1, 0}).sample_pair(PairPart::dirac, 0.7);
   EXPECT_TRUE(saw.has_plus && saw.plus_is_jump);
   EXPECT_FALSE(saw.has_minus);
   const CoupledPair slope = GateShape::tabulated({0, 0, 1}, {0, 1, 0}).sample_pair(PairPart::smooth, 0.7);
@@ -142,7 +142,7 @@ TEST(SamplePair, OrientationAndCoupling) {
 
 TEST(SamplePair, StaysInsideTheSupport) {
   for (const auto& [name, gate] : finite_gates()) {
-    for (const PairPart part : {PairPart::smooth, PairPart::atoms}) {
+    for (const PairPart part : {PairPart::smooth, PairPart::dirac}) {
       if (gate.pair_mass(part) == 0) continue;
       for (const double u : {0x1p-53, 0.5, 1 - 0x1p-53}) {
         const CoupledPair p = gate.sample_pair(part, u);

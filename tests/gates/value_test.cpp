@@ -159,7 +159,7 @@ TEST(GateShape, ScalesExactly) {
         EXPECT_NEAR(big.value(s * x) * s, one.value(x), 1e-12 * one.value(0.1));
         EXPECT_NEAR(big.derivative(s * x) * s * s, one.derivative(x), 1e-12 * one.value(0.1));
       }
-      for (const PairPart part : {PairPart::smooth, PairPart::atoms}) {
+      for (const PairPart part : {PairPart::smooth, PairPart::dirac}) {
         EXPECT_NEAR(big.pair_mass(part) * s, one.pair_mass(part), 1e-13);
         if (one.pair_mass(part) > 0) {
           EXPECT_NEAR(big.sample_pair(part, 0.3).plus / s, one.sample_pair(part, 0.3).plus, 1e-13);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
+
 #include <filesystem>
 
 #include "core/base/error.h"
@@ -15,6 +17,21 @@ struct Case {
   std::string from, to;
   std::string message;  ///< after the file's name
 };
+
+/// The tiny experiment with each of the changes is refused with its message, of which the beginning is given.
+void expect_messages(const TemporaryFolder& folder, std::span<const Case> cases) {
+  for (const Case& c : cases) {
+    const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
+    try {
+      load_experiment(file);
+      ADD_FAILURE() << "accepted: " << c.to;
+    } catch (const InputError& error) {
+      const std::string what = error.what();
+      EXPECT_EQ(what.substr(0, file.size() + 1 + c.message.size()), file + ":" + c.message);
+      EXPECT_EQ(what.find('\n'), std::string::npos);
+    }
+  }
+}
 
 TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
   const TemporaryFolder folder;
@@ -121,17 +138,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"seed: 3", "estimator: {sampling: best}", "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
       {"seed: 3", "estimator: {antithetic: 1}", "11:25: estimator.antithetic: '1' is neither (true or false)"},
   };
-  for (const Case& c : cases) {
-    const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
-    try {
-      load_experiment(file);
-      ADD_FAILURE() << "accepted: " << c.to;
-    } catch (const InputError& error) {
-      const std::string what = error.what();
-      EXPECT_EQ(what.substr(0, file.size() + 1 + c.message.size()), file + ":" + c.message);
-      EXPECT_EQ(what.find('\n'), std::string::npos);
-    }
-  }
+  expect_messages(folder, cases);
   const auto table_error = [&](const std::string& table) -> std::string {
     const std::string file = folder.write(
         "tiny.yaml", replaced(tiny_experiment(), gates, "{kind: tabulated, centers: [5], file: " + table + "}"));
@@ -153,33 +160,21 @@ TEST(Experiment, MessagesAboutMapsNameTheirKeys) {
   const std::string gates = "gates: {kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}\n";
   const Case cases[] = {
       {"iterations: 6", "stop: 5", "10:54: optimizer.stop: is not a map (keys and values; its keys: window)"},
-      {"iterations: 6", "stop: {}", "10:54: optimizer.stop.window: is missing (keys here: window)"},
-      {"iterations: 6", "decay: {start: 5}",
-       "10:55: optimizer.decay.half_life: is missing (keys here: half_life, start)"},
+      {"iterations: 6", "stop: {}", "10:54: optimizer.stop.window: is missing"},
+      {"iterations: 6", "decay: {start: 5}", "10:55: optimizer.decay.half_life: is missing"},
       {"seed: 7}", "noise: 100}", "8:30: target.noise: is not a map (keys and values; its keys: photons)"},
-      {"seed: 7}", "noise: {}}", "8:30: target.noise.photons: is missing (keys here: photons)"},
+      {"seed: 7}", "noise: {}}", "8:30: target.noise.photons: is missing"},
       {"type: translation, shape: block, direction: [0, 1, 0]",
        "type: vertices, shape: block, direction: normal, smoothing: 3",
        "6:80: parameters[0].smoothing: is not a map (keys and values; its keys: diffusion, slopes)"},
-      {"shape: block, ", "",
-       "6:5: parameters[0].shape: is missing (keys here: name, type, shape, selection, direction, "
-       "initial, target, lower, upper, scale)"},
       {"seed: 3", "loss: huber", "11:7: loss: is not a map (keys and values; its keys: kind, scale)"},
-      {"seed: 3", "loss: {scale: 1}", "11:7: loss.kind: is missing (keys here: kind, scale)"},
+      {"seed: 3", "loss: {scale: 1}", "11:7: loss.kind: is missing"},
       {"  - {name: power, type: emission, shape: lamp, initial: 8, target: 10}", "  - power",
        "7:5: parameters[1]: is not a map (keys and values; its keys: name, type, shape, material, "},
       {gates, "", "1:1: gates: is missing (a map with the keys kind, centers, unit, scene_unit_m"},
       {"name: tiny\n", "", "1:1: name: is missing"},
   };
-  for (const Case& c : cases) {
-    const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
-    try {
-      load_experiment(file);
-      ADD_FAILURE() << "accepted: " << c.to;
-    } catch (const InputError& error) {
-      EXPECT_EQ(std::string(error.what()).substr(0, file.size() + 1 + c.message.size()), file + ":" + c.message);
-    }
-  }
+  expect_messages(folder, cases);
 }
 
 TEST(Experiment, ASceneIsNotAnExperiment) {

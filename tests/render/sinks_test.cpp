@@ -126,7 +126,7 @@ TangentBasis single_column(const TangentBasis& whole, int column) {
     double coefficient = 0;
     for (int e = whole.row_begin[row]; e < whole.row_begin[row + 1]; ++e)
       if (whole.entries[e].column == column) coefficient = whole.entries[e].coefficient;
-    if (whole.moves(static_cast<int>(row))) one.entries.push_back({0, coefficient});
+    if (whole.differentiates(static_cast<int>(row))) one.entries.push_back({0, coefficient});
     one.row_begin.push_back(static_cast<int>(one.entries.size()));
   }
   return one;

@@ -49,7 +49,6 @@ class Diffuse final : public Bsdf {
 }  // namespace
 
 extern const MaterialKind kDiffuse;
-const MaterialKind kDiffuse{"diffuse", "the same in all directions",
-                            []() -> std::unique_ptr<Bsdf> { return std::make_unique<Diffuse>(); }};
+const MaterialKind kDiffuse{"diffuse", "the same in all directions", make_bsdf<Diffuse>};
 
 }  // namespace isochron

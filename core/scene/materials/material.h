@@ -17,6 +17,10 @@ struct MaterialKind {
   std::unique_ptr<Bsdf> (*make)();
 };
 std::span<const MaterialKind* const> material_kinds();
+template <class T>
+std::unique_ptr<Bsdf> make_bsdf() {
+  return std::make_unique<T>();
+}
 /// The names of all that can be differentiated in any of them, each with the names of the kinds that have it.
 std::vector<std::pair<std::string, std::vector<std::string>>> material_quantities();
 

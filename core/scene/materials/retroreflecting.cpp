@@ -103,6 +103,6 @@ class Retroreflecting final : public Bsdf {
 
 extern const MaterialKind kRetroreflecting;
 const MaterialKind kRetroreflecting{"retroreflecting", "back the way the light came, and diffusely",
-                                    []() -> std::unique_ptr<Bsdf> { return std::make_unique<Retroreflecting>(); }};
+                                    make_bsdf<Retroreflecting>};
 
 }  // namespace isochron

@@ -63,7 +63,6 @@ class RoughConductor final : public Bsdf {
 }  // namespace
 
 extern const MaterialKind kRoughConductor;
-const MaterialKind kRoughConductor{"rough_conductor", "mirrors of the GGX law",
-                                   []() -> std::unique_ptr<Bsdf> { return std::make_unique<RoughConductor>(); }};
+const MaterialKind kRoughConductor{"rough_conductor", "mirrors of the GGX law", make_bsdf<RoughConductor>};
 
 }  // namespace isochron

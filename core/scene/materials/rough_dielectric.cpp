@@ -215,6 +215,6 @@ std::optional<DirectionSample> RoughDielectric::sample(const Vec3& n, const Vec3
 
 extern const MaterialKind kRoughDielectric;
 const MaterialKind kRoughDielectric{"rough_dielectric", "a solid behind a closed mesh; GGX",
-                                    []() -> std::unique_ptr<Bsdf> { return std::make_unique<RoughDielectric>(); }};
+                                    make_bsdf<RoughDielectric>};
 
 }  // namespace isochron

@@ -12,6 +12,7 @@
 
 #include "core/base/cpu_time.h"
 #include "core/base/parallel.h"
+#include "tests/benchmark/measure/arguments.h"
 #include "tests/render/scene_building.h"
 #include "tests/render/support.h"
 
@@ -158,16 +159,9 @@ Scene ball_scene() {
 int main(int argc, char** argv) {
   using namespace isochron;
   using namespace isochron::benchmarks;
-  if (argc < 2 || argc > 3 || argv[1][0] == '-') {
-    std::fprintf(stderr, "usage: isochron_boundary CSV [BATCHES]\n");
-    return 2;
-  }
-  const int batches = argc == 3 ? std::max(2, std::atoi(argv[2])) : 64;
-  std::FILE* csv = std::fopen(argv[1], "w");
-  if (!csv) {
-    std::fprintf(stderr, "isochron_boundary: cannot write %s\n", argv[1]);
-    return 1;
-  }
+  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_boundary CSV [BATCHES]", 64, 2);
+  std::FILE* const csv = arguments.csv.get();
+  const int batches = arguments.number;
   std::fprintf(csv, "scene,techniques,mean,variance_seconds_of_mean,variance_seconds_of_pixels,learning_share\n");
   set_thread_count(1);
   const Scene cube = load_scene(PROJECT_ROOT "/scenes/cube/scene.yaml");
@@ -179,6 +173,5 @@ int main(int argc, char** argv) {
   measure({"sensor", sensor(), "occluder", gauss(0.0114, 5.7), 1, Sampling::ellipsoidal, 4000}, batches, csv);
   measure({"ball wide", ball_scene(), "ball", gauss(0.3, 8), 2, Sampling::standard, 16}, batches, csv);
   measure({"ball narrow", ball_scene(), "ball", gauss(0.016, 8), 2, Sampling::ellipsoidal, 16}, batches, csv);
-  std::fclose(csv);
   return 0;
 }

@@ -18,6 +18,7 @@
 #include "core/base/parallel.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/heavy_tail.h"
+#include "tests/benchmark/measure/arguments.h"
 #include "tests/render/contact_scenes.h"
 #include "tests/render/pixel_statistics.h"
 
@@ -174,16 +175,9 @@ void flagged(Table& table, const contact::ContactCase& c) {
 int main(int argc, char** argv) {
   using namespace isochron;
   using namespace isochron::benchmarks;
-  if (argc < 2 || argc > 3 || argv[1][0] == '-') {
-    std::fprintf(stderr, "usage: isochron_contact CSV [FACTOR]\n");
-    return 2;
-  }
-  const int factor = argc == 3 ? std::max(1, std::atoi(argv[2])) : 4;
-  std::FILE* csv = std::fopen(argv[1], "w");
-  if (!csv) {
-    std::fprintf(stderr, "isochron_contact: cannot write %s\n", argv[1]);
-    return 1;
-  }
+  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_contact CSV [FACTOR]", 4, 1);
+  std::FILE* const csv = arguments.csv.get();
+  const int factor = arguments.number;
   Table table(csv);
   set_thread_count(1);
   for (const Box& box : kBoxes)
@@ -199,6 +193,5 @@ int main(int argc, char** argv) {
     compare_case(table, c, factor);
     flagged(table, c);
   }
-  std::fclose(csv);
   return 0;
 }

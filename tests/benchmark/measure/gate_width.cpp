@@ -12,6 +12,7 @@
 #include "core/base/cpu_time.h"
 #include "core/base/parallel.h"
 #include "core/render/measure_mix.h"
+#include "tests/benchmark/measure/arguments.h"
 #include "tests/render/support.h"
 #include "tests/render/width_growth.h"
 
@@ -126,18 +127,12 @@ void measure_growth(int batches, std::FILE* csv) {
 int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
   const std::string what = argc > 1 ? argv[1] : "";
-  if (argc < 3 || argc > 4 || (what != "cost" && what != "growth")) {
-    std::fprintf(stderr, "usage: isochron_gate_width cost|growth CSV [BATCHES]\n");
-    return 2;
-  }
-  const int batches = argc == 4 ? std::max(2, std::atoi(argv[3])) : 64;
-  std::FILE* csv = std::fopen(argv[2], "w");
-  if (!csv) {
-    std::fprintf(stderr, "isochron_gate_width: cannot write %s\n", argv[2]);
-    return 1;
-  }
+  const bool known = what == "cost" || what == "growth";
+  const Arguments arguments =
+      read_arguments(known ? argc : 0, argv, 2, "isochron_gate_width cost|growth CSV [BATCHES]", 64, 2);
+  std::FILE* const csv = arguments.csv.get();
+  const int batches = arguments.number;
   isochron::set_thread_count(1);
   what == "cost" ? measure_cost(batches, csv) : measure_growth(batches, csv);
-  std::fclose(csv);
   return 0;
 }

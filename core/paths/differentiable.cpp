@@ -1,8 +1,8 @@
-#include "core/paths/moving_parts.h"
+#include "core/paths/differentiable.h"
 
 namespace isochron {
 
-MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
+Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
     : vertex(scene.positions.size(), 0),
       triangle(scene.triangles.size(), 0),
       material(scene.materials.size(), 0),
@@ -12,17 +12,17 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
   number.assign(layout.first_number.back() - first_number, 0);
   if (!basis || basis->columns == 0) return;
   for (int v = 0; v < layout.vertices; ++v)
-    for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->moves(layout.vertex(v, axis));
+    for (int axis = 0; axis < 3; ++axis) vertex[v] |= basis->differentiates(layout.vertex(v, axis));
   for (int m = 0; m < layout.materials(); ++m) {
     for (int k = 0; k < layout.numbers(m); ++k) {
       const int dof = layout.number(m, k);
-      material[m] |= number[dof - first_number] = basis->moves(dof);
+      material[m] |= number[dof - first_number] = basis->differentiates(dof);
     }
     const int index = scene.materials[m].bsdf().index_number();
-    lengths |= index >= 0 && basis->moves(layout.number(m, index));
+    lengths |= index >= 0 && basis->differentiates(layout.number(m, index));
   }
   for (int s = 0; s < layout.shapes; ++s)
-    for (int c = 0; c < 3; ++c) emission[s] |= basis->moves(layout.emission(s, c));
+    for (int c = 0; c < 3; ++c) emission[s] |= basis->differentiates(layout.emission(s, c));
   for (std::size_t t = 0; t < triangle.size(); ++t) {
     for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
     geometry |= triangle[t] != 0;
@@ -32,7 +32,7 @@ MovingParts::MovingParts(const Scene& scene, const TangentBasis* basis)
   find_bounds(scene);
 }
 
-void MovingParts::find_bounds(const Scene& scene) {
+void Differentiable::find_bounds(const Scene& scene) {
   bounds = {};
   for (std::size_t t = 0; t < triangle.size(); ++t)
     if (triangle[t])

@@ -9,7 +9,7 @@
 namespace isochron {
 
 /// Which degrees of freedom move. Everything else is skipped by the derivative passes.
-struct MovingParts {
+struct Differentiable {
   std::vector<std::uint8_t> vertex, triangle;
   std::vector<std::uint8_t> material;  ///< any of its numbers
   std::vector<std::uint8_t> number;    ///< as DofLayout counts them, from the first material's first on
@@ -17,12 +17,12 @@ struct MovingParts {
   bool any = false, geometry = false;
   Bounds bounds;         ///< of the triangles with a vertex that moves
   bool lengths = false;  ///< paths can change their length
-  MovingParts() = default;
-  MovingParts(const Scene& scene, const TangentBasis* basis);
+  Differentiable() = default;
+  Differentiable(const Scene& scene, const TangentBasis* basis);
   /// Sets `bounds`; to be called again when vertices have moved.
   void find_bounds(const Scene& scene);
   /// Of a degree of freedom that is a material's.
-  bool number_moves(const DofLayout& layout, int dof) const { return number[dof - layout.first_number[0]] != 0; }
+  bool has_number(const DofLayout& layout, int dof) const { return number[dof - layout.first_number[0]] != 0; }
 };
 
 }  // namespace isochron
