@@ -26,7 +26,7 @@ struct CheckCommand {
   std::string parameter;  ///< empty: all
 };
 
-/// Components of one parameter that are looked at; more of them are thinned out evenly.
+/// Most components of one parameter that are checked, evenly spaced.
 constexpr int kMostComponents = 32;
 
 std::vector<int> components_to_check(const Parameters& parameters, const Parameters::Block& chosen) {

@@ -89,7 +89,7 @@ std::string ProgressDisplay::line(bool bar) const {
   std::string text = run_;
   if (text.empty()) {
     text = fmt::format("{}: {:.0f} %", work->name, 100 * work->fraction);
-    // Until a fiftieth is done nobody knows.
+    // No estimate before a fiftieth is done.
     if (work->fraction > 0.02)
       text += fmt::format(", {} left", duration(work->seconds * (1 - work->fraction) / work->fraction));
   }

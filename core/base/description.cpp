@@ -213,7 +213,7 @@ class Reader final : public Keys {
     if (!value.is_map()) value.fail("is not a map", "keys and values; its keys: " + names_of(describe));
     read_keys(value, describe);
   }
-  /// `inner`: what describes the map that is looked for.
+  /// `inner`: what describes the map of this name.
   std::optional<YamlValue> find(const std::string& name, const KeyOptions& options, const Describe* inner = nullptr) {
     const Only& only = options.only;
     if (!only.here) {

@@ -15,8 +15,9 @@ class DiscreteDistribution {
     below_.reserve(weights.size() + 1);
     for (double w : weights) below_.push_back(below_.back() + w);
     first_.reserve(weights.size());
+    const double each = total() / size();
     for (int part = 0, i = 0; part < size(); ++part) {
-      const double begin = total() * part / size();
+      const double begin = each * part;
       while (i + 1 < size() && below_[i + 1] <= begin) ++i;
       first_.push_back(i);
     }
@@ -49,7 +50,7 @@ class DiscreteDistribution {
 
   int guess(double u) const { return std::min(static_cast<int>(u * size()), size() - 1); }
 
-  /// The index whose share holds `target`, looked for in steps that double away from `near`.
+  /// The index whose share holds `target`; the search starts at `near` in steps that double.
   int search(double target, int near) const {
     int low = near, high = near;  // below_[low] <= target < below_[high], or `high` is the end
     for (int step = 1; low > 0 && target < below_[low]; step *= 2) {

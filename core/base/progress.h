@@ -1,4 +1,4 @@
-// How far long work has come, for whoever shows it, and how it is stopped. Both belong to the whole process, as its threads
+// How far long work has come, for display, and how it is stopped. Both belong to the whole process, as its threads
 // do: work is announced in stages by the thread that controls it, the parallel loops within count by themselves.
 #pragma once
 #include <atomic>

@@ -50,7 +50,7 @@ class GateShape {
   /// Support [lower, upper] beyond which the value is zero (gaussian: below double rounding of its peak).
   double lower() const { return lower_; }
   double upper() const { return upper_; }
-  /// Standard deviation of the gate seen as a density (the width that `auto` sampling looks at); steady:
+  /// Standard deviation of the gate as a density (the width that `auto` sampling goes by); steady:
   /// infinity.
   double width() const { return width_; }
   /// Integral over the real line: 1, less what truncation took away. Steady: 1 by convention.

@@ -77,7 +77,7 @@ struct SampleRange {
   int count() const { return end - begin; }
 };
 
-/// Work of so many rays, and triangles looked at for arcs, in rays: an arc takes 1.3 times as long, measured on the cube
+/// Work of so many rays, and triangles tested for arcs, in rays: an arc takes 1.3 times as long, measured on the cube
 /// and the box.
 inline double work(long long rays, long long arcs) {
   return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs);

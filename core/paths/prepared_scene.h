@@ -45,7 +45,7 @@ class PreparedScene {
   Differentiable differentiable;
   VertexFlows flows;
   RayCaster caster;
-  /// Of the triangles with a vertex that moves, and as much more as rays go astray by rounding; and of all vertices but x1
+  /// Of the triangles with a vertex that moves, grown by the rounding error of rays; and of all vertices but x1
   /// that may follow or be followed.
   Bounds moving_bounds, flowing_bounds;
   Emitters emitters;

@@ -26,7 +26,7 @@ constexpr double kPaths = 300000;  ///< of standard sampling, about, and of as m
 constexpr double kTrialPart = 0.1;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
-/// Trials of fewer paths than this must contradict the width of the gates by this factor to be believed.
+/// Trials of fewer paths than this overrule the width of the gates only where they differ by this factor.
 constexpr double kSureOfPaths = 100000, kSure = 1.5;
 /// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
 /// can lose where it is not the best is more than what it can win.
@@ -93,7 +93,7 @@ GatedImage blocks_of(const GatedImage& image, int size) {
   return sums;
 }
 
-/// Width of the blocks whose sums are looked at.
+/// Width of the blocks of pixels whose sums are compared.
 int block_size(const Scene& small, Purpose purpose) {
   return purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
 }

@@ -22,9 +22,9 @@ class SceneCache {
   /// Of scenes that have the topology of `at_first`, which must outlive this. `update`: of the rays' hierarchy.
   SceneCache(const Scene& at_first, CasterUpdate update) : at_first_(at_first), update_(update) {}
 
-  /// The scene made ready; nobody else's until the pointer is gone. The same bits whatever was taken before.
+  /// The scene made ready, for the caller alone until the pointer is gone. The same bits whatever was taken before.
   std::shared_ptr<ReadyScene> take(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow);
-  /// Where intersections of meshes are to be looked for.
+  /// The edges to search for intersections of meshes.
   const CrossingEdges& crossing();
 
  private:

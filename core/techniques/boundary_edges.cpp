@@ -15,7 +15,7 @@ Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const
   return cross(scene.normal(t), along ? tangent : -tangent);
 }
 
-/// How often an edge is to be looked at from the camera: by its length in the image, and between two faces that are both
+/// How often the camera samples an edge: by its length in the image, and between two faces that are both
 /// seen, where light changes little, by the angle between them, `wedge` (without it, pi). Zero where it makes no difference
 /// to any image.
 double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, double wedge) {
@@ -46,7 +46,7 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Cross
 
 void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
   const std::size_t count = scene.scene.edges.size();
-  // What the camera looks at depends on whether points may follow others.
+  // Which edges the camera samples depends on whether points may follow others.
   const bool all = revision_ == 0 || wedge != wedge_ || camera_possible_ != scene.flows.camera_possible();
   edges_.resize(count);
   moves_.resize(count);

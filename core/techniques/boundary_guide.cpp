@@ -16,7 +16,7 @@ constexpr int kMostBins = 512;
 /// A histogram has a bin for as many records as this, and fewer than these teach a tile nothing of its own.
 constexpr int kRecordsPerBin = 4, kFewRecords = 32;
 /// How often a technique is used follows from the sum of its squares, which is known as well as if so many records of
-/// equal squares made it up. With as few as these, half of it (of its logarithm) is believed.
+/// equal squares made it up. Its logarithm is shrunk by half at this effective sample size.
 constexpr double kFewEqual = 8;
 /// How many times as often as without guiding a technique may be used.
 constexpr double kMostRate = 8, kLeastRate = 1.0 / 8;

@@ -6,7 +6,7 @@
 // Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
 // that ends outside is found by emitter arcs, whatever it went through before.
 // Every crossing arc is sampled once; only which of them gets its visibility tested is a random pick, so the density
-// of a technique is one over the arc's span. (The pick by contribution has to look at all arcs; the uniform one looks at
+// of a technique is one over the arc's span. (The pick by contribution evaluates all arcs; the uniform one evaluates
 // the picked arc alone.)
 #pragma once
 #include <span>
@@ -39,7 +39,7 @@ class EllipsoidalConnections {
   /// One camera path through `pixel` with connections at its other vertices; contributions are scaled by `scale`.
   void sample_walk(int pixel, double scale, Rng& rng);
 
-  /// Walks on from vertex 1 of the worker's path, which vertex 0 looks at, by up to `max_bounces` scattering vertices.
+  /// Walks on from vertex 1 of the worker's path, which vertex 0 sees, by up to `max_bounces` scattering vertices.
   /// Hands complete paths of the given lengths to the receiver, which there must be. Leaves the path grown.
   void gather(std::span<const double> lengths, int max_bounces, Rng& rng);
 

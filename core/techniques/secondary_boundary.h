@@ -130,7 +130,7 @@ class SecondaryBoundary {
   const BoundaryGuide& guide_;
   const BoundaryTechniques techniques_;
   const bool at_length_;
-  const double camera_over_edge_rate_;  ///< how often segments are looked for from the camera, over that from an edge
+  const double camera_over_edge_rate_;  ///< samples of segments from the camera over those from an edge
   const double aimed_share_;            ///< of the directions from an edge
   LightSide light_side_;
   LocalDifferential camera_flow_, material_flow_, following_;

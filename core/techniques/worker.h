@@ -29,7 +29,7 @@ struct Worker {
   std::vector<int> candidates;              ///< triangles that may hold an arc
   std::vector<double> inverse_probability;  ///< of each candidate to be one, for the pick by contribution
   long long rays = 0;
-  long long arcs = 0;  ///< triangles looked at for arcs, and the queries that found them
+  long long arcs = 0;  ///< triangles tested for arcs, and the queries that found them
 
   Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator,
          const GatePick& gate_pick, Sink& target);
@@ -93,7 +93,7 @@ struct BsdfSample {
   double pdf;      ///< per solid angle
 };
 
-/// Samples the direction in which a path goes on from x, which looks back along the unit vector w_back. `throughput` gets
+/// Samples the direction in which a path goes on from x, reached from the direction of the unit vector w_back. `throughput` gets
 /// the BSDF's weight. Empty where the path ends.
 inline std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back,
                                              Rgb& throughput, Rng& rng, TransportMode mode = TransportMode::radiance) {

@@ -14,7 +14,7 @@ constexpr std::uint64_t kReferenceSeed = 0x7265666572656e63u;  // changes the ex
 constexpr int kReferenceRepeats = 32;
 constexpr int kRungs = 4;
 constexpr int kFewestRepeats = 4, kRepeats = 10, kMostRepeats = 400;
-/// Unknowns that are looked at where the time grows with their number.
+/// Unknowns that are measured where the time grows with their number.
 constexpr int kMostComponents = 6;
 
 /// Rungs of one height have the same random numbers in all methods, and others than those of another height:

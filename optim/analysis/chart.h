@@ -42,7 +42,7 @@ Reference make_reference(const Experiment& experiment, const std::vector<double>
 
 struct ChartMethod {
   std::string name;
-  int components = 0;  ///< unknowns that were looked at
+  int components = 0;  ///< unknowns that were measured
   std::vector<Rung> rungs;
   MethodError error;
   Measured to_error;  ///< core-seconds to ChartOptions::error, infinite: never

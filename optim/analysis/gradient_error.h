@@ -52,7 +52,7 @@ struct MethodError {
   SquaredNorm bias2;  ///< squared bias, unbiased: may be negative
 };
 
-/// `scale` multiplies all squares: unknowns over the components in the repeats, where not all were looked at.
+/// `scale` multiplies all squares: unknowns over the components in the repeats, where only some were measured.
 /// `bias_from_all`: the bias is taken not to depend on the samples, so that all rungs tell it (else the
 /// uppermost alone).
 MethodError method_error(const std::vector<Rung>& rungs, const Repeats& reference, double norm2, double scale,

@@ -82,7 +82,7 @@ void describe_estimator(Keys& keys, EstimatorOptions& options, bool& guiding) {
 
 void describe(Keys& keys, GradientSpec& gradient) {
   keys.value("method", field::choice(gradient.method), "how the loss is differentiated");
-  // A step that nobody chose stays out where it plays no part: the check command would take it for a wish.
+  // A default step is not written where it has no effect: the check command would take it for a given one.
   const bool idle = gradient.method == GradientMethod::analytic && !gradient.step_given;
   if (keys.value("step", field::positive(gradient.step), "finite differences: half the distance of the two images",
                  {.unit = "the parameter's", .unset = idle, .otherwise = fmt::format("`{}`", gradient.step)}))
