@@ -51,6 +51,11 @@ struct Field {
   std::string names = {};              ///< of a choice: what each name means
 };
 
+/// A kind that a map can be of.
+struct KindName {
+  std::string name, meaning;
+};
+
 /// Fields of variables, which must outlive what is made of them.
 namespace field {
 
@@ -86,6 +91,9 @@ Field choice(E& variable) {
   return choice(
       names, [&variable](int i) { variable = kChoices<E>[i].value; }, [&variable] { return name_of(variable); });
 }
+/// The word that says of which kind a map is; choose(kind) receives it, `chosen` is written.
+Field kind(const std::vector<KindName>& kinds, std::function<void(const std::string&)> choose,
+           const std::string& chosen);
 /// The field with a check, or whatever else is to be done, after it was read.
 Field checked(Field field, std::function<void(const YamlValue&)> check);
 
@@ -158,9 +166,7 @@ class Keys {
   /// A map of maps, each under a name of the user's; `names` are those to be written.
   virtual void named(const std::string& name, const std::vector<std::string>& names, const DescribeNamed& describe,
                      const std::string& meaning, const KeyOptions& options = {}) = 0;
-  struct Kind {
-    std::string name, meaning;
-  };
+  using Kind = KindName;
   /// A word that says of which kind the map is, and the keys of that kind: describe(keys, kind) names those of any kind.
   /// `chosen` is the present one, choose(kind) sets another.
   virtual void kinds(const std::string& name, const std::vector<Kind>& kinds, const std::string& chosen,

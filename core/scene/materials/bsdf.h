@@ -91,7 +91,7 @@ class Bsdf {
 
   /// f in 1/sr, without cosine; that of radiance which travels from w_i to w_o. Zero where nothing is scattered.
   virtual Rgb value(const Directions& d) const = 0;
-  /// Of ln(value), for directions where no colour's value is zero; else all zero.
+  /// Of ln(value); all zero for colours whose value is zero.
   virtual BsdfDerivative derivative(const Directions& d) const = 0;
   /// Density per solid angle with which `sample` draws w_i given w_o. Integrates to less than one where some draws end
   /// below the surface and are dropped. Of Directions::reversed(): that of w_o given w_i.
