@@ -48,10 +48,13 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
   const std::size_t count = scene.scene.edges.size();
   // Which edges the camera samples depends on whether points may follow others.
   const bool all = revision_ == 0 || wedge != wedge_ || camera_possible_ != scene.flows.camera_possible();
-  edges_.resize(count);
-  moves_.resize(count);
-  primary_.weights.resize(count);
-  secondary_.weights.resize(count);
+  const auto keep_edges_of_scene = [&] {
+    edges_.resize(count);
+    moves_.resize(count);
+    primary_.weights.resize(count);
+    secondary_.weights.resize(count);
+  };
+  if (revision_ == 0) keep_edges_of_scene();
   constexpr std::size_t kChunk = 4096;
   std::vector<char> changed((count + kChunk - 1) / kChunk, 0);
   parallel(static_cast<int>(changed.size()), [&](int chunk) {
@@ -63,12 +66,15 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
       changed[chunk] = 1;
     }
   });
+  if (std::find(changed.begin(), changed.end(), 1) != changed.end()) {
+    keep_edges_of_scene();  // without the intersections of before
+    if (scene.differentiable.geometry) add_mesh_intersections(scene, wedge);
+    parallel(2, [&](int i) { finish(i == 0 ? primary_ : secondary_); });
+  }
+  // Last: an interrupted update is made again.
   revision_ = scene.revision();
   wedge_ = wedge;
   camera_possible_ = scene.flows.camera_possible();
-  if (std::find(changed.begin(), changed.end(), 1) == changed.end()) return;
-  if (scene.differentiable.geometry) add_mesh_intersections(scene, wedge);
-  parallel(2, [&](int i) { finish(i == 0 ? primary_ : secondary_); });
 }
 
 void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool wedge) {

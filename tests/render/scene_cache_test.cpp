@@ -41,8 +41,10 @@ std::vector<double> everything(const Renderer& renderer, const Scene& scene, con
   return result;
 }
 
-const std::vector<std::vector<double>> kPoints = {{0, 0, 0, 0},        {0.1, 0.3, 0, 0}, {0.45, 0.3, 0, 0},
-                                                  {0.45, 0.3, 0.1, 2}, {0, 0, 0, 0},     {-0.2, -0.1, 0.05, 1}};
+/// One twice in a row, with the block going through the floor.
+const std::vector<std::vector<double>> kPoints = {{0, 0, 0, 0},         {0.1, 0.3, 0, 0},    {0.45, 0.3, 0, 0},
+                                                  {0.45, 0.3, 0, 0},    {0.45, 0.3, 0.1, 2}, {0, 0, 0, 0},
+                                                  {-0.2, -0.1, 0.05, 1}};
 
 class Kept : public ::testing::TestWithParam<Sampling> {};
 
@@ -53,11 +55,14 @@ TEST_P(Kept, GivesTheBitsOfAFreshOne) {
   const GateSet gates(GateShape::boxcar(0.6), {5.0, 6.0});
   const EstimatorOptions options{.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 8};
   SceneCache cache(scene, CasterUpdate::rebuild);
+  std::size_t intersections = 0;
   for (const auto& theta : kPoints) {
     const Scene moved = at(scene, all, theta);
+    intersections = std::max(intersections, find_mesh_intersections(moved, RayCaster(moved)).size());
     EXPECT_EQ(everything(Renderer(moved, gates, options, &basis, &cache), moved, gates),
               everything(Renderer(moved, gates, options, &basis), moved, gates));
   }
+  EXPECT_GT(intersections, 0u);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {
