@@ -1,12 +1,9 @@
 #include "core/gates/gate.h"
 
 #include <cmath>
-#include <limits>
-#include <numbers>
 #include <numeric>
 #include <string>
 
-#include "core/base/constants.h"
 #include "core/base/error.h"
 
 namespace isochron {

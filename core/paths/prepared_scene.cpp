@@ -64,7 +64,9 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
       }
     });
   }
+  const std::vector<int> emitted = emitters.triangles();
   update_emitters();
+  any_changed |= emitters.triangles() != emitted;
   flows.update(*this, follow);
   moving_bounds = differentiable.bounds.grown(caster.offset());
   flowing_bounds = flows.near().grown(caster.offset());

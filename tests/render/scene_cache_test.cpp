@@ -18,7 +18,7 @@ Scene small_box() {
 
 std::vector<Motion> motions(const Scene& scene) {
   return {translate(scene, "block", {0.3, -1, 0.2}), rotate_y(scene, "panel", {0, 0, 0}),
-          change_material(scene, "block", "albedo"), change_emission(scene, "light")};
+          change_material(scene, "block", "albedo"), change_emission(scene, "light"), change_emission(scene, "block")};
 }
 
 Scene at(const Scene& scene, const std::vector<Motion>& all, const std::vector<double>& theta) {
@@ -41,18 +41,23 @@ std::vector<double> everything(const Renderer& renderer, const Scene& scene, con
   return result;
 }
 
-/// One twice in a row, with the block going through the floor.
-const std::vector<std::vector<double>> kPoints = {{0, 0, 0, 0},         {0.1, 0.3, 0, 0},    {0.45, 0.3, 0, 0},
-                                                  {0.45, 0.3, 0, 0},    {0.45, 0.3, 0.1, 2}, {0, 0, 0, 0},
-                                                  {-0.2, -0.1, 0.05, 1}};
+/// One twice in a row, with the block going through the floor; in another the block becomes a lamp.
+const std::vector<std::vector<double>> kPoints = {
+    {0, 0, 0, 0, 0},        {0.1, 0.3, 0, 0, 0}, {0.45, 0.3, 0, 0, 0},     {0.45, 0.3, 0, 0, 0},
+    {0.45, 0.3, 0.1, 2, 0}, {0, 0, 0, 0, 0},     {-0.2, -0.1, 0.05, 1, 0}, {-0.2, -0.1, 0.05, 1, 3}};
+
+/// The box, what moves in it, and gates.
+struct Setting {
+  Scene scene = small_box();
+  std::vector<Motion> all = motions(scene);
+  TangentBasis basis = make_basis(scene, all);
+  GateSet gates{GateShape::boxcar(0.6), {5.0, 6.0}};
+};
 
 class Kept : public ::testing::TestWithParam<Sampling> {};
 
 TEST_P(Kept, GivesTheBitsOfAFreshOne) {
-  const Scene scene = small_box();
-  const std::vector<Motion> all = motions(scene);
-  const TangentBasis basis = make_basis(scene, all);
-  const GateSet gates(GateShape::boxcar(0.6), {5.0, 6.0});
+  const auto [scene, all, basis, gates] = Setting();
   const EstimatorOptions options{.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 8};
   SceneCache cache(scene, CasterUpdate::rebuild);
   std::size_t intersections = 0;
@@ -70,10 +75,7 @@ INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling:
 });
 
 TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
-  const Scene scene = small_box();
-  const std::vector<Motion> all = motions(scene);
-  const TangentBasis basis = make_basis(scene, all);
-  const GateSet gates(GateShape::gaussian(0.3), {5.0, 6.0});
+  const auto [scene, all, basis, gates] = Setting();
   const EstimatorOptions options{.max_bounces = 3, .sampling = Sampling::standard};
   SceneCache cache(scene, CasterUpdate::refit);
   for (const auto& theta : kPoints) {
@@ -87,10 +89,7 @@ TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
 }
 
 TEST(KeptScenes, TwoAtATimeDoNotMeet) {
-  const Scene scene = small_box();
-  const std::vector<Motion> all = motions(scene);
-  const TangentBasis basis = make_basis(scene, all);
-  const GateSet gates(GateShape::gaussian(0.3), {5.0, 6.0});
+  const auto [scene, all, basis, gates] = Setting();
   const EstimatorOptions options{.max_bounces = 2, .sampling = Sampling::standard};
   SceneCache cache(scene, CasterUpdate::rebuild);
   const Scene a = at(scene, all, kPoints[1]), b = at(scene, all, kPoints[3]);
@@ -105,12 +104,10 @@ TEST(KeptScenes, TwoAtATimeDoNotMeet) {
 }
 
 TEST(PreparedScene, TouchesWhatMovedAlone) {
-  const Scene scene = small_box();
-  const std::vector<Motion> all = motions(scene);
-  const TangentBasis basis = make_basis(scene, all);
+  const auto [scene, all, basis, gates] = Setting();
   PreparedScene prepared(scene, &basis);
   const int before = prepared.revision();
-  prepared.update(at(scene, all, {0.1, 0, 0, 0}), &basis, {});
+  prepared.update(at(scene, all, {0.1, 0, 0, 0, 0}), &basis, {});
   const int block = scene.find_shape("block");
   for (std::size_t t = 0; t < scene.triangles.size(); ++t)
     EXPECT_EQ(prepared.changed(static_cast<int>(t)) > before, scene.triangles[t].shape == block) << t;
