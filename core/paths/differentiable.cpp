@@ -6,7 +6,9 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
     : vertex(scene.positions.size(), 0),
       triangle(scene.triangles.size(), 0),
       material(scene.materials.size(), 0),
-      emission(scene.shapes.size(), 0) {
+      emission(scene.shapes.size(), 0),
+      paint(scene.paint.size(), 0),
+      light(scene.lights.size(), 0) {
   const DofLayout layout(scene);
   const int first_number = layout.first_number[0];
   number.assign(layout.first_number.back() - first_number, 0);
@@ -27,7 +29,17 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
     for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
     geometry |= triangle[t] != 0;
   }
-  lengths |= geometry;
+  for (int v = 0; v < layout.painted; ++v) paint[v] = basis->differentiates(layout.paint(v));
+  for (int i = 0; i < layout.lights; ++i)
+    for (int k = 0; k < 9; ++k) {
+      const bool moves = basis->differentiates(layout.light_position(i, k));
+      light[i] |= moves;
+      geometry |= moves && k < 3;
+    }
+  gain = basis->differentiates(layout.gain());
+  time_offset = basis->differentiates(layout.time_offset());
+  every_path = gain || time_offset;
+  lengths |= geometry || time_offset;
   any = !basis->entries.empty();
   find_bounds(scene);
 }

@@ -14,9 +14,14 @@ struct Differentiable {
   std::vector<std::uint8_t> material;  ///< any of its numbers
   std::vector<std::uint8_t> number;    ///< as DofLayout counts them, from the first material's first on
   std::vector<std::uint8_t> emission;  ///< per shape
-  bool any = false, geometry = false;
+  std::vector<std::uint8_t> paint;     ///< per vertex, where shapes are painted
+  std::vector<std::uint8_t> light;     ///< any number of it
+  bool gain = false, time_offset = false;
+  bool any = false;
+  bool geometry = false;  ///< vertices, or lights without an extent
   Bounds bounds;         ///< of the triangles with a vertex that moves
   bool lengths = false;  ///< paths can change their length
+  bool every_path = false;  ///< every path has a derivative
   Differentiable() = default;
   Differentiable(const Scene& scene, const TangentBasis* basis);
   /// Sets `bounds`; to be called again when vertices have moved.

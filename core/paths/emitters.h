@@ -1,5 +1,5 @@
-// What lights a scene: which emitter a path goes to, and how far any is. Emitters are triangles of shapes with `emission`; points
-// on them are PreparedScene::point_on_emitter's.
+// What lights a scene: which emitter a path goes to, and how far any is. Emitters are triangles of shapes with `emission`, and
+// lights without an extent (light_in_place_of_triangle); points on them are PreparedScene::point_on_emitter's.
 #pragma once
 #include <vector>
 
@@ -11,7 +11,7 @@ namespace isochron {
 class Emitters {
  public:
   Emitters() = default;
-  /// Triangles that emit, in rising order, with area x radiance of each, and boxes that hold them.
+  /// Emitters in a fixed order, with area x radiance (or the like) of each, and boxes that hold them.
   Emitters(std::vector<int> triangles, const std::vector<double>& power, std::vector<Bounds> boxes)
       : triangles_(std::move(triangles)), distribution_(power), boxes_(std::move(boxes)) {}
 
@@ -20,7 +20,7 @@ class Emitters {
   /// Of all of them.
   double power() const { return distribution_.total(); }
 
-  /// A triangle, in proportion to its power; `u` in (0, 1).
+  /// One of them, in proportion to its power; `u` in (0, 1).
   int pick(double u) const { return triangles_[distribution_.sample(u)]; }
   /// Asks early for what pick(u) will read.
   void prefetch(double u) const { __builtin_prefetch(&triangles_[distribution_.prefetch(u)]); }
@@ -28,6 +28,7 @@ class Emitters {
   /// Lower bound of the distance from p to an emitter; infinite where there is none.
   double distance(const Vec3& p) const { return std::sqrt(boxes_.distance_squared(p)); }
 
+  bool have_extent = false;     ///< some of them
   bool seen_by_camera = false;  ///< may be, if nothing is in between
 
  private:

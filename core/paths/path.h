@@ -29,8 +29,8 @@ class FixedStack {
   std::size_t size_ = 0;
 };
 
-/// A path under construction: vertices from the camera on. `vertex[0]` is the camera (or, for the light side of a
-/// boundary segment, the point that the walk looks from); its triangle is -1 for the camera.
+/// A path under construction: vertices from the camera on. `vertex[0]` is the camera or sensor point (or, for the light side of a
+/// boundary segment, the point that the walk looks from); its triangle is -1 for the former.
 struct Path {
   FixedStack<SurfacePoint> vertex;
   FixedStack<double> length;      ///< length[k]: optical, from vertex 0 to vertex k, plus what length[0] starts with
@@ -58,12 +58,17 @@ struct Path {
   }
   const SurfacePoint& back() const { return vertex.back(); }
   int size() const { return static_cast<int>(vertex.size()); }
+  /// Whether light from y to the last vertex, which vertex 0 sees, takes the way back that it is seen along, as that of a
+  /// confocal capture does: what one of the two sees the other sees.
+  bool retraces(const SurfacePoint& y) const {
+    return vertex.size() == 2 && vertex[0].triangle == -1 && is_light(y.triangle) && y.p == vertex[0].p;
+  }
 };
 
 /// Whether the path x0 ... x(last) of `path`, followed by a point on an emitter's triangle, can have a gradient.
 inline bool path_has_gradient(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
   return path.has_gradient[last] || scene.has_moving_vertex(emitter_triangle) ||
-         scene.differentiable.emission[scene.shape_index(emitter_triangle)];
+         (!is_light(emitter_triangle) && scene.differentiable.emission[scene.shape_index(emitter_triangle)]);
 }
 
 /// Directions at a scattering vertex x towards its neighbours `before` (camera side) and `after` (light side).

@@ -38,6 +38,15 @@ void add_scalar(int dof, const Rgb& log_f, LocalDifferential& out) {
     if (log_f[c] != 0) out.scalars.push_back({dof, c, log_f[c]});
 }
 
+/// Adds what the paint at x does to ln F.
+void add_paint(const PreparedScene& scene, const SurfacePoint& x, LocalDifferential& out) {
+  const auto b = scene.barycentrics(x);
+  const double value = scene.paint(x);
+  for (int i = 0; i < 3; ++i)
+    if (const int v = scene.scene.triangles[x.triangle].vertex[i]; scene.differentiable.paint[v])
+      out.scalars.push_back({scene.layout.paint(v), -1, b[i] / value});
+}
+
 /// What a vertex's material point adds up beyond what its base flow says: from neighbours that follow it, from x1 itself.
 struct Extra {
   Vec3 position, length;
@@ -69,6 +78,22 @@ Extra let_follow(const VertexFlow& flow, const SurfacePoint& x, const Accumulate
   return lost;
 }
 
+/// Carries the gradients of a light without an extent, the end of a path, to what can move there. `w`: unit, to the path's last
+/// vertex but one. `channel`: see let_flow.
+void to_light(const PreparedScene& scene, const SurfacePoint& y, const Accumulated& g, const Vec3& w, bool length_only,
+              int channel, LocalDifferential& out) {
+  const int i = light_number(y.triangle);
+  if (scene.captures() || !scene.differentiable.light[i]) return;
+  for (int axis = 0; axis < 3; ++axis)
+    out.scalars.push_back({scene.layout.light_position(i, axis), channel, g.position[axis], g.length[axis]});
+  if (length_only || channel > 0) return;
+  const PointLight& light = scene.lights[i];
+  const Vec3 turn = light.derivative(w).direction;
+  for (int axis = 0; axis < 3; ++axis)
+    if (turn[axis] != 0) out.scalars.push_back({scene.layout.light_direction(i, axis), -1, turn[axis]});
+  for (int c = 0; c < 3; ++c) out.scalars.push_back({scene.layout.light_intensity(i, c), c, 1 / light.intensity[c]});
+}
+
 /// Carries position and normal gradients of a vertex to its triangle's vertices.
 /// `area`: how often d ln (area of the triangle) counts (paper Eq. 11).
 void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumulated& g, double area, bool length_only,
@@ -92,8 +117,10 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
               bool length_only, int channel, LocalDifferential& out) {
   thread_local std::vector<Extra> extra;
   extra.assign(count, {});
-  // Each material point counts its area but that of x1, which the pixel holds.
-  for (int k = 2; k < count; ++k) extra[k].area = 1;
+  // Each material point counts its area but that of x1, which the pixel of a camera holds.
+  const bool held = !scene.captures();
+  const int last_on_surface = is_light(x[count - 1].triangle) ? count - 2 : count - 1;
+  for (int k = held ? 2 : 1; k <= last_on_surface; ++k) extra[k].area = 1;
 
   const Vec3 ray = x[1].p - x[0].p;
   const double height = dot(x[1].n, ray);
@@ -102,16 +129,21 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
     const Vec3& forward = scene.camera.forward;
     return x[1].n / height - forward * (3 / dot(forward, ray));
   };
+  // A vertex that does not move with its material crosses the paint there.
+  const auto log_paint = [&](int k) {
+    return scene.painted(x[k].triangle) && !length_only ? scene.paint_gradient(x[k]) / scene.paint(x[k]) : Vec3();
+  };
   VertexFlows::Pair before, after;
   Extra lost_by_pixel;
-  for (int k = 1; k < count; ++k) {
-    after = k + 1 < count ? scene.flows.pair(scene, x[k], x[k + 1], k) : VertexFlows::Pair{};
-    const VertexFlow flow = VertexFlows::at(before, after, k);
+  for (int k = 1; k <= last_on_surface; ++k) {
+    const int rank = held ? k : k + 1;  // x1 that no pixel holds is a vertex like the others
+    after = k < last_on_surface ? scene.flows.pair(scene, x[k], x[k + 1], rank) : VertexFlows::Pair{};
+    const VertexFlow flow = VertexFlows::at(before, after, rank);
     before = after;
     if (!flow.follows()) continue;
-    const Extra lost = let_follow(flow, x[k], g[k], k == 1 ? log_density() : Vec3(), &extra[k - 1], &extra[k],
-                                  k + 1 < count ? &extra[k + 1] : nullptr);
-    if (k == 1) {
+    const Extra lost = let_follow(flow, x[k], g[k], (rank == 1 ? log_density() : Vec3()) + log_paint(k), &extra[k - 1],
+                                  &extra[k], k + 1 < count ? &extra[k + 1] : nullptr);
+    if (rank == 1) {
       lost_by_pixel = lost;
       extra[k].area = flow.own.weight;
     } else {
@@ -121,15 +153,18 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
     }
   }
 
-  // The pixel flow: along the ray, as far as the surface moves along its normal.
-  Vec3 through_ray = g[1].position - lost_by_pixel.position;
-  if (lost_by_pixel.area > 0) {
-    through_ray += log_density() * lost_by_pixel.area;
-    g[1].normal += ray * (lost_by_pixel.area / height);
+  if (held) {
+    // The pixel flow: along the ray, as far as the surface moves along its normal.
+    const Vec3 paint = last_on_surface >= 1 ? log_paint(1) : Vec3();
+    Vec3 through_ray = g[1].position + paint - lost_by_pixel.position;
+    if (lost_by_pixel.area > 0) {
+      through_ray += log_density() * lost_by_pixel.area;
+      g[1].normal += ray * (lost_by_pixel.area / height);
+    }
+    g[1].position = x[1].n * (dot(ray, through_ray) / height) - paint;
+    g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
   }
-  g[1].position = x[1].n * (dot(ray, through_ray) / height);
-  g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
-  for (int k = 1; k < count; ++k) {
+  for (int k = 1; k <= last_on_surface; ++k) {
     g[k].position += extra[k].position;
     g[k].length += extra[k].length;
     to_triangle(scene, x[k], g[k], extra[k].area, length_only, channel, out);
@@ -156,18 +191,30 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
       const int dof = scene.layout.number(medium->material, medium->bsdf->index_number());
       if (scene.differentiable.has_number(scene.layout, dof)) out.scalars.push_back({dof, -1, 0, squared * inverse});
     }
-    if (length_only || k == 0) continue;
-    const double cos_near = dot(x[k].n, d), cos_far = dot(x[k + 1].n, d);
+    if (length_only || (k == 0 && !scene.captures())) continue;
+    const double cos_near = dot(x[k].n, d);
+    const bool to_light = is_light(x[k + 1].triangle);
+    const double cos_far = to_light ? 1 : dot(x[k + 1].n, d);
     if (cos_near == 0 || cos_far == 0) {
       out.clear();
       return;
     }
-    const Vec3 g_d = x[k].n / cos_near + x[k + 1].n / cos_far - d * (4 / squared);
+    Vec3 g_d = x[k].n / cos_near - d * (4 / squared);
+    if (to_light) {
+      // cos / r^2 x radiant intensity
+      const Vec3 of_light = scene.lights[light_number(x[k + 1].triangle)].derivative(-w).w;
+      g_d += d / squared - through_normalize(of_light, -w, 1 / inverse);
+    } else {
+      g_d += x[k + 1].n / cos_far;
+      g[k + 1].normal += d / cos_far;
+    }
     g[k].position -= g_d;
     g[k + 1].position += g_d;
     g[k].normal += d / cos_near;
-    g[k + 1].normal += d / cos_far;
   }
+  if (scene.differentiable.time_offset) out.scalars.push_back({scene.layout.time_offset(), -1, 0, 1});
+  if (scene.differentiable.gain && !length_only)
+    out.scalars.push_back({scene.layout.gain(), -1, 1 / scene.scene.detector.gain});
   // Where colours differ, what is theirs alone.
   thread_local std::array<std::vector<Accumulated>, 3> own;
   bool coloured = false;
@@ -175,6 +222,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     for (int k = 1; k + 1 < count; ++k) {
       const int m = scene.shape_of(x[k].triangle).material;
       const Bsdf& bsdf = scene.bsdf_of(x[k].triangle);
+      if (scene.painted(x[k].triangle)) add_paint(scene, x[k], out);
       if (!bsdf.depends_on_directions() && !scene.differentiable.material[m]) continue;
       const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
       const BsdfDerivative derivative = bsdf.derivative(s);
@@ -192,13 +240,18 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
         if (const int dof = scene.layout.number(m, i); scene.differentiable.has_number(scene.layout, dof))
           add_scalar(dof, derivative.by_number[i], out);
     }
-    const int s = scene.shape_index(x[count - 1].triangle);
-    if (scene.differentiable.emission[s])
+    const int s = is_light(x[count - 1].triangle) ? -1 : scene.shape_index(x[count - 1].triangle);
+    if (s >= 0 && scene.differentiable.emission[s])
       for (int c = 0; c < 3; ++c)
         if (const double radiance = scene.scene.shapes[s].emission.radiance[c]; radiance > 0)
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
   }
+  const SurfacePoint& y = x[count - 1];
+  const auto end_at_light = [&](const Accumulated& at_y, int channel) {
+    if (is_light(y.triangle)) to_light(scene, y, at_y, normalize(x[count - 2].p - y.p), length_only, channel, out);
+  };
   if (!coloured) {
+    end_at_light(g[count - 1], -1);
     let_flow(scene, x, count, g, length_only, -1, out);
     return;
   }
@@ -208,12 +261,18 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
       own[c][k].normal += g[k].normal;
       if (c == 0) own[c][k].length = g[k].length;  // once for all channels
     }
+    end_at_light(own[c][count - 1], c);
     let_flow(scene, x, count, own[c], length_only, c, out);
   }
 }
 
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out) {
   if (!scene.has_moving_vertex(x.triangle)) return;
+  if (is_light(x.triangle)) {
+    for (int axis = 0; axis < 3; ++axis)
+      out.scalars.push_back({scene.layout.light_position(light_number(x.triangle), axis), -1, g[axis]});
+    return;
+  }
   const auto b = scene.barycentrics(x);
   scene.for_each_moving_corner(x.triangle, [&](int i, int vertex) { out.vertices.push_back({vertex, g * b[i], {}}); });
 }

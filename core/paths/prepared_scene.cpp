@@ -1,5 +1,6 @@
 #include "core/paths/prepared_scene.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -38,6 +39,9 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   const bool first = revision_++ == 0;
   scene.materials = source.materials;
   scene.shapes = source.shapes;
+  scene.detector = source.detector;
+  scene.lights = source.lights;
+  scene.paint = source.paint;
   std::vector<char> moved_shapes(scene.shapes.size(), 0);
   const std::vector<char> moved = move_vertices(source.positions, moved_shapes);
   const bool same_pattern = !first && same_columns(basis);
@@ -66,6 +70,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   }
   const std::vector<int> emitted = emitters.triangles();
   update_emitters();
+  update_hidden();
   any_changed |= emitters.triangles() != emitted;
   flows.update(*this, follow);
   moving_bounds = differentiable.bounds.grown(caster.offset());
@@ -86,7 +91,7 @@ void PreparedScene::update_shapes() {
     const Material& material = scene.materials[shape.material];
     const Bsdf& bsdf = material.bsdf();
     const double index = bsdf.transparent() ? material.number(bsdf.index_number()) : 0;
-    shapes_.push_back({&bsdf, shape.material, bsdf.two_sided(), index, shape.emission});
+    shapes_.push_back({&bsdf, shape.material, bsdf.two_sided(), index, shape.emission, shape.painted});
     if (index == 0 || shape.triangle_count == 0) continue;
     has_medium_ = true;
     least_index_ = std::min(least_index_, index);
@@ -107,7 +112,69 @@ void PreparedScene::update_record(int t) {
   record.normal = doubled > 0 ? normal / doubled : Vec3();
   record.moving_corners = 0;
   for (int k = 0; k < 3; ++k) record.moving_corners |= (differentiable.vertex[v[k]] != 0) << k;
-  record.has_gradient = record.moving_corners || differentiable.material[shapes_[record.shape].material];
+  record.has_gradient = differentiable.every_path || record.moving_corners ||
+                        differentiable.material[shapes_[record.shape].material];
+  if (shapes_[record.shape].painted)
+    for (const int vertex : v) record.has_gradient |= differentiable.paint[vertex] != 0;
+}
+
+Vec3 PreparedScene::paint_gradient(const SurfacePoint& x) const {
+  const TriangleRecord& r = records_[x.triangle];
+  const double b = scene.paint[r.vertex[1]] - scene.paint[r.vertex[0]],
+               c = scene.paint[r.vertex[2]] - scene.paint[r.vertex[0]];
+  return (cross(r.edge[1], r.normal) * b + cross(r.normal, r.edge[0]) * c) / (2 * r.area);
+}
+
+void PreparedScene::update_hidden() {
+  const auto sought = [&](int t) { return scene.shapes[records_[t].shape].sought; };
+  if (revision_ == 1) {
+    std::vector<int> triangles;
+    std::vector<Vec3> centers;
+    for (int t = 0; t < static_cast<int>(records_.size()); ++t) {
+      if (!sought(t)) continue;
+      triangles.push_back(t);
+      centers.push_back(records_[t].origin + (records_[t].edge[0] + records_[t].edge[1]) / 3);
+    }
+    sought_.clear();
+    for (const int i : spatial_order(centers)) sought_.push_back(triangles[i]);
+  }
+  std::vector<Vec3> corners;  // of a box about the sensor points: what all of them are behind of, none sees
+  if (captures()) {
+    Bounds box;
+    for (const WallPoint& s : scene.capture->sensor) box.add(s.p);
+    for (int i = 0; i < 8; ++i)
+      corners.push_back({i & 1 ? box.high.x : box.low.x, i & 2 ? box.high.y : box.low.y, i & 4 ? box.high.z : box.low.z});
+  }
+  const auto seen = [&](int t) {
+    if (two_sided(t) || transparent(t)) return true;
+    return std::any_of(corners.begin(), corners.end(), [&](const Vec3& p) { return height_over(t, p) > 0; });
+  };
+  std::vector<int> triangles;
+  std::vector<double> areas;
+  for (const int t : sought_) {
+    records_[t].sought = records_[t].area > 0 && (!captures() || seen(t));
+    if (!records_[t].sought) continue;
+    triangles.push_back(t);
+    areas.push_back(records_[t].area);
+  }
+  hidden = HiddenGeometry(std::move(triangles), areas);
+  hidden_is_all = sought_.size() == records_.size();
+}
+
+void PreparedScene::update_lights() {
+  if (!captures()) {
+    lights = scene.lights;
+    return;
+  }
+  if (!lights.empty()) return;  // a capture stays where it is
+  const Capture& capture = *scene.capture;
+  for (const WallPoint& spot : capture.confocal() ? capture.sensor : capture.spots) {
+    PointLight light;
+    light.kind = PointLight::Kind::wall;
+    light.position = spot.p;
+    light.direction = spot.n;
+    lights.push_back(light);
+  }
 }
 
 void PreparedScene::update_emitters() {
@@ -133,10 +200,23 @@ void PreparedScene::update_emitters() {
     }
     if (emits) boxes.push_back(box);
   }
+  const bool triangles_have_none = triangles.empty();
+  update_lights();
+  Bounds spots;
+  for (std::size_t i = 0; i < lights.size(); ++i) {
+    Bounds box;
+    box.add(lights[i].position);
+    spots.add(box);
+    triangles.push_back(light_in_place_of_triangle(static_cast<int>(i)));
+    power.push_back(lights[i].power());
+    if (!captures()) boxes.push_back(box);
+  }
+  if (captures()) boxes.push_back(spots);
   emitters = Emitters(std::move(triangles), power, std::move(boxes));
+  emitters.have_extent = !triangles_have_none;
   emitters.seen_by_camera = seen;
   for (ShapeRecord& shape : shapes_)
-    if (shape.emission.emits() && !emitters.empty()) shape.emitter_pdf = shape.emission.power() / emitters.power();
+    if (shape.emission.emits() && emitters.have_extent) shape.emitter_pdf = shape.emission.power() / emitters.power();
 }
 
 const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {

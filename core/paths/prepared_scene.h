@@ -15,12 +15,16 @@
 #include "core/geometry/ray_caster.h"
 #include "core/paths/differentiable.h"
 #include "core/paths/emitters.h"
+#include "core/paths/hidden_geometry.h"
 #include "core/paths/records.h"
 #include "core/paths/vertex_flow.h"
 #include "core/scene/scene.h"
 #include "core/scene/sensors/pinhole.h"
 
 namespace isochron {
+
+/// The part of a capture's first vertices that hidden geometry sampling finds, where it does not find them all.
+inline constexpr double kHiddenShare = 0.5;
 
 /// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
 class PreparedScene {
@@ -49,6 +53,11 @@ class PreparedScene {
   /// that may follow or be followed.
   Bounds moving_bounds, flowing_bounds;
   Emitters emitters;
+  /// Lights without an extent: the scene's, or the spots of a capture's laser.
+  std::vector<PointLight> lights;
+  HiddenGeometry hidden;
+  /// Whether hidden geometry sampling finds whatever a sensor point sees.
+  bool hidden_is_all = false;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -61,8 +70,43 @@ class PreparedScene {
   /// Whether its material reflects on both sides.
   bool two_sided(int triangle) const { return shapes_[shape_index(triangle)].two_sided; }
 
-  /// Radiance that leaves the point of an emitter towards the unit direction w.
+  bool captures() const { return scene.capture.has_value(); }
+  int pixels() const { return camera.pixels(); }
+  /// x0 of the paths of a pixel.
+  SurfacePoint sensor_point(int pixel) const {
+    if (!captures()) return {camera.position, {}, -1};
+    const WallPoint& s = scene.capture->sensor_of(pixel);
+    return {s.p, s.n, -1};
+  }
+  /// What a pixel makes of radiance from the unit direction w, per solid angle: of a camera, whose image holds the direction,
+  /// image area; of a capture the wall's reflection.
+  double importance(int pixel, const Vec3& w) const {
+    if (!captures()) return camera.image_area_per_solid_angle(w);
+    return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
+  }
+  /// The part of a capture's first vertices that hidden geometry sampling finds.
+  double hidden_share() const { return hidden.empty() ? 0 : hidden_is_all ? 1 : kHiddenShare; }
+  /// Density per area of x1, which the sensor point sees, where Worker::start_path draws it; `received`: what the wall makes
+  /// of light from there, importance per area, which is the density of the wall's own reflection.
+  double first_vertex_pdf(const SurfacePoint& x1, double received) const {
+    const double share = hidden_share();
+    return share * (is_sought(x1.triangle) ? hidden.pdf() : 0) + (1 - share) * received;
+  }
+  /// The light that a pixel of a capture is lit by, in place of a triangle.
+  int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
+  /// Whether light that comes from x1 of a path takes the way back that x1 is seen along.
+  bool confocal() const { return captures() && scene.capture->confocal(); }
+
+  /// What multiplies the BSDF at x.
+  double paint(const SurfacePoint& x) const { return shapes_[shape_index(x.triangle)].painted ? paint_at(x) : 1; }
+  bool painted(int triangle) const { return shapes_[shape_index(triangle)].painted; }
+  /// Its gradient along the surface.
+  Vec3 paint_gradient(const SurfacePoint& x) const;
+
+  /// Radiance that leaves the point of an emitter towards the unit direction w; of a light without an extent radiant
+  /// intensity.
   Rgb emitted(const SurfacePoint& x, const Vec3& w) const {
+    if (is_light(x.triangle)) return lights[light_number(x.triangle)].towards(w);
     return shapes_[shape_index(x.triangle)].emission.towards(x.n, w);
   }
 
@@ -90,10 +134,21 @@ class PreparedScene {
   const Vec3& normal(int triangle) const { return records_[triangle].normal; }
   double area(int triangle) const { return records_[triangle].area; }
   bool emits(int triangle) const { return records_[triangle].emits; }
-  /// Whether a path through the triangle can have a derivative because of it.
-  bool has_gradient(int triangle) const { return records_[triangle].has_gradient; }
-  /// Whether one of its vertices moves.
-  bool has_moving_vertex(int triangle) const { return records_[triangle].moving_corners != 0; }
+  /// Whether a path through the triangle, or to the light in its place, can have a derivative because of it.
+  bool has_gradient(int triangle) const {
+    return triangle >= 0 ? records_[triangle].has_gradient
+                         : differentiable.every_path || (is_light(triangle) && light_changes(triangle));
+  }
+  /// Whether one of its vertices, or the light in its place, moves.
+  bool has_moving_vertex(int triangle) const {
+    return triangle >= 0 ? records_[triangle].moving_corners != 0 : is_light(triangle) && light_changes(triangle);
+  }
+  /// Whether the light in a triangle's place can have a derivative.
+  bool light_changes(int triangle) const {
+    const std::size_t i = light_number(triangle);
+    return i < differentiable.light.size() && differentiable.light[i];
+  }
+  bool is_sought(int triangle) const { return records_[triangle].sought; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
   void for_each_moving_corner(int triangle, F&& f) const {
@@ -102,7 +157,7 @@ class PreparedScene {
       if (r.moving_corners >> i & 1) f(i, r.vertex[i]);
   }
 
-  /// A point of an emitter, in proportion to area x radiance; `pdf` per area.
+  /// A point of an emitter, in proportion to area x radiance; `pdf` per area, or of a light without an extent a probability.
   SurfacePoint sample_emitter(double u0, double u1, double u2, double& pdf) const {
     const int t = pick_emitter(u0);
     pdf = emitter_pdf(t);
@@ -112,17 +167,33 @@ class PreparedScene {
   /// Emitters::prefetch, is optional.
   int pick_emitter(double u) const {
     const int t = emitters.pick(u);
-    prefetch(t);
+    if (t >= 0) prefetch(t);
     return t;
   }
   SurfacePoint point_on_emitter(int triangle, double u1, double u2) const {
+    if (is_light(triangle)) return point_of_light(triangle);
+    return uniform_point(triangle, u1, u2);
+  }
+  SurfacePoint point_of_light(int triangle) const {
+    const PointLight& light = lights[light_number(triangle)];
+    return {light.position, light.kind == PointLight::Kind::wall ? light.direction : Vec3(), triangle};
+  }
+  SurfacePoint uniform_point(int triangle, double u1, double u2) const {
     const TriangleRecord& r = records_[triangle];
     return {r.origin + (r.edge[0] * (1 - u2) + r.edge[1] * u2) * std::sqrt(u1), r.normal, triangle};
   }
+  /// A point of hidden geometry, of density hidden.pdf().
+  SurfacePoint sample_hidden(double u0, double u1) const {
+    const int t = hidden.pick(u0);
+    return uniform_point(t, u0, u1);
+  }
   /// Asks for the triangle's record early.
   void prefetch(int triangle) const { isochron::prefetch(records_[triangle]); }
-  /// Of a triangle that emits.
-  double emitter_pdf(int triangle) const { return shapes_[shape_index(triangle)].emitter_pdf; }
+  /// Of a triangle that emits, per area; of a light without an extent, its probability. A capture's spot is certain.
+  double emitter_pdf(int triangle) const {
+    if (is_light(triangle)) return captures() ? 1 : lights[light_number(triangle)].power() / emitters.power();
+    return shapes_[shape_index(triangle)].emitter_pdf;
+  }
 
   /// Edges from corner 0 to corners 1 and 2.
   const Vec3 (&edges(int triangle) const)[2] { return records_[triangle].edge; }
@@ -207,7 +278,14 @@ class PreparedScene {
   std::vector<char> move_vertices(const std::vector<Vec3>& positions, std::vector<char>& moved_shapes);
   void update_shapes();
   void update_record(int triangle);
+  void update_lights();
   void update_emitters();
+  void update_hidden();
+  double paint_at(const SurfacePoint& x) const {
+    const auto b = barycentrics(x);
+    const auto& v = records_[x.triangle].vertex;
+    return b[0] * scene.paint[v[0]] + b[1] * scene.paint[v[1]] + b[2] * scene.paint[v[2]];
+  }
 
   LargeArray<TriangleRecord> records_;
   std::vector<int> changed_;
@@ -216,6 +294,7 @@ class PreparedScene {
   mutable std::array<std::unique_ptr<LazyHierarchy>, 3> hierarchies_;  ///< by Part
   std::vector<ShapeRecord> shapes_;
   std::vector<char> emitting_shapes_;
+  std::vector<int> sought_;  ///< triangles in spatial order
   bool has_medium_ = false;
   double least_index_ = 1;
 };

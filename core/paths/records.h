@@ -9,12 +9,24 @@
 
 namespace isochron {
 
-/// A point on a triangle.
+/// A point on a triangle, or an end of a path that lies on none: the camera or the sensor point of a capture (triangle -1), or a
+/// light without an extent.
 struct SurfacePoint {
   Vec3 p;
-  Vec3 n;  ///< unit face normal
+  Vec3 n;  ///< unit face normal; that of the wall where a capture has its points; zero of camera and lights
   int triangle = -1;
 };
+
+/// What stands in the place of the triangle at point light number i, and the other way round.
+inline int light_in_place_of_triangle(int i) {
+  return -2 - i;
+}
+inline bool is_light(int triangle) {
+  return triangle < -1;
+}
+inline int light_number(int triangle) {
+  return -2 - triangle;
+}
 
 /// What paths ask of a triangle, side by side in memory: two cache lines, the first of which decides where a ray ends and how
 /// it goes on. On a fine mesh each is a wait for main memory.
@@ -25,6 +37,7 @@ struct alignas(64) TriangleRecord {
   int shape = -1;
   bool emits = false;
   bool has_gradient = false;        ///< a path through the triangle can have a derivative
+  bool sought = false;              ///< hidden geometry sampling draws points on it
   std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
   Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
   std::array<int, 3> vertex = {};
@@ -38,6 +51,7 @@ struct ShapeRecord {
   bool two_sided = false;
   double index = 0;  ///< of refraction behind its faces; 0: opaque
   AreaEmitter emission;
+  bool painted = false;
   double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
 };
 

@@ -23,8 +23,16 @@ constexpr long long kFewestLearningRounds = 64;
 
 std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow,
                                         SceneCache* cache) {
-  if (cache) return cache->take(source, basis, follow);
-  return std::shared_ptr<ReadyScene>(new ReadyScene{PreparedScene(source, basis, follow), std::nullopt});
+  FollowOptions used = follow;
+  if (source.capture) used.radius_in_pixels = 0;  // no pixel holds x1
+  if (cache) return cache->take(source, basis, used);
+  return std::shared_ptr<ReadyScene>(new ReadyScene{PreparedScene(source, basis, used), std::nullopt});
+}
+
+/// A capture's paths find their lengths by themselves: hidden geometry sampling serves all gates at once, unless told not to.
+SamplingMix mix_of(const EstimatorOptions& options, const GateSet& gates, const Scene& source) {
+  if (source.capture && options.sampling == Sampling::automatic) return {};
+  return sampling_mix(options, gates);
 }
 
 }  // namespace
@@ -36,7 +44,7 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
       options(estimator),
       basis(tangent),
       scene(ready->scene),
-      mix(sampling_mix(estimator, gate_set)),
+      mix(mix_of(estimator, gate_set, source)),
       every_gate(gate_set),
       cache_(cache) {
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
@@ -92,7 +100,7 @@ bool Passes::interior_pairs() const {
 
 void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths,
                        const Pass& pass, Partition partition) const {
-  const double scale = 1.0 / pass.range.count(), splat_scale = scale / scene.camera.pixels();
+  const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   const ConnectionRates& used = worker.rates = share == 1 ? rates : ConnectionRates{};
   worker.ellipsoidal_share = share;
   worker.antithetic_factor = pair_gain_;
@@ -106,10 +114,11 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   const PointSet of_lengths = points.of_image(Technique::camera_lengths);
   const PointSet of_pairs = points.of_image(Technique::camera_pairs);
   for_each_pixel(partition, [&](int pixel) {
-    if (lengths.value)
+    const bool from_camera = !scene.captures();
+    if (lengths.value && from_camera)
       points.in_image(of_lengths, pixel, share * used.camera_lengths,
                       [&](Rng& rng) { camera_lengths.sample_from_camera(splat_scale / used.camera_lengths, rng); });
-    if (lengths.pairs)
+    if (lengths.pairs && from_camera)
       points.in_image(of_pairs, pixel, share * used.camera_pairs,
                       [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale / used.camera_pairs, rng); });
     const double rate = worker.pick.rate(pixel), walks = rate * used.walk;
@@ -122,23 +131,41 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
 }
 
 void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
-  const double scale = 1.0 / pass.range.count(), splat_scale = scale / scene.camera.pixels();
+  const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   PrimaryBoundary primary(worker, edges(), *guide_, mix.interior == 1);
   SecondaryBoundary secondary(worker, edges(), *guide_, mix.interior == 1);
   const double edges_rate = guide_->rate(BoundaryGuide::primary),
                borders_rate = guide_->rate(BoundaryGuide::pixel_border),
                from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
+               from_light_rate = guide_->rate(BoundaryGuide::from_light),
                from_camera_rate = guide_->rate(BoundaryGuide::from_camera);
   const SamplePoints points(pass.stream, pass.range, options.numbers);
   const PointSet of_edges = points.of_image(Technique::primary_edge);
   const PointSet of_borders = points.of_image(Technique::pixel_border);
   const PointSet of_segments = points.of_image(Technique::from_edge);
+  const PointSet of_light_edges = points.of_image(Technique::from_light);
   for_each_pixel(partition, [&](int pixel) {
+    if (scene.captures()) {
+      // Every segment serves the pixel that it is drawn for.
+      const double pick = worker.pick.rate(pixel);
+      points.in_pixel(Technique::from_edge, pixel, from_edge_rate * pick, [&](Rng& rng) {
+        secondary.sample_from_edge(pixel, scale / (from_edge_rate * pick), rng);
+      });
+      points.in_pixel(Technique::from_light, pixel, from_light_rate * pick, [&](Rng& rng) {
+        secondary.sample_from_light(pixel, scale / (from_light_rate * pick), rng);
+      });
+      points.in_pixel(Technique::from_camera, pixel, from_camera_rate * pick, [&](Rng& rng) {
+        secondary.sample_from_camera(pixel, scale / (from_camera_rate * pick), rng);
+      });
+      return;
+    }
+    points.in_image(of_light_edges, pixel, from_light_rate,
+                    [&](Rng& rng) { secondary.sample_from_light(0, splat_scale / from_light_rate, rng); });
     points.in_image(of_edges, pixel, edges_rate, [&](Rng& rng) { primary.sample(splat_scale / edges_rate, rng); });
     points.in_image(of_borders, pixel, borders_rate,
                     [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
     points.in_image(of_segments, pixel, from_edge_rate,
-                    [&](Rng& rng) { secondary.sample_from_edge(splat_scale / from_edge_rate, rng); });
+                    [&](Rng& rng) { secondary.sample_from_edge(0, splat_scale / from_edge_rate, rng); });
     const double rate = from_camera_rate * worker.pick.rate(pixel);
     points.in_pixel(Technique::from_camera, pixel, rate,
                     [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / rate, rng); });
@@ -152,16 +179,19 @@ void Passes::learn() const {
   else
     ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->crossing() : nullptr);
   Guide::Each<bool> possible;
-  possible[Guide::primary] = edges().has_primary();
+  const bool captures = scene.captures(), secondary_edges = edges().has_secondary();
+  possible[Guide::primary] = edges().has_primary() && !captures;
   possible[Guide::pixel_border] = scene.flows.camera_possible();
-  possible[Guide::from_edge] = edges().has_secondary();
-  possible[Guide::from_camera] = edges().has_secondary() && options.boundary.from_camera;
+  possible[Guide::from_edge] = secondary_edges && (!captures || options.max_bounces > 1);
+  possible[Guide::from_light] =
+      secondary_edges && !scene.lights.empty() && !(scene.confocal() && options.max_bounces == 1);
+  possible[Guide::from_camera] = secondary_edges && (options.boundary.from_camera || captures);
   const Guide& unguided = guide_.emplace(possible);
   const auto searches = std::count(possible.begin(), possible.end(), true);
   if (searches == 0) return;
   const long long rounds =
       std::llround(options.guiding_samples * scene.camera.pixels() / static_cast<double>(searches));
-  if (rounds < kFewestLearningRounds) return;
+  if (rounds < kFewestLearningRounds || captures) return;
   constexpr int kPartitions = kMostPartitions;  // their sums are few records
   std::vector<std::vector<GuideRecord>> records(kPartitions);
   std::vector<Guide::Each<double>> costs(kPartitions);
@@ -185,7 +215,8 @@ void Passes::learn() const {
       Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
       run(Guide::primary, [&] { primary.sample(splat_scale, rng); });
       run(Guide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
-      run(Guide::from_edge, [&] { secondary.sample_from_edge(splat_scale, rng); });
+      run(Guide::from_edge, [&] { secondary.sample_from_edge(0, splat_scale, rng); });
+      run(Guide::from_light, [&] { secondary.sample_from_light(0, splat_scale, rng); });
       run(Guide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
     }
     records[partition] = std::move(sink.records);

@@ -22,6 +22,39 @@ struct Renderer::Impl : Passes {
   GatedImage blank() const {
     return GatedImage(scene.camera.width, scene.camera.height, gates.size(), scene.scene.grey ? 1 : 3);
   }
+
+  /// f(pixel, background of the pixel, its degree of freedom)
+  template <class F>
+  void for_each_background(F&& f) const {
+    const Detector& detector = scene.scene.detector;
+    for (int pixel = 0; pixel < scene.pixels(); ++pixel) {
+      const int i = detector.background.size() == 1 ? 0 : scene.scene.capture->sensor_index(pixel);
+      f(pixel, detector.background[i], scene.layout.background(i));
+    }
+  }
+  void add_background(GatedImage& image) const {
+    const std::size_t values = image.data.size() / static_cast<std::size_t>(image.pixels());
+    for_each_background([&](int pixel, double background, int) {
+      for (std::size_t i = 0; background != 0 && i < values; ++i) image.data[pixel * values + i] += background;
+    });
+  }
+  /// Of the background, which counts in the interior term.
+  void add_background_derivative(std::vector<GatedImage>& images) const {
+    for_each_background([&](int pixel, double, int dof) {
+      for (int e = basis->row_begin[dof]; e < basis->row_begin[dof + 1]; ++e) {
+        GatedImage& image = images[basis->entries[e].column];
+        const std::size_t values = image.data.size() / static_cast<std::size_t>(image.pixels());
+        for (std::size_t i = 0; i < values; ++i) image.data[pixel * values + i] += basis->entries[e].coefficient;
+      }
+    });
+  }
+  void add_background_gradient(const GatedImage& adjoint, std::vector<double>& dof_gradient) const {
+    const std::size_t values = adjoint.data.size() / static_cast<std::size_t>(adjoint.pixels());
+    for_each_background([&](int pixel, double, int dof) {
+      if (!basis->differentiates(dof)) return;
+      for (std::size_t i = 0; i < values; ++i) dof_gradient[dof] += adjoint.data[pixel * values + i];
+    });
+  }
 };
 
 Renderer::Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options, const TangentBasis* basis,
@@ -51,14 +84,20 @@ bool Renderer::pixels_are_independent(Term term) const {
 
 GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   GatedImage image = impl_->blank();
-  if (impl_->scene.emitters.empty()) return image;  // no lamp, or one that the parameters have flattened
+  render_light(image, stream, range);
+  impl_->add_background(image);
+  return image;
+}
+
+void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange range) const {
+  if (impl_->scene.emitters.empty()) return;  // no lamp, or one that the parameters have flattened
   const auto run = [&](const Film& film, Partition partition) {
     PrimalSink sink(impl_->gates, film);
     impl_->run_images({stream, range}, partition, sink);
   };
   if (pixels_are_independent()) {  // partitions have no pixel in common and need no sums of their own
     parallel(kMostPartitions, [&](int partition) { run(image, {partition, kMostPartitions}); });
-    return image;
+    return;
   }
   const int partitions = impl_->partitions_for(range, image.data.size());
   const auto sum = sum_of_partitions<SparseSum>(partitions, [&](int partition) {
@@ -67,13 +106,13 @@ GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
     return own;
   });
   sum.for_each(image.data.size(), [&](std::size_t i, double value) { image.data[i] += value; });
-  return image;
 }
 
 std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, SampleRange range) const {
   if (!impl_->basis) throw std::logic_error("derive: the renderer was made without a tangent basis");
   const int columns = impl_->basis->columns;
   std::vector<GatedImage> images(columns, impl_->blank());
+  if (term == Term::interior) impl_->add_background_derivative(images);
   if (!impl_->has(term) || columns == 0) return images;
   impl_->prepare(term);
   const auto run = [&](const std::vector<Film>& films, Partition partition) {
@@ -103,6 +142,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
   const TangentBasis& basis = *impl_->basis;
   if (parts) parts->assign(kGradientParts, std::vector<double>(basis.columns, 0.0));
+  if (term == Term::interior) impl_->add_background_gradient(adjoint, dof_gradient);
   if (!impl_->has(term)) return;
   impl_->prepare(term);
   const GatePick pick(impl_->gates, adjoint);

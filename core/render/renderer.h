@@ -62,6 +62,9 @@ class Renderer {
   double work() const;
 
  private:
+  /// What is not background.
+  void render_light(GatedImage& image, const Stream& stream, SampleRange range) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

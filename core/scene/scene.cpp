@@ -7,6 +7,8 @@ namespace isochron {
 
 bool coordinates_fit(const Scene& scene) {
   return coordinates_fit(scene.camera.position) &&
+         std::all_of(scene.lights.begin(), scene.lights.end(),
+                     [](const PointLight& light) { return coordinates_fit(light.position); }) &&
          std::all_of(scene.positions.begin(), scene.positions.end(), [](const Vec3& p) { return coordinates_fit(p); });
 }
 
@@ -28,9 +30,16 @@ int Scene::find_shape(const std::string& name) const {
 int Scene::find_material(const std::string& name) const {
   return find_name(materials, name);
 }
+int Scene::find_light(const std::string& name) const {
+  return find_name(lights, name);
+}
 
 DofLayout::DofLayout(const Scene& scene)
-    : vertices(static_cast<int>(scene.positions.size())), shapes(static_cast<int>(scene.shapes.size())) {
+    : vertices(static_cast<int>(scene.positions.size())),
+      shapes(static_cast<int>(scene.shapes.size())),
+      painted(static_cast<int>(scene.paint.size())),
+      lights(static_cast<int>(scene.lights.size())),
+      backgrounds(static_cast<int>(scene.detector.background.size())) {
   first_number.push_back(3 * vertices);
   for (const Material& material : scene.materials) first_number.push_back(first_number.back() + material.numbers());
 }

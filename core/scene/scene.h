@@ -1,13 +1,16 @@
 // The scene as the user describes it: what the loader fills, what parameters move, what the renderer prepares from.
 #pragma once
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/base/vec.h"
 #include "core/scene/coordinates.h"
 #include "core/scene/emitters/area.h"
+#include "core/scene/emitters/point.h"
 #include "core/scene/materials/material.h"
+#include "core/scene/sensors/capture.h"
 #include "core/scene/sensors/pinhole.h"
 
 namespace isochron {
@@ -36,28 +39,49 @@ struct Shape {
   int first_vertex = 0, vertex_count = 0;
   int first_triangle = 0, triangle_count = 0;
   bool deforms = false;  ///< parameters may move its vertices otherwise than as a rigid body
+  bool painted = false;  ///< what Scene::paint says multiplies its material's BSDF
+  bool sought = false;   ///< paths are led to it directly, see HiddenGeometry
+};
+
+/// What becomes of the light that a pixel receives: a reading is gain x light + background.
+struct Detector {
+  double gain = 1;
+  std::vector<double> background{0};  ///< of every pixel, or one for each sensor point of a capture
+  double time_offset = 0;             ///< light is counted later by it: as if paths were longer; scene units
+
+  double background_of(const std::optional<Capture>& capture, int pixel) const {
+    return background.size() == 1 ? background[0] : background[capture->sensor_index(pixel)];
+  }
+  bool operator==(const Detector&) const = default;
 };
 
 struct Scene {
+  /// Of a capture only its size, in pixels, and its place, amid the sensor points, count.
   Camera camera;
+  std::optional<Capture> capture;  ///< in place of the camera
+  Detector detector;
+  std::vector<PointLight> lights;
   std::vector<Material> materials;
   std::vector<Shape> shapes;
   std::vector<Vec3> positions;  ///< welded per shape: vertices of one shape at one position are one vertex
+  std::vector<double> paint;    ///< per vertex, linear over triangles; empty: no shape is painted
   std::vector<Triangle> triangles;
   std::vector<Edge> edges;
   bool grey = true;  ///< every albedo, reflectance and emission in the file was given as a single number
 
   int find_shape(const std::string& name) const;     ///< -1 when there is none
   int find_material(const std::string& name) const;  ///< -1 when there is none
+  int find_light(const std::string& name) const;     ///< -1 when there is none
 };
 
-/// Of the camera and all vertices.
+/// Of the camera, lights and all vertices.
 bool coordinates_fit(const Scene& scene);
 
 /// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then those of
-/// each material (Bsdf::quantities), then three per shape (emission r g b).
+/// each material (Bsdf::quantities), three per shape (emission r g b), the paint of each vertex where shapes are painted, nine
+/// per light (position, direction, intensity), and what the detector has: gain, time offset, backgrounds.
 struct DofLayout {
-  int vertices = 0, shapes = 0;
+  int vertices = 0, shapes = 0, painted = 0, lights = 0, backgrounds = 1;
   std::vector<int> first_number;  ///< of each material, and where emissions begin
   explicit DofLayout(const Scene& scene);
   int materials() const { return static_cast<int>(first_number.size()) - 1; }
@@ -65,7 +89,14 @@ struct DofLayout {
   int number(int m, int k) const { return first_number[m] + k; }
   int numbers(int m) const { return first_number[m + 1] - first_number[m]; }
   int emission(int s, int channel) const { return first_number.back() + 3 * s + channel; }
-  int size() const { return first_number.back() + 3 * shapes; }
+  int paint(int v) const { return emission(shapes, 0) + v; }
+  int light_position(int i, int axis) const { return paint(painted) + 9 * i + axis; }
+  int light_direction(int i, int axis) const { return light_position(i, 3 + axis); }
+  int light_intensity(int i, int channel) const { return light_position(i, 6 + channel); }
+  int gain() const { return light_position(lights, 0); }
+  int time_offset() const { return gain() + 1; }
+  int background(int i) const { return gain() + 2 + i; }
+  int size() const { return background(backgrounds); }
 };
 
 /// Sparse matrix d(dof)/d(column) in compressed rows: how fast each degree of freedom moves per unit of each column.

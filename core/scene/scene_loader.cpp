@@ -177,11 +177,45 @@ void describe(Keys& keys, ShapeKeys& entry, Scene& scene) {
   keys.check([&](const YamlValue&) { add_shape(entry, scene); });
 }
 
+/// The size of a capture's images, and their place amid the sensor points.
+Camera camera_of(const Capture& capture) {
+  Camera camera;
+  camera.width = capture.columns;
+  camera.height = capture.image_rows();
+  Vec3 sum;
+  for (const WallPoint& s : capture.sensor) sum += s.p;
+  camera.position = sum / static_cast<double>(capture.sensor.size());
+  camera.look_at = camera.position + capture.sensor[0].n;
+  camera.up = std::abs(capture.sensor[0].n.y) < 0.9 ? Vec3{0, 1, 0} : Vec3{1, 0, 0};
+  return camera;
+}
+
+void describe_light(Keys& keys, PointLight& light, Scene& scene) {
+  const PointLight* first = scene.lights.data();
+  describe(keys, light, scene.grey);
+  keys.check([&, first](const YamlValue& value) {
+    for (const PointLight* other = first; other != &light; ++other)
+      if (other->name == light.name) value.fail("'" + light.name + "' is an earlier light's name", "names differ");
+    if (!coordinates_fit(light.position))
+      value.fail("lies too far away", fmt::format("coordinates of at most {}", kLargestCoordinate));
+  });
+}
+
 void describe(Keys& keys, Scene& scene) {
   Keys::Places places;
   keys.remember(places);
+  Capture capture;
+  keys.map("capture", [&](Keys& inner) { describe(inner, capture); },
+           "a wall that a detector looks at point by point, while a laser lights it; in place of a camera",
+           {.otherwise = "a camera"});
+  const bool captured = places.contains("capture");
+  if (captured) {
+    scene.camera = camera_of(capture);
+    scene.capture = std::move(capture);
+  }
+  const Only of_camera{!captured, "cameras", "capture"};
   keys.map("camera", [&](Keys& inner) { describe(inner, scene.camera); }, "where the images are taken",
-           {.required = true});
+           {.required = true, .only = of_camera});
   const auto material = [&](Keys& inner, const std::string& name) {
     describe(inner, scene.materials.emplace_back(material_kinds()[0]->name, name), scene.grey);
   };
@@ -191,12 +225,16 @@ void describe(Keys& keys, Scene& scene) {
   std::vector<ShapeKeys> shapes;
   keys.list("shapes", shapes, [&](Keys& inner, ShapeKeys& shape) { describe(inner, shape, scene); },
             "what the camera sees and what lights it", {.required = true});
+  keys.list("lights", scene.lights, [&](Keys& inner, PointLight& light) { describe_light(inner, light, scene); },
+            "lights without an extent", {.only = of_camera, .unset = scene.lights.empty()});
   keys.check([&](const YamlValue&) {
     const YamlValue& value = places.at("shapes");
     if (scene.shapes.empty()) value.fail("has no shape", "at least one");
-    const bool lit = std::any_of(scene.shapes.begin(), scene.shapes.end(),
-                                 [](const Shape& shape) { return shape.emission.emits(); });
-    if (!lit) value.fail("no shape emits light", "emission above 0 on at least one");
+    const bool emits = std::any_of(scene.shapes.begin(), scene.shapes.end(),
+                                   [](const Shape& shape) { return shape.emission.emits(); });
+    if (scene.capture && emits) value.fail("a shape emits light", "none does in a capture, which its laser lights alone");
+    if (!scene.capture && !emits && scene.lights.empty())
+      value.fail("no shape emits light", "emission above 0 on at least one, or `lights`");
   });
 }
 

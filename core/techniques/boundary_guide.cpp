@@ -129,6 +129,9 @@ void GuideSink::bind(const LocalDifferential& differential) {
       for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
         rate_ += column_sign(basis_.entries[i].column) * v.log_f[axis] * basis_.entries[i].coefficient;
     }
+  for (const ScalarGradient& s : differential.scalars)
+    for (int i = basis_.row_begin[s.dof]; i < basis_.row_begin[s.dof + 1]; ++i)
+      rate_ += column_sign(basis_.entries[i].column) * s.log_f * basis_.entries[i].coefficient;
 }
 
 void GuideSink::add(int pixel, const Rgb& value, double length, GateWeights) {

@@ -44,8 +44,9 @@ struct GuideRecord {
 
 class BoundaryGuide {
  public:
-  enum Technique { primary, pixel_border, from_edge, from_camera };
-  static constexpr int kTechniques = 4;
+  /// The last one has further tables.
+  enum Technique { primary, pixel_border, from_edge, from_light, from_camera };
+  static constexpr int kTechniques = 5;
 
   /// One value for each technique.
   template <class T>

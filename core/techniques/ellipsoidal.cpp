@@ -6,7 +6,7 @@
 namespace isochron {
 
 void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
-  worker_.start_at_camera(worker_.path);
+  worker_.start_at_sensor(worker_.path, 0);
   draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
   for (const TargetLength& target : targets_) {
     if (scene_.emitters.seen_by_camera) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
@@ -17,8 +17,14 @@ void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
 void EllipsoidalConnections::sample_walk(int pixel, double scale, Rng& rng) {
   const int max_bounces = worker_.options.max_bounces;
   draw_targets(pass_, worker_.gates, worker_.pick, pixel, rng, targets_);
-  if (targets_.empty() || max_bounces < 1 || !worker_.start_camera_path(pixel, rng)) return;
-  connect_along(pixel, scale, max_bounces, rng);
+  if (targets_.empty() || max_bounces < 1) return;
+  if (scene_.captures()) {
+    worker_.start_at_sensor(worker_.path, pixel);
+    for (const TargetLength& target : targets_) connect_surface(target, pixel, Rgb(scale), rng);
+    if (max_bounces == 1) return;
+  }
+  const double weight = worker_.start_path(pixel, rng);
+  if (weight > 0) connect_along(pixel, scale * weight, max_bounces, rng);
 }
 
 void EllipsoidalConnections::gather(std::span<const double> lengths, int max_bounces, Rng& rng) {
@@ -61,8 +67,9 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   const double along = rng.uniform();
   const double pick = rng.uniform(), thinning = rng.uniform();
-  double pdf_y;
-  const SurfacePoint y = scene_.sample_emitter(u0, u1, u2, pdf_y);
+  double pdf_y = 1;
+  const SurfacePoint y = scene_.captures() ? scene_.point_of_light(scene_.spot_of(pixel))
+                                           : scene_.sample_emitter(u0, u1, u2, pdf_y);
   const Path& path = worker_.path;
   const SurfacePoint& x = path.back();
   const double before = path.length.back();
@@ -73,7 +80,8 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   const Ellipsoid ellipsoids[2] = {{foci, target.tau[0] - before}, {foci, target.tau[1] - before}};
   const EllipsoidBvh& bvh =
       scene_.hierarchy(any_arc_contributes(y.triangle) ? PreparedScene::Part::all : PreparedScene::Part::moving);
-  find_candidates(bvh, {y.p, y.n, 0, 1, true}, low, high, thinning);
+  const bool has_front = length_squared(y.n) > 0;
+  find_candidates(bvh, {y.p, y.n, 0, 1, has_front}, low, high, thinning);
 
   const Rgb factor = throughput * (1 / pdf_y);
   ArcPair chosen;
@@ -89,14 +97,22 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   for (int i = 0; i < 2; ++i) {
     const ArcPoint& q = chosen.side[i];
     if (q.value.is_black()) continue;
-    const bool seen = path.size() == 1 ? worker_.visible_from_camera(q.point) : worker_.visible(x, q.point);
-    if (!seen || !worker_.visible(q.point, y)) continue;
+    if (!sees(q.point)) continue;
     worker_.path.push(scene_, q.point);
+    if (!path.retraces(y) && !worker_.visible(q.point, y)) {
+      worker_.path.pop();
+      continue;
+    }
     worker_.path.push(scene_, y);
     deliver(target, i, q, inverse_probability, &ArcDensities::surface);
     worker_.path.pop();
     worker_.path.pop();
   }
+}
+
+bool EllipsoidalConnections::sees(const SurfacePoint& q) {
+  if (worker_.path.size() == 1 && !scene_.captures()) return worker_.visible_from_camera(q);
+  return worker_.visible(worker_.path.back(), q);
 }
 
 void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low,
@@ -114,6 +130,7 @@ void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const Elli
 EllipsoidBvh::Focus EllipsoidalConnections::focus() const {
   const Path& path = worker_.path;
   const SurfacePoint& x = path.back();
+  if (path.size() == 1 && scene_.captures()) return {x.p, x.n, 0, 1, true};
   if (path.size() == 1) {
     const double cosine = scene_.camera.cos_corner;
     return {x.p, scene_.camera.forward, cosine, std::sqrt(1 - cosine * cosine), false};
@@ -147,7 +164,7 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
   for (int i = 0; i < 2; ++i) {
     const ArcPoint& y = chosen.side[i];
     if (y.value.is_black()) continue;
-    if (!(path.size() == 1 ? worker_.visible_from_camera(y.point) : worker_.visible(x, y.point))) continue;
+    if (!sees(y.point)) continue;
     worker_.path.push(scene_, y.point);
     deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
     worker_.path.pop();
@@ -191,19 +208,19 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t
   const SurfacePoint& x = path.back();
   if (!scene_.outside(x, q)) return;
   const Scattering s(x.p, q, y.p);
-  const double cos_y = -dot(y.n, s.w_i);
+  const double cos_y = is_light(y.triangle) ? 1 : -dot(y.n, s.w_i);
   if (!(cos_y > 0)) return;
   double carried = std::abs(s.cos_i * s.cos_o) * cos_y / (s.distance_i * s.distance_i * s.distance_o * s.distance_o);
-  Rgb f = scene_.bsdf_of(t).value(s);
+  Rgb f = bsdf_value(scene_, q, s);
   out.pixel = pixel;
   if (path.size() == 1) {
-    out.pixel = scene_.camera.project(q.p);
+    if (!scene_.captures()) out.pixel = scene_.camera.project(q.p);
     if (out.pixel < 0) return;
-    carried *= scene_.camera.image_area_per_solid_angle(-s.w_o);
+    carried *= scene_.importance(out.pixel, -s.w_o);
   } else {
     const Scattering at_x(path.vertex[path.size() - 2].p, x, q.p);
     carried *= std::abs(at_x.cos_i);
-    f *= scene_.bsdf_of(x.triangle).value(at_x);
+    f *= bsdf_value(scene_, x, at_x);
   }
   if (!(carried > 0) || f.is_black()) return;
   const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n);
@@ -234,7 +251,7 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, d
   } else {
     const Scattering at_x(path.vertex[path.size() - 2].p, x, y.p);
     carried *= std::abs(at_x.cos_i);
-    f = scene_.bsdf_of(x.triangle).value(at_x);
+    f = bsdf_value(scene_, x, at_x);
   }
   if (!(carried > 0) || f.is_black()) return;
   // About the foot of x in the plane, dA = r dr dphi with r the distance.

@@ -33,10 +33,10 @@ class EllipsoidalConnections {
   EllipsoidalConnections(Worker& worker, const GatePass& pass, LengthReceiver* receiver = nullptr)
       : worker_(worker), scene_(worker.scene), pass_(pass), receiver_(receiver) {}
 
-  /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`.
+  /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`. Not of captures.
   void sample_from_camera(double scale, Rng& rng);
 
-  /// One camera path through `pixel` with connections at its other vertices; contributions are scaled by `scale`.
+  /// One path from `pixel` with connections at its vertices, but not at the camera; contributions are scaled by `scale`.
   void sample_walk(int pixel, double scale, Rng& rng);
 
   /// Walks on from vertex 1 of the worker's path, which vertex 0 sees, by up to `max_bounces` scattering vertices.
@@ -62,6 +62,9 @@ class EllipsoidalConnections {
   /// Whether a connection of the worker's path to an emitter's triangle may contribute by whatever point on an arc. If not,
   /// for neither the path nor the emitter has a gradient, it does so only by points on triangles that move.
   bool any_arc_contributes(int emitter_triangle) const;
+
+  /// Whether the path's last vertex sees q.
+  bool sees(const SurfacePoint& q);
 
   void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
   void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);

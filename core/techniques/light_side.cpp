@@ -24,7 +24,7 @@ struct Visitor {
 LightSide::LightSide(Worker& worker, bool arcs)
     : worker_(worker),
       scene_(worker.scene),
-      arcs_(arcs),
+      arcs_(arcs && scene_.lights.empty()),
       path_(worker.options.max_bounces),
       connections_(worker, {}, this) {}
 
@@ -50,7 +50,7 @@ const std::vector<GatheredLight>& LightSide::gather(const SurfacePoint& towards,
     std::swap(worker_.path, path_);
   } else {
     const auto [shortest, longest] = std::ranges::minmax(before, {}, &CameraSide::length);
-    walk_standard(worker_, path_, max_bounces,
+    walk_standard(worker_, path_, before[0].pixel, max_bounces,
                   {worker_.gates.lower() - longest.length, worker_.gates.upper() - shortest.length}, rng,
                   Visitor{lights_, path_});
   }

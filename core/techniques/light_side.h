@@ -25,7 +25,7 @@ struct CameraSide {
 
 class LightSide final : private LengthReceiver {
  public:
-  /// `arcs`: by ellipsoidal connections.
+  /// `arcs`: by ellipsoidal connections, which need emitters with an extent.
   LightSide(Worker& worker, bool arcs);
   LightSide(const LightSide&) = delete;
   LightSide& operator=(const LightSide&) = delete;

@@ -19,7 +19,8 @@ enum class Technique : std::uint32_t {
   primary_edge,
   pixel_border,
   from_edge,
-  from_camera
+  from_camera,
+  from_light
 };
 
 /// One set of points, to be visited in parts.

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace isochron {
 namespace {
 
+constexpr double kOnlyFromCamera = std::numeric_limits<double>::infinity();
 constexpr double kTowardsCamera = 32;  // rays within 1 / 32 of a touched surface miss it
 
 /// Where the line from D through an edge meets an emitter's plane: D + p (height / -(n.p)), p = a + s c.
@@ -41,7 +43,7 @@ SecondaryBoundary::SecondaryBoundary(Worker& worker, const BoundaryEdges& edges,
       techniques_(worker.options.boundary),
       at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
       camera_over_edge_rate_(guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)),
-      aimed_share_(techniques_.aimed ? 0.5 : 0),
+      aimed_share_(techniques_.aimed && scene_.emitters.have_extent ? 0.5 : 0),
       light_side_(worker, narrow_gates && techniques_.light_arcs) {}
 
 bool SecondaryBoundary::Segment::orient() {
@@ -57,7 +59,7 @@ Vec3 SecondaryBoundary::Segment::offset_ray_origin(double offset) const {
   return y.y - n_b * (side * offset) - w * (kTowardsCamera * offset);
 }
 
-void SecondaryBoundary::sample_from_edge(double scale, Rng& rng) {
+void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
   Segment g;
   const double x = edge_warp().sample(rng.uniform());
   g.y = edges_.sample_secondary(x);
@@ -66,6 +68,7 @@ void SecondaryBoundary::sample_from_edge(double scale, Rng& rng) {
   if (pick < aimed_share_) {
     double pdf;
     const SurfacePoint target = scene_.sample_emitter(u0, u1, u2, pdf);
+    if (is_light(target.triangle)) return;  // see sample_from_light
     g.w = normalize(target.p - g.y.y);
     aimed_at = target.triangle;
   } else {
@@ -75,27 +78,57 @@ void SecondaryBoundary::sample_from_edge(double scale, Rng& rng) {
   const bool may_end_flowing = g.y.edge->moves || may_meet_flowing(g, -g.w);
   if (!(may_end_flowing || may_meet_flowing(g, g.w)) || !find_light_end(g)) return;
   if (aimed_at >= 0 && g.light.triangle != aimed_at) return;
-  if (!(may_end_flowing || may_flow(g.light))) return;
-  ++worker_.rays;
-  const int t = scene_.caster.closest_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
-  if (t < 0 || !faces(t, g.w)) return;
-  g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
-  g.r_d = length(g.camera_end.p - g.y.y);
-  if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return;
+  if (!(may_end_flowing || may_flow(g.light)) || !find_camera_end(g)) return;
 
   connections_.clear();
-  walk_to_camera(g, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
+  walk_to_camera(g, pixel, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
   finish(g, Found::from_edge, rng);
   worker_.sink.note_guide(BoundaryGuide::table(BoundaryGuide::from_edge), x);
+}
+
+void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
+  Segment g;
+  const int table = BoundaryGuide::table(BoundaryGuide::from_light);
+  const double x = guide_.warp(table).sample(rng.uniform());
+  g.y = edges_.sample_secondary(x);
+  const int count = static_cast<int>(scene_.lights.size());
+  const int light = scene_.captures()
+                        ? scene_.spot_of(pixel)
+                        : light_in_place_of_triangle(std::min(static_cast<int>(rng.uniform() * count), count - 1));
+  g.light = scene_.point_of_light(light);
+  const Vec3 d = g.light.p - g.y.y;
+  g.r_s = length(d);
+  if (!(g.r_s > 0)) return;
+  g.w = d / g.r_s;
+  const Rgb intensity = scene_.emitted(g.light, -g.w);
+  if (intensity.is_black() || !g.orient()) return;
+  if (!(g.y.edge->moves || may_flow(g.light) || may_meet_flowing(g, -g.w)) || !find_camera_end(g)) return;
+  ++worker_.rays;
+  if (scene_.caster.occluded(scene_.offset_ray_origin(g.light, -g.w), g.offset_ray_origin(scene_.caster.offset()))) return;
+
+  connections_.clear();
+  const double lights = scene_.captures() ? 1 : count;
+  walk_to_camera(g, pixel, scale * lights * g.sine / (g.r_s * g.r_s * g.y.pdf * guide_.warp(table).density(x)), rng);
+  light_of_end_ = {intensity, 0, 0, -1};
+  finish(g, Found::from_light, rng);
+  worker_.sink.note_guide(table, x);
 }
 
 void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
   // Each edge is drawn, and so prefetched, before the ray is traced to the vertex that needs it.
   BoundaryEdges::Pick pick = pick_from_camera(pixel, 1, rng);
-  if (!worker_.start_camera_path(pixel, rng)) return;
+  if (scene_.captures()) {
+    worker_.start_at_sensor(worker_.path, pixel);
+    connect_edge(pixel, Rgb(scale), pick, rng);
+    if (worker_.options.max_bounces == 1) return;
+    pick = pick_from_camera(pixel, 1, rng);
+  }
+  const double weight = worker_.start_path(pixel, rng);
+  if (weight == 0) return;
   Path& path = worker_.path;
   camera_densities_ = {};
   Rgb throughput(1.0);
+  scale *= weight;
   double tau = 0;
   if (at_length_) {
     const double gate_pick = rng.uniform(), u = rng.uniform();
@@ -147,6 +180,15 @@ bool SecondaryBoundary::find_light_end(Segment& g) {
   return true;
 }
 
+bool SecondaryBoundary::find_camera_end(Segment& g) {
+  ++worker_.rays;
+  const int t = scene_.caster.closest_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
+  if (t < 0 || !faces(t, g.w)) return false;
+  g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
+  g.r_d = length(g.camera_end.p - g.y.y);
+  return differentiate(g) || may_flow(g.camera_end) || may_flow(g.light);
+}
+
 bool SecondaryBoundary::differentiate(const Segment& g) {
   const Vec3 b = g.n_b * g.side;
   LocalDifferential& common = camera_flow_;
@@ -155,18 +197,20 @@ bool SecondaryBoundary::differentiate(const Segment& g) {
   const double whole = g.r_s + g.r_d;
   add_material_flow(scene_, g.light, b * (-g.r_d / whole), common);
   material_flow_ = common;
-  add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), camera_flow_);
+  if (g.camera_end.triangle >= 0) add_pixel_flow(scene_, g.camera_end, b * (-g.r_s / whole), camera_flow_);
   add_material_flow(scene_, g.camera_end, b * (-g.r_s / whole), material_flow_);
   return !camera_flow_.empty() || !material_flow_.empty();
 }
 
 const LocalDifferential& SecondaryBoundary::with_following(const Segment& g, const Connection& c,
                                                            const SurfacePoint& next) {
-  const int k = c.bounces;
+  // x1 that no pixel holds is a vertex like the others.
+  const int k = c.bounces + (scene_.captures() ? 1 : 0);
   const bool has_before = c.before.triangle >= 0, has_next = next.triangle >= 0;
   const VertexFlows& flows = scene_.flows;
-  const LocalDifferential& base = k == 1 ? camera_flow_ : material_flow_;
-  const auto along = flows.pair(scene_, g.camera_end, g.light, k);
+  const LocalDifferential& base = flow_of(c);
+  const bool both = g.camera_end.triangle >= 0 && g.light.triangle >= 0;
+  const auto along = both ? flows.pair(scene_, g.camera_end, g.light, k) : VertexFlows::Pair{};
   const auto before = has_before ? flows.pair(scene_, c.before, g.camera_end, k - 1) : VertexFlows::Pair{};
   const auto after = has_next ? flows.pair(scene_, g.light, next, k + 1) : VertexFlows::Pair{};
   const VertexFlow of_d = VertexFlows::at(before, along, k), of_s = VertexFlows::at(along, after, k + 1);
@@ -189,20 +233,22 @@ double SecondaryBoundary::back(const SurfacePoint& before, const SurfacePoint& x
 double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint& x1, int k, int pixel,
                                            const WalkDensities& walk) const {
   if (!techniques_.from_camera) return 0;
-  const Vec3& eye = scene_.camera.position;
-  const double by_camera = camera_over_edge_rate_ * worker_.pick.rate(pixel) * camera_warp(pixel, k).density(g.y.x()) /
-                           edge_warp().density(g.y.x()) *
-                           scene_.camera.image_area_per_solid_angle(normalize(x1.p - eye)) *
-                           solid_angle_to_area(eye, x1) / scene_.camera.pixels() * walk.towards_light;
+  const Vec3 eye = scene_.sensor_point(pixel).p;
+  const double received = scene_.importance(pixel, normalize(x1.p - eye)) * solid_angle_to_area(eye, x1);
+  // Segments from an edge serve all pixels of a camera, but one of a capture.
+  const double found = scene_.captures() ? scene_.first_vertex_pdf(x1, received)
+                                         : worker_.pick.rate(pixel) * received / scene_.pixels();
+  const double by_camera = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) /
+                           edge_warp().density(g.y.x()) * found * walk.towards_light;
   const double by_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, g.camera_end) * walk.towards_camera;
   // Within round-off of the next vertex a path may seem impossible both ways.
   return by_camera > 0 ? by_camera / by_edge : 0;
 }
 
-void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng) {
-  const CameraModel& camera = scene_.camera;
-  SurfacePoint eye;
-  eye.p = camera.position;
+void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng) {
+  const bool captures = scene_.captures();
+  const SurfacePoint eye = scene_.sensor_point(of_pixel);
+  const double extra = captures ? scene_.scene.capture->extra_length(of_pixel) : 0;
   Rgb throughput(1.0);
   walk_.assign(1, g.camera_end);
   WalkDensities densities;
@@ -210,18 +256,20 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
   double walked = 0;
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
     const SurfacePoint x = walk_.back();
-    const Vec3 to_camera = camera.position - x.p;
+    const Vec3 to_camera = eye.p - x.p;
     const double distance = length(to_camera);
-    if (const int pixel = camera.project(x.p); pixel >= 0) {
+    // Light that takes the way back that it is seen along has one boundary, which is found from the camera's side.
+    const bool retraces = bounce == 1 && is_light(g.light.triangle) && g.light.p == eye.p;
+    if (const int pixel = captures ? of_pixel : scene_.camera.project(x.p); pixel >= 0 && !retraces) {
       const Vec3 w_o = to_camera / distance;
-      const Rgb f = scene_.bsdf_of(x.triangle).value({x.n, from, w_o, dot(x.n, from), dot(x.n, w_o), dot(from, w_o)});
+      const Rgb f = bsdf_value(scene_, x, {x.n, from, w_o, dot(x.n, from), dot(x.n, w_o), dot(from, w_o)});
       // Zero for a face seen edge-on, which has no flow along the pixel's ray either.
-      const double importance = camera.image_area_per_solid_angle(-w_o) * solid_angle_to_area(camera.position, x);
-      if (!f.is_black() && importance > 0 && worker_.visible_from_camera(x)) {
+      const double importance = scene_.importance(pixel, -w_o) * solid_angle_to_area(eye.p, x);
+      if (!f.is_black() && importance > 0 && (captures ? worker_.visible(eye, x) : worker_.visible_from_camera(x))) {
         WalkDensities all = densities;
         if (bounce > 1) all.towards_light *= towards(eye, x, walk_[bounce - 2]);
         connections_.push_back({pixel, bounce, throughput * f * (importance * scale),
-                                walked + distance * scene_.index_between(x, eye),
+                                extra + walked + distance * scene_.index_between(x, eye),
                                 camera_over_edge(g, x, bounce, pixel, all), bounce > 1 ? walk_[1] : SurfacePoint{}});
       }
     }
@@ -230,8 +278,8 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, double scale, Rng& rng)
     if (!next) return;
     from = -next->direction;
     walked += length(next->point.p - x.p) * scene_.index_between(x, next->point);
-    const double others = g.r_d + g.r_s + length(next->point.p - camera.position);
-    if (walked + others * scene_.least_index() > worker_.gates.upper()) return;
+    const double others = g.r_d + g.r_s + length(next->point.p - eye.p);
+    if (extra + walked + others * scene_.least_index() > worker_.gates.upper()) return;
     densities.towards_camera *= next->pdf * solid_angle_to_area(x.p, next->point);
     if (bounce > 1) densities.towards_light *= towards(next->point, x, walk_[bounce - 2]);
     walk_.push_back(next->point);
@@ -253,6 +301,7 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
   const double u_edge = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   double pdf_area;
   const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
+  if (is_light(emitter)) return;
   Segment g;
   const int table = camera_table(pixel, worker_.path.size() - 1);
   g.y = edges_.sample_secondary(guide_.warp(table).sample(u_edge));
@@ -304,8 +353,13 @@ bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throu
   if (!(g.r_d > 0)) return false;
   g.w = d / g.r_d;
   const int k = path.size() - 1;
-  const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
-  const Rgb f = scene_.bsdf_of(g.camera_end.triangle).value(s);
+  Rgb f;  // with the cosine
+  if (k == 0) {
+    f = Rgb(scene_.importance(pixel, g.w));
+  } else {
+    const Scattering s(path.vertex[k - 1].p, g.camera_end, g.y.y);
+    f = bsdf_value(scene_, g.camera_end, s) * std::abs(s.cos_i);
+  }
   if (f.is_black() || !g.orient()) return false;
   if (!(g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
   if (!find_light_end(g)) return false;
@@ -315,10 +369,10 @@ bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throu
     return false;
   WalkDensities densities = camera_densities_;
   if (k > 1) densities.towards_camera *= back(path.vertex[k - 1], g.camera_end, g.y.y);
-  const double factor = g.sine * std::abs(s.cos_i) / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x()));
-  connections_.assign(
-      1, {pixel, k, throughput * f * factor, path.length.back(),
-          camera_over_edge(g, path.vertex[1], k, pixel, densities), k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
+  const double factor = g.sine / (g.r_d * g.r_d * g.y.pdf * camera_warp(pixel, k).density(g.y.x()));
+  const double over_edge = k == 0 ? kOnlyFromCamera : camera_over_edge(g, path.vertex[1], k, pixel, densities);
+  connections_.assign(1, {pixel, k, throughput * f * factor, path.length.back(), over_edge,
+                          k > 1 ? path.vertex[k - 1] : SurfacePoint{}});
   return true;
 }
 
@@ -331,13 +385,16 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
     fewest = std::min(fewest, c.bounces);
     before_.push_back({c.pixel, c.length + length});
   }
-  const auto& lights = light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng);
+  const std::span<const GatheredLight> lights =
+      found == Found::from_light
+          ? std::span(&light_of_end_, 1)
+          : std::span(light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng));
   const bool may_follow = scene_.flows.possible_at(g.camera_end.p) || scene_.flows.possible_at(g.light.p) ||
                           scene_.flows.camera_possible_at(g.camera_end.p);
   const LocalDifferential* bound = nullptr;
   for (std::size_t i = 0; i < connections_.size(); ++i) {
     const Connection& c = connections_[i];
-    const LocalDifferential* differential = c.bounces == 1 ? &camera_flow_ : &material_flow_;
+    const LocalDifferential* differential = &flow_of(c);
     if (!may_follow && differential->empty()) continue;
     const double ratio = c.camera_over_edge;
     for (const GatheredLight& e : lights) {
@@ -347,7 +404,9 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
       if (differential->empty()) continue;
       if (may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
       const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
-      const double weight = found == Found::from_edge ? 1 / (1 + ratio * (1 + rate)) : 1 / (1 / ratio + 1 + rate);
+      const double weight = found == Found::from_light  ? 1
+                            : found == Found::from_edge ? 1 / (1 + ratio * (1 + rate))
+                                                        : 1 / (1 / ratio + 1 + rate);
       worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0]);
       worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i].length + e.length, kValueOnly);
     }

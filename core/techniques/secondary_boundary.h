@@ -6,7 +6,8 @@
 //     or a glossy surface sees;
 //   - under narrow gates, from the camera at a length drawn from the gates: y is where the shadow of a random edge, cast
 //     from D onto an emitter's plane, is at the distance that is left.
-// From the edge, the D side walks on and connects to the camera at every vertex.
+// From the edge, the D side walks on and connects to the camera at every vertex. Segments that end at a light without an
+// extent, or begin at the sensor point of a capture, are found in one way each: from an edge point, which determines them.
 #pragma once
 #include <span>
 #include <vector>
@@ -24,9 +25,13 @@ class SecondaryBoundary {
   SecondaryBoundary(Worker& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates);
 
   /// One segment from an edge; contributions are scaled by `scale` (one over the number of such segments).
-  void sample_from_edge(double scale, Rng& rng);
+  /// `pixel`: which it serves in a capture; a camera's lands on any.
+  void sample_from_edge(int pixel, double scale, Rng& rng);
 
-  /// One camera path through `pixel`, with a random edge point at each of its vertices.
+  /// One segment from an edge to a light without an extent, likewise. There must be such lights.
+  void sample_from_light(int pixel, double scale, Rng& rng);
+
+  /// One camera path through `pixel`, with a random edge point at each of its vertices; of a capture also at the sensor point.
   void sample_from_camera(int pixel, double scale, Rng& rng);
 
  private:
@@ -55,7 +60,7 @@ class SecondaryBoundary {
     double camera_over_edge;  ///< density of finding the segment from the camera over that from the edge
     SurfacePoint before;      ///< the vertex before D; none (triangle -1) where D is x1
   };
-  enum class Found { from_edge, from_camera };
+  enum class Found { from_edge, from_camera, from_light };
 
   const Warp& edge_warp() const { return guide_.warp(BoundaryGuide::table(BoundaryGuide::from_edge)); }
   /// Of D at vertex `bounces` of a path through the pixel.
@@ -84,6 +89,9 @@ class SecondaryBoundary {
   /// Traces from the edge point along w to S. False where there is none, or it faces away.
   bool find_light_end(Segment& g);
 
+  /// Traces from the edge point against w to D. False where there is none, it faces away, or nothing moves.
+  bool find_camera_end(Segment& g);
+
   /// The speed of the edge relative to the line that grazes it, as a linear form in vertex velocities, where D and S
   /// follow nothing; once with D as x1, once as a material point. False when nothing moves.
   bool differentiate(const Segment& g);
@@ -102,8 +110,14 @@ class SecondaryBoundary {
   /// Density of finding the segment from the camera, by a path on which D is vertex k, over that of finding it from the edge.
   double camera_over_edge(const Segment& g, const SurfacePoint& x1, int k, int pixel, const WalkDensities& walk) const;
 
-  /// Walks on from D, away from the light, and collects a connection to the camera at every vertex.
-  void walk_to_camera(const Segment& g, double scale, Rng& rng);
+  /// Of `differentiate`, by what holds D.
+  const LocalDifferential& flow_of(const Connection& c) const {
+    return c.bounces == 1 && !scene_.captures() ? camera_flow_ : material_flow_;
+  }
+
+  /// Walks on from D, away from the light, and collects a connection to the camera, or to the sensor point of the pixel, at
+  /// every vertex.
+  void walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng);
 
   /// Of an edge point for D at vertex `bounces` of a path through the pixel.
   BoundaryEdges::Pick pick_from_camera(int pixel, int bounces, Rng& rng) const;
@@ -137,6 +151,7 @@ class SecondaryBoundary {
   std::vector<SurfacePoint> walk_;
   WalkDensities camera_densities_;  ///< of the worker's path, up to its last vertex but one
   std::vector<Connection> connections_;
+  GatheredLight light_of_end_;  ///< of a segment from a light
   std::vector<CameraSide> before_;  ///< up to S, one per connection
 };
 

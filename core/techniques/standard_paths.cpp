@@ -9,10 +9,15 @@ constexpr std::size_t kCachedTriangles = 1 << 13;
 }  // namespace
 
 StandardPaths::StandardPaths(Worker& worker, bool pairs)
-    : large_(worker.scene.scene.triangles.size() > kCachedTriangles),
+    : worker_(worker),
+      large_(worker.scene.scene.triangles.size() > kCachedTriangles),
       slots_{Slot(worker, pairs), Slot(worker, pairs)} {}
 
 void StandardPaths::start(int pixel, double scale, Rng& rng) {
+  if (worker_.scene.captures()) {
+    slots_[0].run_at_wall(pixel, scale, rng);
+    return;
+  }
   if (!large_) {
     slots_[0].run(pixel, scale, rng);
     return;
@@ -34,6 +39,15 @@ void StandardPaths::finish() {
   }
 }
 
+void StandardPaths::Slot::run_at_wall(int pixel, double scale, Rng& rng) {
+  pixel_ = pixel;
+  scale_ = scale * worker_.start_path(pixel, rng);
+  if (scale_ == 0) return;
+  std::swap(path_, worker_.path);
+  walk_standard(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()}, rng,
+                Visitor{*this});
+}
+
 void StandardPaths::Slot::start(int pixel, double scale, const Rng& rng) {
   rng_ = rng;
   walk_.emplace(begin(pixel, scale, rng_));
@@ -46,7 +60,7 @@ void StandardPaths::Slot::advance() {
 StandardPaths::Slot::Walk StandardPaths::Slot::begin(int pixel, double scale, Rng& rng) {
   pixel_ = pixel;
   scale_ = scale;
-  Walk walk(worker_, path_, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()},
+  Walk walk(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()},
             Visitor{*this});
   walk.begin_at_camera(pixel, rng);
   return walk;

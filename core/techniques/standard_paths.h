@@ -29,6 +29,8 @@ class StandardPaths {
 
     /// A path from its start to its end.
     void run(int pixel, double scale, Rng& rng);
+    /// The same from a sensor point of a capture.
+    void run_at_wall(int pixel, double scale, Rng& rng);
     bool active() const { return walk_.has_value(); }
     void start(int pixel, double scale, const Rng& rng);
     void advance();
@@ -53,6 +55,7 @@ class StandardPaths {
     std::optional<Walk> walk_;
   };
 
+  Worker& worker_;
   const bool large_;
   std::array<Slot, 2> slots_;
   int next_slot_ = 0;

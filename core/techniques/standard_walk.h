@@ -21,8 +21,15 @@ struct LengthRange {
 template <class Visitor>
 class StandardWalk {
  public:
-  StandardWalk(Worker& worker, Path& path, int max_bounces, LengthRange reach, Visitor visitor)
-      : worker_(worker), path_(path), max_bounces_(max_bounces), reach_(reach), visitor_(std::move(visitor)) {}
+  /// `pixel`: whose light a capture's path ends at.
+  StandardWalk(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Visitor visitor)
+      : worker_(worker),
+        path_(path),
+        max_bounces_(max_bounces),
+        reach_(reach),
+        visitor_(std::move(visitor)),
+        light_(worker.scene.captures() ? worker.scene.spot_of(pixel) : -1),
+        light_is_given_(worker.scene.captures()) {}
 
   /// At the first surface point, the path's last vertex; next_event_and_sample() goes on.
   void begin(Rng& rng) {
@@ -36,7 +43,7 @@ class StandardWalk {
   }
   /// At the camera, with a ray through a random point of `pixel`; intersect() goes on.
   void begin_at_camera(int pixel, Rng& rng) {
-    worker_.start_at_camera(path_);
+    worker_.start_at_sensor(path_, pixel);
     const Vec3 direction = worker_.direction_through(pixel, rng);
     draw_light(rng);
     w_o_ = -direction;
@@ -54,20 +61,24 @@ class StandardWalk {
     const double u1 = rng.uniform(), u2 = rng.uniform();
     const SurfacePoint y = scene.point_on_emitter(light_, u1, u2);
     const Scattering s(x, w_o_, distance_o_, y.p);
-    const double cos_y = -dot(y.n, s.w_i);
+    const bool has_extent = !is_light(light_);
+    const double cos_y = has_extent ? -dot(y.n, s.w_i) : 1;
     if (cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {
       const Bsdf& bsdf = scene.bsdf_of(x.triangle);
-      if (const Rgb f = bsdf.value(s); !f.is_black()) {
+      if (const Rgb f = bsdf_value(scene, x, s); !f.is_black()) {
         const double to_area = cos_y / (s.distance_i * s.distance_i);
-        const double pdf_bsdf = bsdf.pdf(s) * to_area;
+        const double pdf_bsdf = has_extent ? bsdf.pdf(s) * to_area : 0;
+        const bool retraces = path_.retraces(y);
         path_.push(scene, y, s.distance_i);
-        if (visitor_.wants() && worker_.visible(x, y))
+        if (visitor_.wants() && (retraces || worker_.visible(x, y)))
           visitor_.take(throughput_ * f * scene.emitted(y, -s.w_i) *
                         (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_bsdf)));
         path_.pop();
       }
     }
 
+    // Rays meet no light without an extent.
+    if (bounce_ == max_bounces_ && !scene.emitters.have_extent) return false;
     const auto next = sample_bsdf(scene, x, w_o_, throughput_, rng);
     if (!next) return false;
     pdf_ = next->pdf;
@@ -101,10 +112,13 @@ class StandardWalk {
   /// Chooses the emitter of the next estimation in two steps, so that memory is read meanwhile: the tables that choose it
   /// are prefetched during a ray, the emitter itself before the next vertex.
   void draw_light(Rng& rng) {
+    if (light_is_given_) return;
     light_draw_ = rng.uniform();
     worker_.scene.emitters.prefetch(light_draw_);
   }
-  void pick_light() { light_ = worker_.scene.pick_emitter(light_draw_); }
+  void pick_light() {
+    if (!light_is_given_) light_ = worker_.scene.pick_emitter(light_draw_);
+  }
 
   void take_emission(double weight) {
     const SurfacePoint& x = path_.back();
@@ -123,16 +137,17 @@ class StandardWalk {
   Vec3 w_o_;        ///< unit, back along the last ray
   double distance_o_ = 0;
   double light_draw_ = 0;
-  int light_ = -1;         ///< the emitter of the next estimation
+  int light_;              ///< the emitter of the next estimation
+  const bool light_is_given_;
   int hit_triangle_ = -1;  ///< of the last ray; -1: none
   double pdf_ = 0;         ///< of the last ray's direction, per solid angle
 };
 
 /// A whole walk. Leaves the path as it was.
 template <class Visitor>
-void walk_standard(Worker& worker, Path& path, int max_bounces, LengthRange reach, Rng& rng, Visitor&& visitor) {
+void walk_standard(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Rng& rng, Visitor&& visitor) {
   const int base = path.size();
-  StandardWalk<std::remove_cvref_t<Visitor>> walk(worker, path, max_bounces, reach, std::forward<Visitor>(visitor));
+  StandardWalk<std::remove_cvref_t<Visitor>> walk(worker, path, pixel, max_bounces, reach, std::forward<Visitor>(visitor));
   walk.begin(rng);
   for (bool goes_on = max_bounces > 0; goes_on;) goes_on = walk.next_event_and_sample(rng) && walk.intersect(rng);
   while (path.size() > base) path.pop();

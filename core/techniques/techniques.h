@@ -33,6 +33,7 @@ class Techniques {
     const int last = path.size() - 1;
     const SurfacePoint& y = path.vertex[last];
     const bool by_emitter = found == &ArcDensities::emitter;
+    if (is_light(y.triangle)) return {1, 0};  // no circle goes through a point
     if (last == 1) return {0, pdf_on_arc * length_pdf(0)};
     if (walks_only && last == 2) return {0, 1};
     const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
@@ -70,7 +71,7 @@ class Techniques {
       const Vec3 d = y.p - x.p;
       const double in_plane = isochron::length_squared(d) - dot(d, q.n) * dot(d, q.n);
       const double area_rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
-      ellipsoidal = pdf_q * pick_.length_pdf(pixel, length) / across;
+      ellipsoidal = is_light(y.triangle) ? 0 : pdf_q * pick_.length_pdf(pixel, length) / across;
       if (scene_.outside(x, q))
         ellipsoidal +=
             pdf_y * (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /

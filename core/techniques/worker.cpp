@@ -13,17 +13,41 @@ Worker::Worker(const PreparedScene& prepared, const GateSet& gate_set, const Est
       differential_sink(target.differential()),
       path(estimator.max_bounces) {}
 
-void Worker::start_at_camera(Path& camera_path) const {
-  SurfacePoint eye;
-  eye.p = scene.camera.position;
-  camera_path.start(eye, 0);
+void Worker::start_at_sensor(Path& sensor_path, int pixel) const {
+  sensor_path.start(scene.sensor_point(pixel), scene.captures() ? scene.scene.capture->extra_length(pixel) : 0);
 }
 
-bool Worker::start_camera_path(int pixel, Rng& rng) {
-  start_at_camera(path);
+double Worker::start_path(int pixel, Rng& rng) {
+  start_at_sensor(path, pixel);
+  if (scene.captures()) return start_at_wall(pixel, rng);
   const auto point = trace_camera(direction_through(pixel, rng));
   if (point) path.push(scene, *point);
-  return point.has_value();
+  return point.has_value() ? 1 : 0;
+}
+
+double Worker::start_at_wall(int pixel, Rng& rng) {
+  const SurfacePoint s = path.back();
+  const double share = scene.hidden_share();
+  const bool by_area = share == 1 || (share > 0 && rng.uniform() < share);
+  const double u0 = rng.uniform(), u1 = rng.uniform();
+  SurfacePoint x;
+  if (by_area) {
+    x = scene.sample_hidden(u0, u1);
+  } else {
+    const Vec3 w = sample_cosine(s.n, u0, u1);
+    const auto hit = scene.end_point(closest_hit(s, w), s.p, w);
+    if (!hit) return 0;
+    x = *hit;
+  }
+  const Vec3 d = x.p - s.p;
+  const double r = length(d), cos_x = -dot(x.n, d);
+  if (!(r > 0) || (!(cos_x > 0) && !scene.two_sided(x.triangle) && !scene.transparent(x.triangle))) return 0;
+  const double shortest = r + length(x.p - scene.scene.capture->spot_of(pixel).p) * scene.least_index();
+  if (path.length.back() + shortest > gates.upper()) return 0;
+  const double received = scene.importance(pixel, d / r) * solid_angle_to_area(s.p, x);
+  if (!(received > 0) || (by_area && !visible(s, x))) return 0;
+  path.push(scene, x, r);
+  return received / scene.first_vertex_pdf(x, received);
 }
 
 void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use) {

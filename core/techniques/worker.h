@@ -71,10 +71,12 @@ struct Worker {
     const double u = pixel % camera.width + rng.uniform(), v = pixel / camera.width + rng.uniform();
     return camera.direction(u, v);
   }
-  /// Starts `camera_path` with the camera.
-  void start_at_camera(Path& camera_path) const;
-  /// Starts `path` with the camera and the surface point seen through a random point of the pixel.
-  bool start_camera_path(int pixel, Rng& rng);
+  /// Starts `sensor_path` with what a pixel looks from: the camera, or the sensor point of a capture.
+  void start_at_sensor(Path& sensor_path, int pixel) const;
+  /// Starts `path` with that and a surface point x1 that it sees: of a camera through a random point of the pixel, of a capture
+  /// by the reflection of the wall or by hidden geometry sampling, combined by the balance heuristic. Returns what the pixel
+  /// makes of radiance from x1, over density; 0: there is no x1.
+  double start_path(int pixel, Rng& rng);
 
   /// Whether the complete path p (last vertex on an emitter) contributes: to images always, to derivatives where it can
   /// have a gradient.
@@ -86,12 +88,21 @@ struct Worker {
   void emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use);
   /// Hands the change of its length alone to the sink, for one gate: a member of a coupled pair.
   void emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value);
+
+ private:
+  double start_at_wall(int pixel, Rng& rng);
 };
 
 struct BsdfSample {
   Vec3 direction;  ///< unit
   double pdf;      ///< per solid angle
 };
+
+/// Of the surface at x, in 1/sr.
+inline Rgb bsdf_value(const PreparedScene& scene, const SurfacePoint& x, const Directions& d) {
+  const Rgb f = scene.bsdf_of(x.triangle).value(d);
+  return scene.painted(x.triangle) ? f * scene.paint(x) : f;
+}
 
 /// Samples the direction in which a path goes on from x, reached from the direction of the unit vector w_back. `throughput` gets
 /// the BSDF's weight. Empty where the path ends.
@@ -103,6 +114,7 @@ inline std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const S
   const auto next = bsdf.sample(x.n, w_back, u0, u1, u2, mode);
   if (!next) return std::nullopt;
   throughput *= next->weight;
+  if (scene.painted(x.triangle)) throughput *= scene.paint(x);
   if (throughput.is_black()) return std::nullopt;
   return BsdfSample{next->direction, next->pdf};
 }
