@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,9 +12,16 @@ namespace isochron {
 /// permission, a folder of that name), else, as on a full disk, std::runtime_error.
 void write_file_atomically(const std::string& path, const std::string& contents);
 
+/// The same for libraries that write files themselves: `write` fills the empty file whose name it is given. What it
+/// throws is passed on, and the temporary file removed.
+void write_file_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write);
+
 /// Contents of a file. Empty where it cannot be read, with the reason in `problem`, to be put behind its name. Never
 /// waits: a named pipe or a device is refused.
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem);
+
+/// Whether `read_regular_file` would open it, for libraries that read files themselves; else the reason in `problem`.
+bool is_regular_file(const std::string& path, std::string& problem);
 
 /// FNV-1a, 64 bits, as 16 hexadecimal digits: tells files apart that were torn or edited, no protection against
 /// intent.
