@@ -63,16 +63,6 @@ bool is_fault_of_path(int error) {
   throw std::runtime_error(message);
 }
 
-/// Takes the flushed and closed temporary file for `path`, or removes it where something failed before.
-void finish(const std::string& path, const std::string& temporary, int error) {
-  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
-    fail_to_write(path, error);
-  }
-  flush_folder(path);
-}
-
 /// A descriptor of a regular file, or -1 with the reason in `problem`; its size in `size`.
 int open_regular_file(const std::string& path, std::size_t& size, std::string& problem) {
   // Without O_NONBLOCK, opening a named pipe would wait for a writer.
@@ -104,23 +94,12 @@ void write_file_atomically(const std::string& path, const std::string& contents)
   if (descriptor < 0) fail_to_write(path, errno);
   int error = write_all(descriptor, contents);
   if (::close(descriptor) != 0 && error == 0) error = errno;
-  finish(path, temporary, error);
-}
-
-void write_file_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write) {
-  std::string temporary;
-  const int descriptor = create_beside(path, temporary);
-  if (descriptor < 0) fail_to_write(path, errno);
-  try {
-    write(temporary);
-  } catch (...) {
-    ::close(descriptor);
+  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
+  if (error != 0) {
     ::unlink(temporary.c_str());
-    throw;
+    fail_to_write(path, error);
   }
-  int error = ::fsync(descriptor) == 0 ? 0 : errno;
-  if (::close(descriptor) != 0 && error == 0) error = errno;
-  finish(path, temporary, error);
+  flush_folder(path);
 }
 
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {

@@ -1,5 +1,4 @@
 #pragma once
-#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -11,10 +10,6 @@ namespace isochron {
 /// where it fails, and throws with path and reason: InputError where the path is at fault (no such folder, no
 /// permission, a folder of that name), else, as on a full disk, std::runtime_error.
 void write_file_atomically(const std::string& path, const std::string& contents);
-
-/// The same for libraries that write files themselves: `write` fills the empty file whose name it is given. What it
-/// throws is passed on, and the temporary file removed.
-void write_file_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write);
 
 /// Contents of a file. Empty where it cannot be read, with the reason in `problem`, to be put behind its name. Never
 /// waits: a named pipe or a device is refused.

@@ -315,21 +315,20 @@ CaptureFile read_capture(const std::string& file) {
 }
 
 void write_capture(const std::string& file, const CaptureFile& capture) {
+  constexpr std::size_t kHeaders = std::size_t{1} << 16;
   require_fit(capture);
   const Hdf5Scope scope;
-  write_file_atomically(file, [&](const std::string& temporary) {
-    Hdf5Writer writer(temporary, file);
-    write_counts(writer, capture.counts, capture.geometry);
-    // The names and numbers of tal's own enumerations.
-    writer.write_enumeration("H_format",
-                             {{"UNKNOWN", 0}, {"T_Sx_Sy", 1}, {"T_Lx_Ly_Sx_Sy", 2}, {"T_Si", 3}, {"T_Li_Si", 4}},
-                             capture.geometry.spots() > 1 ? 2 : 1);
-    write_geometry(writer, capture.geometry);
-    writer.write_number("delta_t", capture.delta_t);
-    writer.write_number("t_start", capture.t_start);
-    writer.write_text("scene_info", "{original_format: isochron}");
-    writer.close();
-  });
+  Hdf5Writer writer(sizeof(float) * capture.counts.data.size() + kHeaders);
+  write_counts(writer, capture.counts, capture.geometry);
+  // The names and numbers of tal's own enumerations.
+  writer.write_enumeration("H_format",
+                           {{"UNKNOWN", 0}, {"T_Sx_Sy", 1}, {"T_Lx_Ly_Sx_Sy", 2}, {"T_Si", 3}, {"T_Li_Si", 4}},
+                           capture.geometry.spots() > 1 ? 2 : 1);
+  write_geometry(writer, capture.geometry);
+  writer.write_number("delta_t", capture.delta_t);
+  writer.write_number("t_start", capture.t_start);
+  writer.write_text("scene_info", "{original_format: isochron}");
+  write_file_atomically(file, writer.image());
 }
 
 }  // namespace isochron

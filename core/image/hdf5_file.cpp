@@ -46,8 +46,8 @@ std::string last_error() {
 }
 
 // Every call of HDF5's forgets the last error: this one comes directly behind what failed.
-[[noreturn]] void fail_to_write(const std::string& file) {
-  throw std::runtime_error(file + ": cannot be written: " + last_error());
+[[noreturn]] void fail_to_write() {
+  throw std::runtime_error("HDF5: " + last_error());
 }
 
 Handle open_dataset(hid_t file, const char* name) {
@@ -74,10 +74,10 @@ Hdf5Shape shape_of(hid_t space) {
   return {sizes.begin(), sizes.end()};
 }
 
-Handle create_dataset(hid_t id, const std::string& file, const char* name, hid_t type, const Hdf5Shape& shape) {
+Handle create_dataset(hid_t id, const char* name, hid_t type, const Hdf5Shape& shape) {
   const Handle space = make_space(shape);
   const hid_t dataset = H5Dcreate2(id, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
-  if (dataset < 0) fail_to_write(file);
+  if (dataset < 0) fail_to_write();
   return Handle(dataset, H5Dclose);
 }
 
@@ -104,6 +104,8 @@ std::string to_text(const Hdf5Shape& shape) {
 }
 
 QuietHdf5::QuietHdf5() {
+  // At exit HDF5 would complain of files that were too damaged to be closed. There is nothing left to be written then.
+  H5dont_atexit();
   H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
 }
@@ -182,57 +184,60 @@ void Hdf5Reader::read_slab(const char* name, std::size_t first, std::size_t coun
     fail(fmt::format("{} cannot be read: {}", name, last_error()));
 }
 
-Hdf5Writer::Hdf5Writer(const std::string& file, std::string name) : name_(std::move(name)) {
+Hdf5Writer::Hdf5Writer(std::size_t bytes) {
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_file_locking(access, false, true);
-  id_ = H5Fcreate(file.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
-  if (id_ < 0) fail_to_write(name_);
+  H5Pset_fapl_core(access, bytes, false);
+  id_ = H5Fcreate("capture", H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  if (id_ < 0) fail_to_write();
 }
 
 Hdf5Writer::~Hdf5Writer() {
-  if (id_ >= 0) H5Fclose(id_);
+  H5Fclose(id_);
 }
 
-void Hdf5Writer::close() {
-  const herr_t done = H5Fclose(id_);
-  id_ = -1;
-  if (done < 0) fail_to_write(name_);
+std::string Hdf5Writer::image() const {
+  if (H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0) fail_to_write();
+  const ssize_t size = H5Fget_file_image(id_, nullptr, 0);
+  if (size < 0) fail_to_write();
+  std::string contents(static_cast<std::size_t>(size), '\0');
+  if (H5Fget_file_image(id_, contents.data(), contents.size()) < 0) fail_to_write();
+  return contents;
 }
 
 void Hdf5Writer::write(const char* name, const Hdf5Shape& shape, const std::vector<double>& values) {
-  const Handle dataset = create_dataset(id_, name_, name, H5T_IEEE_F64LE, shape);
-  if (H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) fail_to_write(name_);
+  const Handle dataset = create_dataset(id_, name, H5T_IEEE_F64LE, shape);
+  if (H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) fail_to_write();
 }
 
 void Hdf5Writer::write_bool(const char* name, bool value) {
   // As h5py writes NumPy's bool.
   const Handle type(H5Tenum_create(H5T_STD_I8LE), H5Tclose);
   for (const signed char member : {0, 1}) H5Tenum_insert(type, member == 0 ? "FALSE" : "TRUE", &member);
-  const Handle dataset = create_dataset(id_, name_, name, type, {});
+  const Handle dataset = create_dataset(id_, name, type, {});
   const signed char number = value ? 1 : 0;
-  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &number) < 0) fail_to_write(name_);
+  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &number) < 0) fail_to_write();
 }
 
 void Hdf5Writer::write_text(const char* name, std::string_view text) {
   const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   H5Tset_size(type, H5T_VARIABLE);
   H5Tset_cset(type, H5T_CSET_UTF8);
-  const Handle dataset = create_dataset(id_, name_, name, type, {});
+  const Handle dataset = create_dataset(id_, name, type, {});
   const std::string copy(text);
   const char* value = copy.c_str();
-  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) fail_to_write(name_);
+  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) fail_to_write();
 }
 
 void Hdf5Writer::write_enumeration(const char* name, std::initializer_list<std::pair<const char*, int>> members,
                                    int value) {
   const Handle type(H5Tenum_create(H5T_NATIVE_INT), H5Tclose);
   for (const auto& [member, number] : members) H5Tenum_insert(type, member, &number);
-  const Handle dataset = create_dataset(id_, name_, name, type, {1});
-  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) fail_to_write(name_);
+  const Handle dataset = create_dataset(id_, name, type, {1});
+  if (H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) fail_to_write();
 }
 
 void Hdf5Writer::create_floats(const char* name, const Hdf5Shape& shape) {
-  create_dataset(id_, name_, name, H5T_IEEE_F32LE, shape);
+  create_dataset(id_, name, H5T_IEEE_F32LE, shape);
 }
 
 void Hdf5Writer::write_slab(const char* name, std::size_t first, std::size_t count, const float* values) {
@@ -241,7 +246,7 @@ void Hdf5Writer::write_slab(const char* name, std::size_t first, std::size_t cou
   Hdf5Shape shape;
   const bool selected = select_slab(space, first, count, shape);
   const Handle memory = make_space(shape);
-  if (!selected || H5Dwrite(dataset, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT, values) < 0) fail_to_write(name_);
+  if (!selected || H5Dwrite(dataset, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT, values) < 0) fail_to_write();
 }
 
 }  // namespace isochron

@@ -29,7 +29,8 @@ class QuietHdf5 {
   void* data_ = nullptr;
 };
 
-/// A file to be read. All errors are InputErrors that begin with the file's name.
+/// A file to be read. All errors are InputErrors that begin with the file's name. HDF5 1.10 finds out that a file was cut
+/// off, but may crash where bytes in its headers were overwritten.
 class Hdf5Reader {
  public:
   explicit Hdf5Reader(const std::string& file);
@@ -54,11 +55,11 @@ class Hdf5Reader {
   std::int64_t id_ = -1;
 };
 
-/// A new file. Errors are std::runtime_errors: that the file can be created was seen before.
+/// A new file, made in memory: HDF5 cannot be relied on where a disk is full. What it holds is copied once, by `image`.
 class Hdf5Writer {
  public:
-  /// Overwrites `file`; `name` is what errors call it.
-  Hdf5Writer(const std::string& file, std::string name);
+  /// `bytes` is about how large the file will be.
+  explicit Hdf5Writer(std::size_t bytes);
   ~Hdf5Writer();
   Hdf5Writer(const Hdf5Writer&) = delete;
   Hdf5Writer& operator=(const Hdf5Writer&) = delete;
@@ -72,11 +73,10 @@ class Hdf5Writer {
   /// A dataset of 32-bit floats, to be filled by `write_slab`.
   void create_floats(const char* name, const Hdf5Shape& shape);
   void write_slab(const char* name, std::size_t first, std::size_t count, const float* values);
-  /// To be called last: what is still in memory may fail to be written.
-  void close();
+  /// The file's contents.
+  std::string image() const;
 
  private:
-  std::string name_;
   std::int64_t id_ = -1;
 };
 

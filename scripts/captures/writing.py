@@ -39,7 +39,8 @@ def write_response(path, offsets, values):
 def write_capture(path, counts, delta_t, t_start, points, normal, laser, original_format):
     """counts [T, Sx, Sy]; points [Sx, Sy, 3] in metres, as are the bins; laser is one point, or None: confocal."""
     grid = points if laser is None else np.asarray(laser, float).reshape(1, 1, 3)
-    with _temporary(path) as temporary, h5py.File(temporary, "w") as file:
+    # In memory: where a disk is full, HDF5 fails in ways that cannot be caught.
+    with h5py.File("capture", "w", driver="core", backing_store=False) as file:
         file.create_dataset("H", data=counts, dtype="f4", compression="gzip", shuffle=True)
         _write_enumeration(file, "H_format", H_FORMATS, "T_Sx_Sy")
         for name, xyz in (("sensor", points), ("laser", grid)):
@@ -51,3 +52,7 @@ def write_capture(path, counts, delta_t, t_start, points, normal, laser, origina
         file["t_start"] = t_start
         file["t_accounts_first_and_last_bounces"] = False
         file["scene_info"] = f"{{original_format: {original_format}}}"
+        file.flush()
+        image = file.id.get_file_image()
+    with _temporary(path) as temporary:
+        temporary.write_bytes(image)

@@ -5,8 +5,6 @@
 #include <sys/stat.h>
 
 #include <csignal>
-#include <fstream>
-#include <stdexcept>
 
 #include "tests/scene/temporary_folder.h"
 
@@ -63,25 +61,6 @@ TEST(WriteFileAtomically, FailureLeavesTheOldFileAndNothingElse) {
   EXPECT_EQ(message, folder.path("f") + ": cannot be written: File too large");
   EXPECT_EQ(folder.read("f"), "old");
   EXPECT_EQ(folder.entries(), 1);
-}
-
-TEST(WriteFileAtomically, LibrariesWriteThemselves) {
-  TemporaryFolder folder;
-  const std::string path = folder.write("f", "old");
-  const auto write = [](const std::string& temporary) { std::ofstream(temporary) << "new"; };
-  EXPECT_THROW(write_file_atomically(path,
-                                     [&](const std::string& temporary) {
-                                       write(temporary);
-                                       throw std::runtime_error("full");
-                                     }),
-               std::runtime_error);
-  EXPECT_EQ(folder.read("f"), "old");
-  EXPECT_EQ(folder.entries(), 1);
-  write_file_atomically(path, write);
-  EXPECT_EQ(folder.read("f"), "new");
-  EXPECT_EQ(folder.entries(), 1);
-  EXPECT_EQ(error_of([&] { write_file_atomically(folder.path("none/f"), write); }),
-            folder.path("none/f") + ": cannot be written: No such file or directory");
 }
 
 TEST(WriteFileAtomically, NamesPathAndReason) {
