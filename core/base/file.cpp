@@ -63,6 +63,29 @@ bool is_fault_of_path(int error) {
   throw std::runtime_error(message);
 }
 
+/// A descriptor of a regular file, or -1 with the reason in `problem`; its size in `size`.
+int open_regular_file(const std::string& path, std::size_t& size, std::string& problem) {
+  // Without O_NONBLOCK, opening a named pipe would wait for a writer.
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) {
+    problem = fmt::format("cannot be opened: {}", std::strerror(errno));
+    return -1;
+  }
+  struct stat status = {};
+  problem.clear();
+  if (::fstat(descriptor, &status) != 0) {
+    problem = fmt::format("cannot be read: {}", std::strerror(errno));
+  } else if (S_ISDIR(status.st_mode)) {
+    problem = "is a folder";
+  } else if (!S_ISREG(status.st_mode)) {
+    problem = "is a pipe or a device, not a regular file";
+  }
+  size = static_cast<std::size_t>(status.st_size);
+  if (problem.empty()) return descriptor;
+  ::close(descriptor);
+  return -1;
+}
+
 }  // namespace
 
 void write_file_atomically(const std::string& path, const std::string& contents) {
@@ -80,37 +103,31 @@ void write_file_atomically(const std::string& path, const std::string& contents)
 }
 
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {
-  // Without O_NONBLOCK, opening a named pipe would wait for a writer.
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
-  if (descriptor < 0) {
-    problem = fmt::format("cannot be opened: {}", std::strerror(errno));
-    return std::nullopt;
-  }
-  struct stat status = {};
   std::string contents;
-  problem.clear();
-  if (::fstat(descriptor, &status) != 0) {
-    problem = fmt::format("cannot be read: {}", std::strerror(errno));
-  } else if (S_ISDIR(status.st_mode)) {
-    problem = "is a folder";
-  } else if (!S_ISREG(status.st_mode)) {
-    problem = "is a pipe or a device, not a regular file";
-  } else {
-    contents.resize(static_cast<std::size_t>(status.st_size));
-    std::size_t done = 0;
-    for (;;) {  // the file may be longer than it was, or be one of /proc, which have no size
-      if (done == contents.size()) contents.resize(done + (1 << 16));
-      const ssize_t n = ::read(descriptor, contents.data() + done, contents.size() - done);
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) problem = fmt::format("cannot be read: {}", std::strerror(errno));
-      if (n <= 0) break;
-      done += static_cast<std::size_t>(n);
-    }
-    contents.resize(done);
+  std::size_t size = 0;
+  const int descriptor = open_regular_file(path, size, problem);
+  if (descriptor < 0) return std::nullopt;
+  contents.resize(size);
+  std::size_t done = 0;
+  for (;;) {  // the file may be longer than it was, or be one of /proc, which have no size
+    if (done == contents.size()) contents.resize(done + (1 << 16));
+    const ssize_t n = ::read(descriptor, contents.data() + done, contents.size() - done);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) problem = fmt::format("cannot be read: {}", std::strerror(errno));
+    if (n <= 0) break;
+    done += static_cast<std::size_t>(n);
   }
+  contents.resize(done);
   ::close(descriptor);
   if (!problem.empty()) return std::nullopt;
   return contents;
+}
+
+bool is_regular_file(const std::string& path, std::string& problem) {
+  std::size_t size = 0;
+  const int descriptor = open_regular_file(path, size, problem);
+  if (descriptor >= 0) ::close(descriptor);
+  return descriptor >= 0;
 }
 
 std::string checksum(std::string_view contents) {

@@ -15,6 +15,9 @@ void write_file_atomically(const std::string& path, const std::string& contents)
 /// waits: a named pipe or a device is refused.
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem);
 
+/// Whether `read_regular_file` would open it, for libraries that read files themselves; else the reason in `problem`.
+bool is_regular_file(const std::string& path, std::string& problem);
+
 /// FNV-1a, 64 bits, as 16 hexadecimal digits: tells files apart that were torn or edited, no protection against
 /// intent.
 std::string checksum(std::string_view contents);
