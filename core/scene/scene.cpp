@@ -44,6 +44,30 @@ DofLayout::DofLayout(const Scene& scene)
   for (const Material& material : scene.materials) first_number.push_back(first_number.back() + material.numbers());
 }
 
+void set_value(Scene& scene, int dof, double value) {
+  const DofLayout layout(scene);
+  if (dof >= layout.background(0)) {
+    scene.detector.background[dof - layout.background(0)] = value;
+  } else if (dof == layout.time_offset()) {
+    scene.detector.time_offset = value;
+  } else if (dof == layout.gain()) {
+    scene.detector.gain = value;
+  } else if (dof >= layout.light_position(0, 0)) {
+    const int i = (dof - layout.light_position(0, 0)) / 9, k = (dof - layout.light_position(0, 0)) % 9;
+    PointLight& light = scene.lights[i];
+    (k < 3 ? light.position[k] : k < 6 ? light.direction[k - 3] : light.intensity[k - 6]) = value;
+  } else if (dof >= layout.paint(0)) {
+    scene.paint[dof - layout.paint(0)] = value;
+  } else if (dof >= layout.emission(0, 0)) {
+    const int k = dof - layout.emission(0, 0);
+    scene.shapes[k / 3].emission.radiance[k % 3] = value;
+  } else {
+    int m = 0;
+    while (layout.number(m + 1, 0) <= dof) ++m;
+    scene.materials[m].set_number(dof - layout.number(m, 0), value);
+  }
+}
+
 std::vector<double> TangentBasis::transpose_apply(const std::vector<double>& dof_gradient) const {
   std::vector<double> gradient(columns, 0.0);
   for (std::size_t row = 0; row < dof_gradient.size(); ++row) {

@@ -99,6 +99,9 @@ struct DofLayout {
   int size() const { return background(backgrounds); }
 };
 
+/// Sets a degree of freedom that is no vertex's coordinate. Emissions, intensities and the like: of one channel.
+void set_value(Scene& scene, int dof, double value);
+
 /// Sparse matrix d(dof)/d(column) in compressed rows: how fast each degree of freedom moves per unit of each column.
 /// A column is one scalar unknown. Rows without entries are static. Entries of a row are sorted by column.
 struct TangentBasis {

@@ -34,7 +34,7 @@ Field selection(Selection& variable) {
 
 Field direction(ParameterSpec& spec) {
   const auto read = [&spec](const YamlValue& value) {
-    if (spec.type == ParameterType::translation || value.is_list())
+    if (spec.type != ParameterType::vertices || value.is_list())
       spec.direction = value.direction();
     else if (value.is_scalar())
       field::choice(spec.direction_kind).read(value);
@@ -91,6 +91,19 @@ Only of_materials(const ParameterSpec& spec) {
   return {spec.type == ParameterType::material, enumeration(names), type_name(spec)};
 }
 
+/// `per` makes an albedo that of a shape.
+Field per(ParameterSpec& spec) {
+  const auto choose = [&spec](const YamlValue& value) {
+    const bool albedo = spec.type == ParameterType::material;
+    if (spec.per == Per::all) return;
+    if ((spec.per == Per::vertex) != albedo)
+      value.fail(fmt::format("a {} is not given per {}", type_name(spec), name_of(spec.per)),
+                 albedo ? "all, vertex" : "all, pixel");
+    if (albedo) spec.type = ParameterType::paint;
+  };
+  return field::checked(field::choice(spec.per), choose);
+}
+
 void check_name(const YamlValue& value) {
   for (const char* reserved : {"render", "target", "initial", "final"})
     if (value.text() == reserved) value.fail(fmt::format("'{}' is the name of another output", reserved));
@@ -99,6 +112,7 @@ void check_name(const YamlValue& value) {
 }  // namespace
 
 std::string type_name(const ParameterSpec& spec) {
+  if (spec.type == ParameterType::paint) return "albedo";
   return spec.type == ParameterType::material ? spec.quantity : name_of(spec.type);
 }
 
@@ -108,7 +122,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     Only result{false, "", type_name(spec)};
     std::vector<std::string> names;
     for (const ParameterType type : types) {
-      names.push_back(name_of(type));
+      names.push_back(type == paint ? "albedo (per: vertex)" : name_of(type));
       result.here |= type == spec.type;
     }
     result.to = enumeration(names);
@@ -118,23 +132,34 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   keys.remember(spec.where);
   keys.value("name", field::checked(file_name(spec.name), check_name), "names columns and files", {.required = true});
   keys.value("type", type(spec), "what changes, in which unit", {.required = true});
-  keys.value("shape", field::text(spec.shape), "whose vertices or emission changes",
-             {.required = true, .only = of({translation, rotation, vertices, emission})});
+  const bool albedo = (spec.type == material && spec.quantity == "albedo") || spec.type == paint;
+  keys.value("per", per(spec), "how many unknowns there are",
+             {.only = {albedo || spec.type == background, "albedo and background", type_name(spec)},
+              .unset = spec.per == Per::all});
+  keys.value("light", field::text(spec.light), "which moves, turns about its position or changes; in place of a shape",
+             {.required = spec.type == intensity, .only = of({translation, rotation, intensity}), .unset = spec.light.empty()});
+  const bool of_light = !spec.light.empty();
+  Only with_shape = of({translation, rotation, vertices, emission, paint});
+  if (of_light && with_shape.here) with_shape = {false, "parameters of shapes", "one of a light"};
+  keys.value("shape", field::text(spec.shape), "whose vertices, emission or albedo changes",
+             {.required = true, .only = with_shape});
   keys.value("material", field::text(spec.material), "which changes", {.required = true, .only = of_materials(spec)});
   keys.value("selection", selection(spec.selection), "the vertices that move: by number, or inside a box of the world",
              {.only = of({translation, rotation, vertices}),
               .unset = spec.selection.kind == Selection::Kind::all,
               .otherwise = "all"});
   keys.value("direction", direction(spec), "by the parameter times this, as long as it is given",
-             {.required = true, .only = of({translation, vertices}), .unit = "scene units"});
+             {.required = true, .only = of({translation, vertices, camera_translation}), .unit = "scene units"});
   const auto check_axis = [&](const YamlValue& value) {
     if (!std::isnormal(length_squared(spec.axis)))
       value.fail("is too long or too short", "a length whose square a double can hold");
   };
   keys.value("axis", field::checked(field::direction(spec.axis), check_axis),
              "turned about by the right-hand rule; its length does not matter",
-             {.required = true, .only = of({rotation})});
-  keys.value("pivot", pivot(spec), "what the axis goes through", {.only = of({rotation}), .unit = "scene units"});
+             {.required = true, .only = of({rotation, camera_rotation})});
+  Only with_pivot = of({rotation});
+  if (of_light && with_pivot.here) with_pivot = {false, "rotations of shapes", "one of a light"};
+  keys.value("pivot", pivot(spec), "what the axis goes through", {.only = with_pivot, .unit = "scene units"});
   const auto smoothing = [&](Keys& inner) {
     inner.value("diffusion", field::non_negative(spec.diffusion),
                 "adam alone: gradients diffuse over the mesh, over about the root of this many edges; 0: not");

@@ -8,7 +8,22 @@
 
 namespace isochron {
 
-enum class ParameterType { translation, rotation, vertices, material, emission };
+enum class ParameterType {
+  translation,
+  rotation,
+  vertices,
+  material,
+  emission,
+  paint,
+  intensity,
+  gain,
+  background,
+  time_offset,
+  camera_translation,
+  camera_rotation
+};
+/// How many unknowns a parameter has that may have one for each of many things.
+enum class Per { all, vertex, pixel };
 enum class VertexDirection { fixed, normal, free };
 /// fixed: a point of the world. center, follow: a point of the shape, which earlier parameters carry along (see
 /// parameters.h); center: the mean of the positions, as loaded, of the vertices that turn.
@@ -22,13 +37,15 @@ struct Selection {
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
-/// file; those of materials and emission replace what the scene file says.
+/// file; those of materials, emission and the like replace what the scene file says.
 struct ParameterSpec {
   std::string name;
   ParameterType type = ParameterType::translation;
-  std::string shape;     ///< translation, rotation, vertices, emission
+  std::string shape;     ///< translation, rotation, vertices, emission, paint
+  std::string light;     ///< translation and rotation in place of a shape, intensity
   std::string material;  ///< material
   std::string quantity;  ///< material: which of its quantities, as `type` in the file
+  Per per = Per::all;
   Selection selection;
   VertexDirection direction_kind = VertexDirection::fixed;
   Vec3 direction;  ///< translation and fixed vertices; the value multiplies it as given (it is not normalised)
@@ -58,7 +75,20 @@ inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterTy
     {{ParameterType::translation, "translation", "along `direction`, scene units"},
      {ParameterType::rotation, "rotation", "about `axis`, degrees"},
      {ParameterType::vertices, "vertices", "each on its own, along `direction`, scene units"},
-     {ParameterType::emission, "emission", "radiance of a shape that emits"}});
+     {ParameterType::emission, "emission", "radiance of a shape that emits"},
+     {ParameterType::intensity, "intensity", "radiant intensity of a light"},
+     {ParameterType::gain, "gain", "what multiplies all readings"},
+     {ParameterType::background, "background", "what is added to every gate"},
+     {ParameterType::time_offset, "time_offset", "light is counted later by it, in the unit of the gates"},
+     {ParameterType::camera_translation, "camera_translation", "of camera or capture along `direction`, scene units"},
+     {ParameterType::camera_rotation, "camera_rotation",
+      "of camera or capture about `axis`, degrees, through the camera's position (a capture's: the mean of its points)"}});
+
+template <>
+inline constexpr auto kChoices<Per> =
+    std::to_array<Choice<Per>>({{Per::all, "all", "one unknown"},
+                                {Per::vertex, "vertex", "an albedo for each vertex of `shape`, linear over triangles"},
+                                {Per::pixel, "pixel", "a background for each sensor point of a capture"}});
 
 template <>
 inline constexpr auto kChoices<VertexDirection> =

@@ -70,58 +70,160 @@ int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, st
 
 /// What counts as one unit of the parameter where the user does not say.
 double default_scale(const ParameterSpec& spec) {
-  if (spec.type == ParameterType::rotation) return kRadian;
-  if (spec.type == ParameterType::emission) return *std::max_element(spec.initial.begin(), spec.initial.end());
+  using enum ParameterType;
+  if (spec.type == rotation || spec.type == camera_rotation) return kRadian;
+  if (spec.type == emission || spec.type == intensity || spec.type == gain)
+    return *std::max_element(spec.initial.begin(), spec.initial.end());
   return 1;
 }
 
 }  // namespace
 
-Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs)
-    : scene_(scene), motions_(scene.shapes.size()) {
+void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
+  for (const ParameterSpec& spec : specs) {
+    const int index = scene.find_shape(spec.shape);
+    if (index >= 0) scene.shapes[index].sought = true;
+    if (spec.type == ParameterType::background && spec.per == Per::pixel) {
+      if (!scene.capture) spec.fail("per", "the scene has a camera", "captures alone have backgrounds per pixel");
+      scene.detector.background.assign(scene.capture->sensor.size(), 0.0);
+    }
+    if (spec.type != ParameterType::paint || index < 0) continue;
+    Shape& shape = scene.shapes[index];
+    if (shape.painted) spec.fail("shape", "another parameter sets the albedos of '" + shape.name + "' already");
+    const Material& own = scene.materials[shape.material];
+    if (own.find("albedo") < 0 || own.kind() != std::string("diffuse"))
+      spec.fail("shape", fmt::format("the material of '{}' is {}", shape.name, own.kind()), "diffuse");
+    Material white = own;
+    white.name = shape.name + " (albedo by vertex)";
+    white.set("albedo", 1.0);
+    shape.material = static_cast<int>(scene.materials.size());
+    scene.materials.push_back(std::move(white));
+    shape.painted = true;
+    scene.paint.resize(scene.positions.size(), 1.0);
+  }
+  // Materials that parameters change count for the shapes that are made of them.
+  for (const ParameterSpec& spec : specs)
+    for (Shape& shape : scene.shapes)
+      shape.sought |= spec.type == ParameterType::material && scene.materials[shape.material].name == spec.material;
+  const bool none = std::none_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.sought; });
+  for (Shape& shape : scene.shapes) shape.sought |= none;
+}
+
+Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit)
+    : scene_(scene), motions_(scene.shapes.size()), light_motions_(scene.lights.size()) {
   for (const ParameterSpec& spec : specs) {
     int count = 1;
-    int shape = -1, material = -1;
-    const bool of_material = spec.type == ParameterType::material;
-    Quantity quantity{};
-    int first_number = -1;
-    if (of_material) {
-      material = scene.find_material(spec.material);
-      if (material < 0)
-        spec.fail("material", fmt::format("there is no material '{}' in the scene", spec.material),
-                  "allowed: " + names_of(scene.materials));
-      first_number = scene.materials[material].find(spec.quantity, &quantity);
-      if (first_number < 0)
-        spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material,
-                                          scene.materials[material].kind(), spec.quantity));
-    } else {
-      shape = scene.find_shape(spec.shape);
-      if (shape < 0)
-        spec.fail("shape", fmt::format("there is no shape '{}' in the scene", spec.shape),
-                  "allowed: " + names_of(scene.shapes));
-    }
     const int first = size();
-    if (spec.type == ParameterType::translation || spec.type == ParameterType::rotation ||
-        spec.type == ParameterType::vertices) {
-      Motion motion;
-      motion.first_component = first;
-      bind_motion(spec, motion, shape, count);
-      motions_[shape].push_back(std::move(motion));
-    } else {
-      const int numbers = of_material ? static_cast<int>(quantity.values.size()) : 3;
-      if (numbers == 3 && !scene.grey) count = 3;
-      const DofLayout layout(scene);
-      const int dof = of_material ? layout.number(material, first_number) : layout.emission(shape, 0);
-      for (const Value& other : values_)
-        if (other.dof == dof)
-          spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
-      values_.push_back({material, of_material ? first_number : shape, dof, numbers, first, count});
+    switch (spec.type) {
+      case ParameterType::translation:
+      case ParameterType::rotation:
+      case ParameterType::vertices:
+        if (spec.light.empty()) {
+          Motion motion;
+          motion.first_component = first;
+          const int shape = find_shape(spec);
+          bind_motion(spec, motion, shape, count);
+          motions_[shape].push_back(std::move(motion));
+        } else {
+          bind_light(spec, first);
+        }
+        break;
+      case ParameterType::camera_translation:
+        camera_motions_.push_back({spec.type, first, spec.direction});
+        break;
+      case ParameterType::camera_rotation:
+        camera_motions_.push_back({spec.type, first, normalize(spec.axis)});
+        break;
+      default:
+        count = bind_value(spec, first, gate_unit);
     }
-    bind_values(spec, count, quantity);
+    bind_values(spec, count);
     blocks_.push_back({spec.name, first, count, spec.scale > 0 ? spec.scale : default_scale(spec)});
     for (int i = 0; i < count; ++i)
       component_names_.push_back(count == 1 ? spec.name : fmt::format("{}[{}]", spec.name, i));
   }
+}
+
+int Parameters::find_shape(const ParameterSpec& spec) const {
+  const int shape = scene_.find_shape(spec.shape);
+  if (shape < 0)
+    spec.fail("shape", fmt::format("there is no shape '{}' in the scene", spec.shape),
+              "allowed: " + names_of(scene_.shapes));
+  return shape;
+}
+
+int Parameters::find_light(const ParameterSpec& spec) const {
+  const int light = scene_.find_light(spec.light);
+  if (light < 0)
+    spec.fail("light", fmt::format("there is no light '{}' in the scene", spec.light),
+              "allowed: " + names_of(scene_.lights));
+  return light;
+}
+
+void Parameters::bind_light(const ParameterSpec& spec, int first) {
+  const int light = find_light(spec);
+  const bool turns = spec.type == ParameterType::rotation;
+  if (turns && scene_.lights[light].kind == PointLight::Kind::point)
+    spec.fail("light", fmt::format("'{}' shines in all directions: turning it changes nothing", spec.light), "a spot");
+  if (spec.selection.kind != Selection::Kind::all) spec.fail("selection", "a light has no vertices");
+  light_motions_[light].push_back({spec.type, first, turns ? normalize(spec.axis) : spec.direction});
+}
+
+int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_unit) {
+  const DofLayout layout(scene_);
+  Value value{0, 1, first, 1};
+  const auto colour = [&](int dof) {
+    value.dof = dof;
+    value.numbers = 3;
+    value.count = scene_.grey ? 1 : 3;
+  };
+  switch (spec.type) {
+    case ParameterType::material: {
+      const int material = scene_.find_material(spec.material);
+      if (material < 0)
+        spec.fail("material", fmt::format("there is no material '{}' in the scene", spec.material),
+                  "allowed: " + names_of(scene_.materials));
+      Quantity quantity{};
+      const int number = scene_.materials[material].find(spec.quantity, &quantity);
+      if (number < 0)
+        spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material,
+                                          scene_.materials[material].kind(), spec.quantity));
+      value.dof = layout.number(material, number);
+      if (quantity.values.size() == 3) colour(value.dof);
+      break;
+    }
+    case ParameterType::emission:
+      colour(layout.emission(find_shape(spec), 0));
+      break;
+    case ParameterType::intensity:
+      colour(layout.light_intensity(find_light(spec), 0));
+      break;
+    case ParameterType::paint: {
+      const Shape& shape = scene_.shapes[find_shape(spec)];
+      value.dof = layout.paint(shape.first_vertex);
+      value.numbers = value.count = shape.vertex_count;
+      break;
+    }
+    case ParameterType::background:
+      value.dof = layout.background(0);
+      value.numbers = layout.backgrounds;
+      value.count = spec.per == Per::pixel ? layout.backgrounds : 1;
+      break;
+    case ParameterType::gain:
+      value.dof = layout.gain();
+      break;
+    case ParameterType::time_offset:
+      value.dof = layout.time_offset();
+      value.factor = gate_unit;
+      break;
+    default:
+      throw std::logic_error("no value: " + type_name(spec));
+  }
+  for (const Value& other : values_)
+    if (other.dof == value.dof)
+      spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
+  values_.push_back(value);
+  return value.count;
 }
 
 void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shape_index, int& count) {
@@ -146,7 +248,7 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
   }
 }
 
-void Parameters::bind_values(const ParameterSpec& spec, int count, const Quantity& quantity) {
+void Parameters::bind_values(const ParameterSpec& spec, int count) {
   const auto expand = [&](const std::vector<double>& values, const char* key, double missing, auto& into) {
     if (values.size() > 1 && static_cast<int>(values.size()) != count)
       spec.fail(key, fmt::format("{} values are given", values.size()),
@@ -156,14 +258,31 @@ void Parameters::bind_values(const ParameterSpec& spec, int count, const Quantit
   };
   double lowest = -kInfinity, highest = kInfinity;
   const double largest = spec.initial.empty() ? 0 : *std::max_element(spec.initial.begin(), spec.initial.end());
-  if (spec.type == ParameterType::material) {
-    const Quantity::Range range = quantity.range(largest);
+  const auto within = [&](const Quantity::Range& range) {
     lowest = range.lowest;
     highest = range.highest;
-  }
-  if (spec.type == ParameterType::emission) {
-    if (!(largest > 0)) spec.fail("initial", "is no emission", "a number above 0");
-    lowest = kLeastRelativeEmission * largest;
+  };
+  switch (spec.type) {
+    case ParameterType::material: {
+      Quantity quantity{};
+      scene_.materials[scene_.find_material(spec.material)].find(spec.quantity, &quantity);
+      within(quantity.range(largest));
+      break;
+    }
+    case ParameterType::paint:
+      within(fraction_range(largest));
+      break;
+    case ParameterType::emission:
+    case ParameterType::intensity:
+    case ParameterType::gain:
+      if (!(largest > 0)) spec.fail("initial", fmt::format("is no {}", type_name(spec)), "a number above 0");
+      lowest = kLeastRelativeEmission * largest;
+      break;
+    case ParameterType::background:
+      lowest = 0;
+      break;
+    default:
+      break;
   }
   const std::size_t first = initial_.size();
   expand(spec.initial, "initial", kUnknown, initial_);
@@ -231,14 +350,14 @@ bool Parameters::target_known() const {
 std::vector<int> Parameters::moving_shapes() const {
   std::vector<int> shapes;
   for (std::size_t s = 0; s < motions_.size(); ++s)
-    if (!motions_[s].empty()) shapes.push_back(static_cast<int>(s));
+    if (!motions_[s].empty() || !camera_motions_.empty()) shapes.push_back(static_cast<int>(s));
   return shapes;
 }
 
 Scene Parameters::apply(const std::vector<double>& theta) const {
   Scene scene = scene_;
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
-    if (motions_[s].empty()) continue;
+    if (motions_[s].empty() && camera_motions_.empty()) continue;
     const Shape& shape = scene.shapes[s];
     const std::vector<CarriedPoint> centers = pivots(static_cast<int>(s), theta);
     for (int v = 0; v < shape.vertex_count; ++v)
@@ -248,13 +367,12 @@ Scene Parameters::apply(const std::vector<double>& theta) const {
                                  std::find(motion.slot.begin(), motion.slot.end(), -1) != motion.slot.end();
   }
   for (const Value& value : values_)
-    for (int i = 0; i < value.numbers; ++i) {
-      const double t = theta[value.first_component + (value.count == 1 ? 0 : i)];
-      if (value.material >= 0)
-        scene.materials[value.material].set_number(value.index + i, t);
-      else
-        scene.shapes[value.index].emission.radiance[i] = t;
-    }
+    for (int i = 0; i < value.numbers; ++i)
+      set_value(scene, value.dof + i, value.factor * theta[value.first_component + (value.count == 1 ? 0 : i)]);
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    PointLight& light = scene.lights[i];
+    move_light(static_cast<int>(i), theta, light.position, light.direction, nullptr, nullptr);
+  }
   return scene;
 }
 
@@ -276,19 +394,33 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
   for (int v = 0; v < layout.vertices; ++v) {
     moved.clear();
     const int s = shape_of[v];
-    if (s >= 0 && !motions_[s].empty()) move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
+    if (s >= 0 && !(motions_[s].empty() && camera_motions_.empty())) move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
     for (int axis = 0; axis < 3; ++axis) {
-      for (const Moved& entry : moved)
+      for (const Moved& entry : moved)  // in the listed order within shape and camera
         if (entry.velocity[axis] != 0) basis.entries.push_back({entry.column, entry.velocity[axis]});
       end_row(layout.vertex(v, axis));
     }
   }
-  std::vector<int> column_of(layout.size() - 3 * layout.vertices, -1);
+  std::vector<std::vector<TangentBasis::Entry>> rates(layout.size() - 3 * layout.vertices);
+  const auto rates_of = [&](int dof) -> auto& { return rates[dof - 3 * layout.vertices]; };
   for (const Value& value : values_)
     for (int i = 0; i < value.numbers; ++i)
-      column_of[value.dof + i - 3 * layout.vertices] = value.first_component + (value.count == 1 ? 0 : i);
-  for (std::size_t i = 0; i < column_of.size(); ++i) {
-    if (column_of[i] >= 0) basis.entries.push_back({column_of[i], 1.0});
+      rates_of(value.dof + i).push_back({value.first_component + (value.count == 1 ? 0 : i), value.factor});
+  for (int i = 0; i < layout.lights; ++i) {
+    Vec3 position, direction;
+    std::vector<Moved> position_rate, direction_rate;
+    move_light(i, theta, position, direction, &position_rate, &direction_rate);
+    const auto add = [&](const std::vector<Moved>& all, int first_dof) {
+      for (const Moved& entry : all)
+        for (int axis = 0; axis < 3; ++axis)
+          if (entry.velocity[axis] != 0) rates_of(first_dof + axis).push_back({entry.column, entry.velocity[axis]});
+    };
+    add(position_rate, layout.light_position(i, 0));
+    add(direction_rate, layout.light_direction(i, 0));
+  }
+  for (std::size_t i = 0; i < rates.size(); ++i) {
+    std::sort(rates[i].begin(), rates[i].end(), [](const auto& a, const auto& b) { return a.column < b.column; });
+    basis.entries.insert(basis.entries.end(), rates[i].begin(), rates[i].end());
     end_row(3 * layout.vertices + static_cast<int>(i));
   }
   return basis;

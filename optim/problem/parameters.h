@@ -12,8 +12,12 @@
 // rotations, which move what is one scene unit from the axis by one scene unit; the largest initial component of an
 // emission.
 //
-// Physical bounds, always applied besides the user's: of materials as their quantities say (core/scene/materials), emission
-// at least 1e-6 of its largest initial component (so that an emitter stays one).
+// Physical bounds, always applied besides the user's: of materials as their quantities say (core/scene/materials), albedos of
+// vertices likewise, emission, intensity and gain at least 1e-6 of their largest initial component (so that an emitter stays
+// one), backgrounds at least 0.
+//
+// The camera's pose is a motion of everything else, so that all that moves is alike: with c its position and R its turn, a
+// point p goes to c_0 + R^-1 (p - c), after all else.
 #pragma once
 #include <string>
 #include <vector>
@@ -23,11 +27,15 @@
 
 namespace isochron {
 
+/// Gives the scene room for what the parameters set: backgrounds of each sensor point, paint on shapes (whose material then
+/// has an albedo of one); and marks the shapes that they change as sought (see Shape). Throws InputError where that cannot be.
+void make_room(Scene& scene, const std::vector<ParameterSpec>& specs);
+
 class Parameters {
  public:
-  /// Binds the parameters to a loaded scene, which must outlive this. Throws InputError (line and key) for a
+  /// `gate_unit`: scene units per unit of the gates' lengths. Binds the parameters to a loaded scene, which must outlive this. Throws InputError (line and key) for a
   /// shape or material that is not there, an empty selection, values of the wrong number or out of bounds.
-  Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs);
+  Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit = 1);
 
   int size() const { return static_cast<int>(component_names_.size()); }  ///< scalar unknowns
   /// NAME for a parameter of one component, else NAME[0], NAME[1], ...: vertices in the order of the
@@ -92,12 +100,17 @@ class Parameters {
     std::vector<int> slot;
     std::vector<int> carriers;  ///< of a rotation's pivot: places in the shape's list of motions, rising
   };
-  /// A parameter that is a value: a quantity of a material, or the emission of a shape.
+  /// A parameter that is a value: degrees of freedom from `dof` on, one each or all the same.
   struct Value {
-    int material;      ///< -1: emission
-    int index;         ///< the quantity's first number in its material, or the shape
-    int dof, numbers;  ///< degrees of freedom that it sets
+    int dof, numbers;
     int first_component, count;
+    double factor = 1;  ///< units of the degrees of freedom per unit of the parameter
+  };
+  /// A translation or rotation of a light or of the camera.
+  struct RigidMotion {
+    ParameterType type;
+    int first_component;
+    Vec3 direction;  ///< or unit axis
   };
   struct Moved {
     int column;
@@ -110,11 +123,16 @@ class Parameters {
     std::vector<Moved> velocity;  ///< a column at most once
   };
 
+  /// Throw InputError where there is none.
+  int find_shape(const ParameterSpec& spec) const;
+  int find_light(const ParameterSpec& spec) const;
+  void bind_light(const ParameterSpec& spec, int first);
+  /// Returns how many unknowns there are.
+  int bind_value(const ParameterSpec& spec, int first, double gate_unit);
   void bind_motion(const ParameterSpec& spec, Motion& motion, int shape, int& count);
   /// Sets the pivot in the scene as loaded, and what carries it.
   void bind_pivot(const ParameterSpec& spec, Motion& motion, int shape) const;
-  /// `quantity`: of a parameter of a material.
-  void bind_values(const ParameterSpec& spec, int count, const Quantity& quantity);
+  void bind_values(const ParameterSpec& spec, int count);
   /// Turns `p` and what `tangent`, if given, holds about the pivot.
   static void turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,
                    std::vector<Moved>* tangent);
@@ -124,8 +142,16 @@ class Parameters {
   Vec3 move(int shape, int v, const std::vector<CarriedPoint>& pivots, const std::vector<double>& theta,
             std::vector<Moved>* tangent) const;
 
+  /// Where the light is and what it points to at theta, and how fast, for every column.
+  void move_light(int light, const std::vector<double>& theta, Vec3& position, Vec3& direction,
+                  std::vector<Moved>* position_rate, std::vector<Moved>* direction_rate) const;
+  /// Moves a point, or only turns a direction, as the camera's motions make everything else move.
+  void view(const std::vector<double>& theta, bool is_point, Vec3& p, std::vector<Moved>* tangent) const;
+
   const Scene& scene_;
   std::vector<std::vector<Motion>> motions_;  ///< per shape, in the listed order
+  std::vector<std::vector<RigidMotion>> light_motions_;  ///< per light, likewise
+  std::vector<RigidMotion> camera_motions_;
   std::vector<Value> values_;
   std::vector<Block> blocks_;
   std::vector<std::string> component_names_;

@@ -102,7 +102,52 @@ Vec3 Parameters::move(int shape_index, int v, const std::vector<CarriedPoint>& p
       add(motion.first_component + slot, normal ? motion.normals[slot] : motion.direction);
     }
   }
+  view(theta, true, p, tangent);
+  if (tangent && !camera_motions_.empty())
+    std::sort(tangent->begin(), tangent->end(), [](const Moved& a, const Moved& b) { return a.column < b.column; });
   return p;
+}
+
+void Parameters::move_light(int light, const std::vector<double>& theta, Vec3& position, Vec3& direction,
+                            std::vector<Moved>* position_rate, std::vector<Moved>* direction_rate) const {
+  position = scene_.lights[light].position;
+  direction = scene_.lights[light].direction;
+  for (const RigidMotion& motion : light_motions_[light]) {
+    const double t = theta[motion.first_component];
+    if (motion.type == ParameterType::translation) {
+      position += t * motion.direction;
+      if (position_rate) position_rate->push_back({motion.first_component, motion.direction});
+      continue;
+    }
+    direction = rotate(direction, motion.direction, t * kDegree);
+    if (!direction_rate) continue;
+    for (Moved& earlier : *direction_rate) earlier.velocity = rotate(earlier.velocity, motion.direction, t * kDegree);
+    direction_rate->push_back({motion.first_component, kDegree * cross(motion.direction, direction)});
+  }
+  view(theta, true, position, position_rate);
+  view(theta, false, direction, direction_rate);
+}
+
+void Parameters::view(const std::vector<double>& theta, bool is_point, Vec3& p, std::vector<Moved>* tangent) const {
+  if (camera_motions_.empty()) return;
+  const Vec3& home = scene_.camera.position;
+  if (is_point) {
+    p -= home;
+    for (const RigidMotion& motion : camera_motions_) {
+      if (motion.type != ParameterType::camera_translation) continue;
+      p -= theta[motion.first_component] * motion.direction;
+      if (tangent) tangent->push_back({motion.first_component, -motion.direction});
+    }
+  }
+  for (auto motion = camera_motions_.rbegin(); motion != camera_motions_.rend(); ++motion) {
+    if (motion->type != ParameterType::camera_rotation) continue;
+    const double radians = -theta[motion->first_component] * kDegree;
+    p = rotate(p, motion->direction, radians);
+    if (!tangent) continue;
+    for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, motion->direction, radians);
+    tangent->push_back({motion->first_component, -kDegree * cross(motion->direction, p)});
+  }
+  if (is_point) p += home;
 }
 
 }  // namespace isochron

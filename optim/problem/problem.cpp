@@ -17,7 +17,10 @@ namespace {
 
 Scene load_scene_at(const Experiment& experiment) {
   Scene scene = load_scene(experiment.scene);
+  make_room(scene, experiment.parameters);
   if (experiment.resolution[0] > 0) {
+    if (scene.capture)
+      throw InputError(experiment.file + ": resolution: belongs to cameras; a capture has its sensor's grid");
     scene.camera.width = experiment.resolution[0];
     scene.camera.height = experiment.resolution[1];
   }
@@ -80,7 +83,7 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     : experiment_(std::move(experiment)),
       scene_(load_scene_at(experiment_)),
       gates_(make_gates(experiment_.gates)),
-      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters)),
+      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters, length_unit(experiment_.gates))),
       cache_(std::make_unique<SceneCache>(scene_, caster_update(experiment_, scene_))),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
   for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
