@@ -154,8 +154,8 @@ TEST(GateShape, ScalesExactly) {
       EXPECT_NEAR(big.mass(), one.mass(), 1e-14);
       EXPECT_NEAR(big.width() / (s * one.width()), 1, 1e-14);
       for (const double u : {1e-9, 0.1, 0.5, 0.77, 1 - 1e-9}) {
-        const double x = one.sample(u);
-        EXPECT_NEAR(big.sample(u) / s, x, 1e-13 * one.upper());
+        const double x = one.sample(u, 0.5);
+        EXPECT_NEAR(big.sample(u, 0.5) / s, x, 1e-13 * one.upper());
         EXPECT_NEAR(big.value(s * x) * s, one.value(x), 1e-12 * one.value(0.1));
         EXPECT_NEAR(big.derivative(s * x) * s * s, one.derivative(x), 1e-12 * one.value(0.1));
       }
