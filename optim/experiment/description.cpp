@@ -124,7 +124,8 @@ void check_use_of_gates(const Experiment& experiment, const YamlValue& root) {
   if (gates.kind != "modulated") return;
   if (experiment.estimator.sampling == Sampling::ellipsoidal)
     found_at(root, {"estimator", "sampling"})
-        .fail("modulated gates let light of every length through, so that no lengths can be drawn", "auto, standard");
+        .fail("modulated gates let light of every length through, so that no lengths can be drawn",
+              "allowed: auto, standard");
   if (experiment.target.photons > 0)
     found_at(root, {"target", "noise"}).fail("readings under modulated gates may be negative, which no count is");
 }

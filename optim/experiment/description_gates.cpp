@@ -90,7 +90,7 @@ void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
   keys.kinds(
       "kind", kinds, gates.kind, [&](const std::string& kind) { gates.choose(kind); }, describe_kind,
       "path-length importance: how much light of a length counts");
-  const Only placed{gates.shape->has_centers(), "kinds that are placed one by one", gates.kind};
+  const Only placed{gates.shape->has_centers(), "every kind but steady, bins and modulated", ""};
   keys.value("centers", centers(gates.centers),
              "one per gate: lengths of whole paths, camera and light segments included",
              {.required = true, .only = placed, .unit = "`unit`"});
