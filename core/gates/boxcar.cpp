@@ -11,7 +11,7 @@ class Boxcar final : public GateDescription {
   void describe(Keys& keys, const ReadNumbers&) override {
     keys.value("width", field::positive(width_), "from end to end", {.required = true, .unit = "`unit`"});
   }
-  GateShape shape(double unit) const override { return GateShape::boxcar(unit * width_); }
+  GateShape shape(const GateUnits& units) const override { return GateShape::boxcar(units.length * width_); }
   std::shared_ptr<GateDescription> stretched(double factor) const override {
     auto copy = std::make_shared<Boxcar>(*this);
     copy->width_ *= factor;
@@ -30,7 +30,7 @@ GateShape GateShape::boxcar(double width) {
   shape.kind_ = GateKind::boxcar;
   shape.lower_ = -0.5 * width;
   shape.upper_ = 0.5 * width;
-  shape.width_ = width / std::sqrt(12.0);
+  shape.width_ = shape.detail_ = width / std::sqrt(12.0);
   shape.peak_ = 1 / width;
   shape.segments_.push_back({shape.peak_, {Side::Form::dirac, shape.lower_, 0}, {Side::Form::dirac, shape.upper_, 0}});
   shape.finish_parts();

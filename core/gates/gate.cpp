@@ -18,7 +18,7 @@ void GateShape::require_positive(double value, const char* name) {
   if (!(value > 0 && std::isfinite(value))) throw InputError(std::string(name) + " must be positive and finite");
 }
 
-double GateShape::sample(double u) const {
+double GateShape::sample(double u, double v) const {
   if (is_gaussian_inside()) {
     // Both halves of the law are read from the lower tail, where its distribution function is accurate.
     const bool upper_half = u > 0.5;
@@ -26,23 +26,19 @@ double GateShape::sample(double u) const {
     const double x = sigma_ * normal_quantile_lower(tail, -std::abs(u - 0.5) * mass_);
     return std::clamp(upper_half ? -x : x, lower_, upper_);
   }
-  if (kind_ != GateKind::tabulated) return lower_ + u * (upper_ - lower_);
-  const double target = u * cumulative_.back();
-  const auto next = std::upper_bound(cumulative_.begin(), cumulative_.end(), target);
-  const int i = std::min(static_cast<int>(next - cumulative_.begin()) - 1, last_interval_);
-  const double rest = target - cumulative_[i];
-  if (rest <= 0) return offsets_[i];
-  // Smaller root of v t + slope t^2 / 2 = rest, in the form that does not cancel.
-  const double root = std::sqrt(std::max(values_[i] * values_[i] + 2 * slopes_[i] * rest, 0.0));
-  return std::min(offsets_[i] + 2 * rest / (values_[i] + root), offsets_[i + 1]);
+  if (kind_ == GateKind::tabulated) return table_.quantile(u);
+  if (kind_ == GateKind::bin) return begin_ + v * (end_ - begin_) - table_.quantile(u);
+  return lower_ + u * (upper_ - lower_);
 }
 
-double GateShape::quantile(const Side& side, double u) {
+double GateShape::quantile(const Side& side, double u) const {
   switch (side.form) {
     case Side::Form::uniform:
       return side.from + u * (side.to - side.from);
     case Side::Form::rayleigh:
       return side.from * std::sqrt(-2 * std::log1p(-u * side.to));
+    case Side::Form::delayed:
+      return side.from - table_.quantile(u);
     case Side::Form::dirac:
       break;
   }
@@ -94,19 +90,32 @@ GateSet::GateSet(GateShape shape, std::vector<double> centers)
   std::iota(order_.begin(), order_.end(), 0);
   std::stable_sort(order_.begin(), order_.end(), [this](int a, int b) { return centers_[a] < centers_[b]; });
   for (std::size_t i = 0; i < order_.size(); ++i) sorted_[i] = centers_[order_[i]];
-  lower_ = shape_.is_steady() ? 0 : sorted_.front() + shape_.lower();
+  lower_ = shape_.is_unbounded() ? 0 : sorted_.front() + shape_.lower();
   upper_ = sorted_.back() + shape_.upper();
+  if (shape_.kind() == GateKind::bin) {
+    constexpr double kSameEdge = 1e-9;  // of a bin's width
+    const double width = shape_.end() - shape_.begin();
+    const auto apart = [&](double a, double b) { return !(std::abs(b - a - width) <= kSameEdge * width); };
+    contiguous_ = std::adjacent_find(sorted_.begin(), sorted_.end(), apart) == sorted_.end();
+    stride_ = shape_.response().stride(width);
+  }
   sorted_.insert(sorted_.end(), kBlock, sorted_.back());
+}
+
+GateSet GateSet::shifted(double by) const {
+  std::vector<double> moved = centers_;
+  for (double& center : moved) center += by;
+  return GateSet(shape_, moved);
 }
 
 double GateSet::relative_width() const {
   double sum = 0;
-  for (double center : centers_) sum += center;
+  for (double center : centers_) sum += std::max(center, 0.0);
   return shape_.width() * size() / sum;
 }
 
 double GateSet::relative_coverage() const {
-  if (shape_.is_steady()) return relative_width();
+  if (shape_.is_unbounded()) return relative_width();
   const double apart = (sorted_.back() - sorted_.front()) / shape_.width();  // in widths of one gate
   return relative_width() * std::min(1 + apart, static_cast<double>(size()));
 }

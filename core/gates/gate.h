@@ -3,9 +3,11 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <utility>
 #include <vector>
 
+#include "core/gates/linear_density.h"
 #include "core/gates/normal.h"
 
 namespace isochron {
@@ -18,7 +20,7 @@ struct CoupledPair {
   bool plus_is_jump = false, minus_is_jump = false;  ///< at a jump of the gate: reported under path_length
 };
 
-enum class GateKind { steady, gaussian, boxcar, truncated_gaussian, tabulated };
+enum class GateKind { steady, gaussian, boxcar, truncated_gaussian, tabulated, bin, modulated };
 
 /// Which part of dW a pair is drawn from. A side of the other part is absent from the pair, so that each part is the same
 /// for every way of sampling and can be left out by itself; where a jump and a slope balance each other, as at the jump of a
@@ -41,19 +43,30 @@ class GateShape {
   static GateShape truncated_gaussian(double sigma, double half_width);
   /// Piecewise linear through (offset, value); a repeated offset is a jump; zero outside. Scaled to unit
   /// integral.
-  static GateShape tabulated(std::vector<double> offsets, std::vector<double> values);
+  static GateShape tabulated(const std::vector<double>& offsets, const std::vector<double>& values);
+  /// A time bin [-width / 2, width / 2] of a detector whose response is the table (offset, value): how much later than it
+  /// arrived light is counted. With r the response, scaled to unit integral,
+  ///   W(l) = 1 / width  integral of r(t - l) over t in the bin,      W'(l) = [r(-width / 2 - l) - r(width / 2 - l)] / width.
+  static GateShape bin(double width, const std::vector<double>& offsets, const std::vector<double>& values);
+  /// cos(wavenumber x) at every length: not normalised, of either sign.
+  static GateShape modulated(double wavenumber);
 
   GateKind kind() const { return kind_; }
   bool is_steady() const { return kind_ == GateKind::steady; }
+  /// Counts light of every length, so that no length can be drawn from it: steady and modulated.
+  bool is_unbounded() const { return kind_ == GateKind::steady || kind_ == GateKind::modulated; }
   /// Gaussian inside the support: the two kinds for which `gaussian_value` holds.
   bool is_gaussian_inside() const { return kind_ == GateKind::gaussian || kind_ == GateKind::truncated_gaussian; }
   /// Support [lower, upper] beyond which the value is zero (gaussian: below double rounding of its peak).
   double lower() const { return lower_; }
   double upper() const { return upper_; }
-  /// Standard deviation of the gate as a density (the width that `auto` sampling goes by); steady:
+  /// Standard deviation of the gate as a density (the width that `auto` sampling goes by); unbounded gates:
   /// infinity.
   double width() const { return width_; }
-  /// Integral over the real line: 1, less what truncation took away. Steady: 1 by convention.
+  /// A length over which the gate changes little: its width, but of a bin that without its response, and of a modulated gate
+  /// what turns it by a radian. Steady: infinity.
+  double detail() const { return detail_; }
+  /// Integral over the real line: 1, less what truncation took away. Unbounded gates: 1 by convention.
   double mass() const { return mass_; }
 
   struct ValueAndDerivative {
@@ -68,14 +81,25 @@ class GateShape {
       const double w = gaussian_value(x);
       return {w, slope_factor_ * x * w};
     }
-    if (kind_ != GateKind::tabulated) return {peak_, 0};
-    const int i = table_interval(x);
-    return {values_[i] + slopes_[i] * (x - offsets_[i]), slopes_[i]};
+    switch (kind_) {
+      case GateKind::tabulated: {
+        const LinearDensity::Knot& knot = table_.before(x);
+        return {knot.value + knot.slope * (x - knot.offset), knot.slope};
+      }
+      case GateKind::bin:
+        return between(table_.cumulated(begin_ - x), table_.cumulated(end_ - x));
+      case GateKind::modulated:
+        return {std::cos(wavenumber_ * x), -wavenumber_ * std::sin(wavenumber_ * x)};
+      default:
+        return {peak_, 0};
+    }
   }
-  /// Offset with density value / mass; u in (0, 1). Not for the steady gate, which is no density.
-  double sample(double u) const;
-  /// Mass of dW+ and of dW- that a pair of the given part stands for; zero for the steady gate. Where a side is absent from
-  /// some pairs, its part of dW has less.
+  /// Offset with density value / mass; u, v in (0, 1). A bin takes its response's delay from u and the place in itself
+  /// from v; other kinds take all from u. Not for unbounded gates, which are no densities.
+  double sample(double u, double v) const;
+  /// Mass of dW+ and of dW- that a pair of the given part stands for; zero for unbounded gates. Where a side is absent from
+  /// some pairs, its part of dW has less. All kinds but bins with a response split dW into its positive and its negative part;
+  /// those take r(begin - l) / width and r(end - l) / width, of which parts may cancel.
   double pair_mass(PairPart part) const { return parts_[static_cast<int>(part)].mass; }
   /// Draws from a part of positive mass; u in (0, 1).
   CoupledPair sample_pair(PairPart part, double u) const;
@@ -85,12 +109,22 @@ class GateShape {
   /// W'(x) = factor * x * W(x) for the gaussian kinds.
   double gaussian_slope_factor() const { return slope_factor_; }
 
+  /// Of a bin with a response: its ends, the response, and value and derivative of a bin from what the response has at
+  /// (begin - l) and (end - l).
+  double begin() const { return begin_; }
+  double end() const { return end_; }
+  const LinearDensity& response() const { return table_; }
+  ValueAndDerivative between(const LinearDensity::Cumulated& begin, const LinearDensity::Cumulated& end) const {
+    // Where the response is all but over, rounding could make the difference negative.
+    return {std::max(end.below - begin.below, 0.0) * peak_, (begin.value - end.value) * peak_};
+  }
+
  private:
   /// One sign of dW on a stretch of the quantile axis.
   struct Side {
     /// dirac: all at `from`. uniform: from -> to as the quantile runs 0 -> 1. rayleigh: from * rho, where rho
-    /// follows the Rayleigh law cut where its distribution function is `to`.
-    enum class Form { dirac, uniform, rayleigh } form = Form::dirac;
+    /// follows the Rayleigh law cut where its distribution function is `to`. delayed: `from` less a delay of the response.
+    enum class Form { dirac, uniform, rayleigh, delayed } form = Form::dirac;
     double from = 0, to = 0;
   };
   struct Segment {
@@ -110,32 +144,20 @@ class GateShape {
 
   /// Throws InputError, naming the argument.
   static void require_positive(double value, const char* name);
-  static double quantile(const Side& side, double u);
+  double quantile(const Side& side, double u) const;
   void set_gaussian(double sigma, double cut);
-  void index_table();
   void couple_table();
   void couple_quantiles(const std::vector<Piece>& plus, const std::vector<Piece>& minus);
   void finish_parts();
 
-  /// Interval [i, i+1] of the table that holds x in [lower, upper]; never one of zero length.
-  int table_interval(double x) const {
-    const int bucket = std::min(static_cast<int>((x - lower_) * bucket_scale_), static_cast<int>(guide_.size()) - 2);
-    // The guide narrows the search to the knots of one bucket: one or two for evenly spaced tables.
-    const auto first = offsets_.begin();
-    const int i = static_cast<int>(std::upper_bound(first + guide_[bucket], first + guide_[bucket + 1], x) - first);
-    return std::min(i - 1, last_interval_);
-  }
-
   GateKind kind_ = GateKind::steady;
-  double lower_ = 0, upper_ = 0, width_ = 0, mass_ = 1;
+  double lower_ = 0, upper_ = 0, width_ = 0, detail_ = 0, mass_ = 1;
   double peak_ = 1;
   double sigma_ = 0, exponent_ = 0, slope_factor_ = 0;  ///< gaussian kinds: W = peak * 2^(exponent x^2)
   double outside_ = 0;                                  ///< gaussian kinds: mass cut off on either side
-  std::vector<double> offsets_, values_, cumulative_;   ///< table: knots, values, integral up to the knot
-  std::vector<double> slopes_;                          ///< of the interval after the knot; zero at a jump
-  std::vector<int> guide_;                              ///< bucket -> number of knots in the buckets before it
-  double bucket_scale_ = 0;
-  int last_interval_ = 0;
+  LinearDensity table_;                                 ///< tabulated: the gate; bin: its response
+  double begin_ = 0, end_ = 0;                          ///< bin
+  double wavenumber_ = 0;                               ///< modulated
   std::vector<Segment> segments_;
   std::array<Part, 2> parts_;
 };
@@ -148,7 +170,10 @@ class GateSet {
   const GateShape& shape() const { return shape_; }
   int size() const { return static_cast<int>(centers_.size()); }
   double center(int g) const { return centers_[g]; }
-  /// Smallest and largest path length at which any gate is non-zero (steady: 0 and infinity).
+  /// The same gates with all centres moved by `by` scene units: W_g(l - by). A detector that counts light later by the
+  /// length t has readings W_g(l + t): shifted(-t).
+  GateSet shifted(double by) const;
+  /// Smallest and largest path length at which any gate is non-zero (unbounded gates: 0 and infinity).
   double lower() const { return lower_; }
   double upper() const { return upper_; }
 
@@ -158,6 +183,8 @@ class GateSet {
     const auto [begin, end] = reaching(l);
     if (shape_.is_gaussian_inside()) {
       for_each_gaussian(l, begin, end, [&](int gate, double, double w) { f(gate, w); });
+    } else if (contiguous_) {
+      for_each_bin(l, begin, end, [&](int gate, const GateShape::ValueAndDerivative& w) { f(gate, w.value); });
     } else {
       for (int i = begin; i < end; ++i) f(order_[i], shape_.value(l - sorted_[i]));
     }
@@ -169,6 +196,9 @@ class GateSet {
     if (shape_.is_gaussian_inside()) {
       const double factor = shape_.gaussian_slope_factor();
       for_each_gaussian(l, begin, end, [&](int gate, double x, double w) { f(gate, w, factor * x * w); });
+    } else if (contiguous_) {
+      for_each_bin(l, begin, end,
+                   [&](int gate, const GateShape::ValueAndDerivative& w) { f(gate, w.value, w.derivative); });
     } else {
       for (int i = begin; i < end; ++i) {
         const auto w = shape_.value_and_derivative(l - sorted_[i]);
@@ -176,7 +206,8 @@ class GateSet {
       }
     }
   }
-  /// Standard deviation of the gates over the mean of their centres; steady: infinity.
+  /// Standard deviation of the gates over the mean of their centres, where those below zero count as zero; unbounded gates:
+  /// infinity.
   double relative_width() const;
   /// The same of all gates together, which overlap or not: how much of the path lengths they take in.
   double relative_coverage() const;
@@ -220,7 +251,29 @@ class GateSet {
     }
   }
 
+  /// Neighbours share an edge, at which the response is looked up once.
+  template <class F>
+  void for_each_bin(double l, int begin, int end, F&& f) const {
+    if (begin >= end) return;
+    const LinearDensity& response = shape_.response();
+    const auto edge = [&](int i) { return sorted_[i] + shape_.end() - l; };
+    auto before = response.cumulated(sorted_[begin] + shape_.begin() - l);
+    const auto visit = [&](int i, const LinearDensity::Cumulated& after) {
+      f(order_[i], shape_.between(before, after));
+      before = after;
+    };
+    if (stride_ > 0) {
+      // The first gate whose support holds l ends within the response or after it.
+      LinearDensity::Comb comb(response, edge(begin), stride_);
+      for (int i = begin; i < end; ++i) visit(i, comb.next());
+    } else {
+      for (int i = begin; i < end; ++i) visit(i, response.cumulated(edge(i)));
+    }
+  }
+
   GateShape shape_;
+  bool contiguous_ = false;  ///< bins with a response, each beginning where the one before ends
+  int stride_ = 0;           ///< of the response from one of these bins to the next
   std::vector<double> centers_;
   std::vector<double> sorted_;  ///< padded by a block, so that blocks may run past the end
   std::vector<int> order_;

@@ -30,7 +30,7 @@ void describe_sigma(Keys& keys, double& sigma) {
 class Gaussian final : public GateDescription {
  public:
   void describe(Keys& keys, const ReadNumbers&) override { describe_sigma(keys, sigma_); }
-  GateShape shape(double unit) const override { return GateShape::gaussian(unit * sigma_); }
+  GateShape shape(const GateUnits& units) const override { return GateShape::gaussian(units.length * sigma_); }
   std::shared_ptr<GateDescription> stretched(double factor) const override {
     auto copy = std::make_shared<Gaussian>(*this);
     copy->sigma_ *= factor;
@@ -48,8 +48,8 @@ class TruncatedGaussian final : public GateDescription {
     keys.value("half_width", field::positive(half_width_), "from the centre to either end",
                {.required = true, .unit = "`unit`"});
   }
-  GateShape shape(double unit) const override {
-    return GateShape::truncated_gaussian(unit * sigma_, unit * half_width_);
+  GateShape shape(const GateUnits& units) const override {
+    return GateShape::truncated_gaussian(units.length * sigma_, units.length * half_width_);
   }
   std::shared_ptr<GateDescription> stretched(double factor) const override {
     auto copy = std::make_shared<TruncatedGaussian>(*this);
@@ -81,7 +81,7 @@ GateShape GateShape::gaussian(double sigma) {
   GateShape shape;
   shape.kind_ = GateKind::gaussian;
   shape.set_gaussian(sigma, kGaussianReach * sigma);
-  shape.width_ = sigma;
+  shape.width_ = shape.detail_ = sigma;
   shape.finish_parts();
   return shape;
 }
@@ -94,12 +94,12 @@ GateShape GateShape::truncated_gaussian(double sigma, double half_width) {
   const double c = half_width / sigma;
   if (c >= kGaussianReach) {  // the cut is below double rounding: no jumps left
     shape.set_gaussian(sigma, kGaussianReach * sigma);
-    shape.width_ = sigma;
+    shape.width_ = shape.detail_ = sigma;
   } else {
     shape.set_gaussian(sigma, half_width);
     shape.outside_ = 0.5 * std::erfc(c * std::sqrt(0.5));
     shape.mass_ = std::erf(c * std::sqrt(0.5));
-    shape.width_ = sigma * std::sqrt(truncated_variance(c));
+    shape.width_ = shape.detail_ = sigma * std::sqrt(truncated_variance(c));
     shape.segments_.push_back({shape.peak_ * std::exp(-0.5 * c * c),
                                {Side::Form::dirac, -half_width, 0},
                                {Side::Form::dirac, half_width, 0}});

@@ -3,10 +3,11 @@
 
 namespace isochron {
 
-extern const GateKindEntry kSteady, kGaussian, kBoxcar, kTruncatedGaussian, kTabulated;
+extern const GateKindEntry kSteady, kGaussian, kBoxcar, kTruncatedGaussian, kTabulated, kBins, kModulated;
 
 std::span<const GateKindEntry* const> gate_kinds() {
-  static constexpr const GateKindEntry* kKinds[] = {&kSteady, &kGaussian, &kBoxcar, &kTruncatedGaussian, &kTabulated};
+  static constexpr const GateKindEntry* kKinds[] = {&kSteady,    &kGaussian, &kBoxcar,   &kTruncatedGaussian,
+                                                    &kTabulated, &kBins,     &kModulated};
   return kKinds;
 }
 

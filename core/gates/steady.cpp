@@ -11,11 +11,13 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 class Steady final : public GateDescription {
  public:
   void describe(Keys&, const ReadNumbers&) override {}
-  GateShape shape(double) const override { return GateShape::steady(); }
+  GateShape shape(const GateUnits&) const override { return GateShape::steady(); }
   std::shared_ptr<GateDescription> stretched(double) const override {
     auto copy = std::make_shared<Steady>(*this);
     return copy;
   }
+  bool has_centers() const override { return false; }
+  bool unbounded() const override { return true; }
 };
 
 }  // namespace
@@ -24,7 +26,7 @@ GateShape GateShape::steady() {
   GateShape shape;
   shape.lower_ = -kInfinity;
   shape.upper_ = kInfinity;
-  shape.width_ = kInfinity;
+  shape.width_ = shape.detail_ = kInfinity;
   return shape;
 }
 

@@ -1,4 +1,4 @@
-// The tabulated gate: checks, normalisation, and the quantile coupling of its derivative measure.
+// The tabulated gate, and the quantile coupling of its derivative measure.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -12,22 +12,11 @@
 namespace isochron {
 namespace {
 
-void check_table(const std::vector<double>& offsets, const std::vector<double>& values) {
-  if (offsets.size() != values.size()) throw InputError("a gate's table needs as many values as offsets");
-  if (offsets.size() < 2) throw InputError("a gate's table needs at least two points");
-  for (std::size_t i = 0; i < offsets.size(); ++i) {
-    const std::string row = "row " + std::to_string(i + 1) + " of the gate's table: ";
-    if (!std::isfinite(offsets[i]) || !std::isfinite(values[i])) throw InputError(row + "not finite");
-    if (values[i] < 0) throw InputError(row + "negative value");
-    if (i > 0 && offsets[i] < offsets[i - 1]) throw InputError(row + "offset below the one before");
-  }
-}
-
 class Tabulated final : public GateDescription {
  public:
   void describe(Keys& keys, const ReadNumbers& read_numbers) override {
     const auto read = [this, &read_numbers](const YamlValue& value) {
-      for (const auto& row : read_numbers(value, 2)) {
+      for (const auto& row : read_numbers(value, {"offset", "value"})) {
         offsets_.push_back(row[0]);
         values_.push_back(row[1]);
       }
@@ -54,9 +43,9 @@ class Tabulated final : public GateDescription {
       gates.fail("the table is no gate",
                  "two rows or more, offsets in rising order, values at least 0 and one of them above");
   }
-  GateShape shape(double unit) const override {
+  GateShape shape(const GateUnits& units) const override {
     std::vector<double> scaled = offsets_;
-    for (double& offset : scaled) offset *= unit;
+    for (double& offset : scaled) offset *= units.length;
     return GateShape::tabulated(scaled, values_);
   }
   std::shared_ptr<GateDescription> stretched(double factor) const override {
@@ -71,81 +60,16 @@ class Tabulated final : public GateDescription {
 
 }  // namespace
 
-GateShape GateShape::tabulated(std::vector<double> offsets, std::vector<double> values) {
-  check_table(offsets, values);
+GateShape GateShape::tabulated(const std::vector<double>& offsets, const std::vector<double>& values) {
   GateShape shape;
   shape.kind_ = GateKind::tabulated;
-  // Of several points at one offset only the first and the last matter: the limits from either side.
-  for (std::size_t i = 0; i < offsets.size(); ++i) {
-    const bool inside = i > 0 && i + 1 < offsets.size() && offsets[i] == offsets[i - 1] && offsets[i] == offsets[i + 1];
-    if (inside) continue;
-    shape.offsets_.push_back(offsets[i]);
-    shape.values_.push_back(values[i]);
-  }
-  // A jump at the very ends is one from or to zero: the outer limit of a repeated end has no effect.
-  if (shape.offsets_[0] == shape.offsets_[1]) {
-    shape.offsets_.erase(shape.offsets_.begin());
-    shape.values_.erase(shape.values_.begin());
-  }
-  std::size_t n = shape.offsets_.size();
-  if (n > 1 && shape.offsets_[n - 1] == shape.offsets_[n - 2]) {
-    shape.offsets_.pop_back();
-    shape.values_.pop_back();
-    --n;
-  }
-  if (n < 2) throw InputError("a gate's table needs at least two different offsets");
-  shape.index_table();
+  shape.table_ = LinearDensity(offsets, values, "gate's table");
+  shape.lower_ = shape.table_.lower();
+  shape.upper_ = shape.table_.upper();
+  shape.width_ = shape.detail_ = shape.table_.deviation();
   shape.couple_table();
   shape.finish_parts();
   return shape;
-}
-
-void GateShape::index_table() {
-  const int n = static_cast<int>(offsets_.size());
-  lower_ = offsets_.front();
-  upper_ = offsets_.back();
-  last_interval_ = n - 2;
-
-  cumulative_.assign(n, 0.0);
-  const auto integrate = [this, n] {
-    for (int i = 0; i + 1 < n; ++i) {
-      cumulative_[i + 1] = cumulative_[i] + 0.5 * (values_[i] + values_[i + 1]) * (offsets_[i + 1] - offsets_[i]);
-    }
-    return cumulative_.back();
-  };
-  const double area = integrate();
-  if (!(area > 0 && std::isfinite(area))) throw InputError("a gate's table must enclose a positive, finite area");
-  for (double& v : values_) v /= area;
-  integrate();
-  slopes_.assign(n, 0.0);
-  for (int i = 0; i <= last_interval_; ++i) {
-    if (offsets_[i] < offsets_[i + 1]) slopes_[i] = (values_[i + 1] - values_[i]) / (offsets_[i + 1] - offsets_[i]);
-  }
-
-  // Mean and variance by Simpson's rule, exact for the cubics at hand; lengths relative to the middle.
-  const double middle = lower_ + 0.5 * (upper_ - lower_);
-  const auto moment = [&](double about, int power) {
-    double sum = 0;
-    const auto f = [&](double x, double w) { return w * std::pow(x - about, power); };
-    for (int i = 0; i + 1 < n; ++i) {
-      const double a = offsets_[i], b = offsets_[i + 1];
-      sum += (b - a) / 6 *
-             (f(a, values_[i]) + f(b, values_[i + 1]) + 4 * f(a + 0.5 * (b - a), 0.5 * (values_[i] + values_[i + 1])));
-    }
-    return sum;
-  };
-  width_ = std::sqrt(moment(middle + moment(middle, 1), 2));
-
-  const int buckets = n - 1;
-  bucket_scale_ = buckets / (upper_ - lower_);
-  // Knots and lengths are put into buckets by the same expression, so rounding cannot separate them.
-  guide_.resize(buckets + 1);
-  int knot = 0;
-  for (int b = 0; b < buckets; ++b) {
-    while (knot < n && static_cast<int>((offsets_[knot] - lower_) * bucket_scale_) < b) ++knot;
-    guide_[b] = knot;
-  }
-  guide_[buckets] = n;
 }
 
 void GateShape::couple_table() {
@@ -154,13 +78,14 @@ void GateShape::couple_table() {
     if (change > 0) plus.push_back({change, side});
     if (change < 0) minus.push_back({-change, side});
   };
-  add(values_.front(), {Side::Form::dirac, lower_, 0});
-  for (int i = 0; i <= last_interval_; ++i) {
-    const bool jump = offsets_[i] == offsets_[i + 1];
-    const Side side{jump ? Side::Form::dirac : Side::Form::uniform, offsets_[i], offsets_[i + 1]};
-    add(values_[i + 1] - values_[i], side);
+  const auto& knots = table_.knots();
+  add(knots.front().value, {Side::Form::dirac, lower_, 0});
+  for (std::size_t i = 0; i + 1 < knots.size(); ++i) {
+    const bool jump = knots[i].offset == knots[i + 1].offset;
+    const Side side{jump ? Side::Form::dirac : Side::Form::uniform, knots[i].offset, knots[i + 1].offset};
+    add(knots[i + 1].value - knots[i].value, side);
   }
-  add(-values_.back(), {Side::Form::dirac, upper_, 0});
+  add(-knots.back().value, {Side::Form::dirac, upper_, 0});
   couple_quantiles(plus, minus);
 }
 
@@ -177,7 +102,7 @@ void GateShape::couple_quantiles(const std::vector<Piece>& plus, const std::vect
   // Breakpoints of the two sides that are equal but for rounding count as one.
   const double tolerance = 4 * std::numeric_limits<double>::epsilon() * static_cast<double>(plus.size() + minus.size());
 
-  const auto stretch = [](const Side& side, double start, double end, double from, double to) {
+  const auto stretch = [this](const Side& side, double start, double end, double from, double to) {
     if (side.form != Side::Form::uniform) return side;
     const double scale = 1 / (end - start);
     return Side{side.form, quantile(side, std::max(from - start, 0.0) * scale),

@@ -17,7 +17,7 @@ const char* name(Term term) {
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates) {
   // Gates that together cover less than this part of the path length: standard sampling throws too many paths away.
   constexpr double kNarrow = 0.02;
-  if (gates.shape().is_steady() || options.sampling == Sampling::standard) return {0, 0};
+  if (gates.shape().is_unbounded() || options.sampling == Sampling::standard) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   if (options.mix) return *options.mix;
   return gates.relative_coverage() < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};

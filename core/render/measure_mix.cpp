@@ -219,7 +219,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   double own_work = 0;
   double& work = trial_work ? *trial_work : own_work;
   work = 0;
-  if (options.sampling == Sampling::standard || gates.shape().is_steady()) return {0, 0};
+  if (options.sampling == Sampling::standard || gates.shape().is_unbounded()) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
   const double width = gates.relative_width(), coverage = gates.relative_coverage();
   EstimatorOptions plain = options;

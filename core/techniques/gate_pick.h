@@ -37,12 +37,12 @@ class GatePick {
   double probability(int pixel, int gate) const {
     return below_.empty() ? 1.0 / gates_.size() : below_[row(pixel) + gate + 1] - below_[row(pixel) + gate];
   }
-  /// Length drawn by picking a gate and then a length from it; empty where no gate counts. Not for steady
-  /// gates.
+  /// Length drawn by picking a gate and then a length from it; empty where no gate counts. What is left of
+  /// `pick` places the length in its bin, so that evenly spread picks are evenly spread over all bins. Not for unbounded gates.
   std::optional<double> sample_length(int pixel, double pick, double u) const {
     const int gate = sample(pixel, pick);
     if (gate < 0) return std::nullopt;
-    return gates_.center(gate) + gates_.shape().sample(u);
+    return gates_.center(gate) + gates_.shape().sample(u, pick);
   }
   /// Density of `sample_length`.
   double length_pdf(int pixel, double length) const {

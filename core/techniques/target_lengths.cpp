@@ -8,11 +8,13 @@ void draw_targets(const GatePass& pass, const GateSet& gates, const GatePick& pi
   if (pass.value) {
     const double pick = rng.uniform(), u = rng.uniform();
     const auto length = pick_gate.sample_length(pixel, pick, u);
-    if (length && *length > 0) {
+    // At the very end of a gate its value may have rounded to zero.
+    const double pdf = length && *length > 0 ? pick_gate.length_pdf(pixel, *length) : 0;
+    if (pdf > 0) {
       TargetLength t;
       t.tau[0] = *length;
       t.present[0] = true;
-      t.scale = 1 / pick_gate.length_pdf(pixel, t.tau[0]);
+      t.scale = 1 / pdf;
       targets.push_back(t);
     }
   }

@@ -15,7 +15,7 @@ namespace isochron {
 namespace {
 
 constexpr double kRelativeLength = 0.01;  ///< of the scene's extent
-constexpr double kRelativeWidth = 0.5;    ///< of the gates' standard deviation; Richardson's error is then
+constexpr double kRelativeWidth = 0.5;    ///< of the length that gates change over; Richardson's error is then
                                           ///< below 0.1 % even where a path lengthens by twice the step
 constexpr double kMostDegrees = 1;
 constexpr double kRelativeValue = 0.05;
@@ -196,7 +196,7 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
     // Bounds of motions are the optimiser's; images exist beyond them.
     if (experiment.gradient.step_given) return step;
     const double distance =
-        std::min(kRelativeLength * extent(problem.scene()), kRelativeWidth * problem.gates().shape().width());
+        std::min(kRelativeLength * extent(problem.scene()), kRelativeWidth * problem.gates().shape().detail());
     const double speed = top_speed(problem, theta, component);
     const double most = type == ParameterType::rotation ? kMostDegrees : std::numeric_limits<double>::max();
     return speed > 0 ? std::min(distance / speed, most) : std::min(distance, most);

@@ -57,10 +57,9 @@ Method automatic_method() {
 
 std::vector<Method> methods_for(const Experiment& experiment, const std::vector<double>& steps,
                                 std::vector<std::string>& notes) {
-  const bool steady = experiment.gates.steady();
   std::vector<Method> methods{with_sampling("standard", Sampling::standard, true)};
-  if (steady) {
-    notes.push_back("steady gates: no ellipsoidal sampling");
+  if (experiment.gates.unbounded()) {
+    notes.push_back(experiment.gates.kind + " gates: no ellipsoidal sampling");
   } else {
     methods.push_back(with_sampling("ellipsoidal_uncoupled", Sampling::ellipsoidal, false));
     methods.push_back(with_sampling("ellipsoidal_coupled", Sampling::ellipsoidal, true));

@@ -28,7 +28,7 @@ Method automatic_method();
 /// standard, ellipsoidal_uncoupled, ellipsoidal_coupled, auto, finite_difference_STEP for each of the steps
 /// (images as auto), 3_bounces (else auto), and `paper`: ellipsoidal coupled, uniform pick of arcs, independent
 /// numbers, one gate and one unknown per pass. What makes no sense for the experiment is left out, with a line in
-/// `notes`: ellipsoidal sampling under steady gates, 3_bounces where there are no more.
+/// `notes`: ellipsoidal sampling under steady and modulated gates, 3_bounces where there are no more.
 std::vector<Method> methods_for(const Experiment& experiment, const std::vector<double>& steps,
                                 std::vector<std::string>& notes);
 

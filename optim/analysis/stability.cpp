@@ -146,7 +146,8 @@ Failure failure(const Direction& d, bool reference_resolved, double error_ratio)
 }
 
 GateSpec with_relative_width(const GateSpec& gates, double width) {
-  if (gates.steady()) throw InputError("gates.kind: steady gates have no width to vary (allowed: any other kind)");
+  if (gates.unbounded())
+    throw InputError(fmt::format("gates.kind: {} gates have no width to vary (allowed: any other kind)", gates.kind));
   GateSpec scaled = gates;
   const double factor = width / make_gates(gates).relative_width();
   scaled.shape = gates.shape->stretched(factor);
@@ -154,7 +155,7 @@ GateSpec with_relative_width(const GateSpec& gates, double width) {
 }
 
 Stability map_stability(const Experiment& experiment, const StabilityOptions& options) {
-  if (experiment.gates.steady()) with_relative_width(experiment.gates, 1);  // throws
+  if (experiment.gates.unbounded()) with_relative_width(experiment.gates, 1);  // throws
   if (!experiment.target.images.empty())
     throw InputError(experiment.file +
                      ": target.images: measured images have one width of gates (a target to be rendered)");

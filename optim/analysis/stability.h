@@ -66,10 +66,10 @@ struct Stability {
 };
 
 /// The gates with another standard deviation, relative to the mean of their centres: all lengths of the shape
-/// scaled. Throws InputError for steady gates, which have no width.
+/// scaled. Throws InputError for steady and modulated gates, which have no width.
 GateSpec with_relative_width(const GateSpec& gates, double width);
 
-/// Throws InputError for steady gates and for measured targets, which have one width of gates only.
+/// Throws InputError for gates without a width and for measured targets, which have one width of gates only.
 Stability map_stability(const Experiment& experiment, const StabilityOptions& options);
 
 /// `width,method,factor,core_seconds,positive,cosine,cosine_error,zero,variance,bias2,bias2_error,error_ratio,

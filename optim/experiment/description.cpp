@@ -106,6 +106,30 @@ void check_parameters(const Experiment& experiment) {
   }
 }
 
+/// The value that the file has at a path of keys; else the innermost map on the way that it has.
+YamlValue found_at(YamlValue value, const std::vector<std::string>& path) {
+  for (const std::string& key : path) {
+    const auto inner = value.map().find(key);
+    if (!inner) break;
+    value = *inner;
+  }
+  return value;
+}
+
+/// What gates ask of the rest of the experiment.
+void check_use_of_gates(const Experiment& experiment, const YamlValue& root) {
+  const GateSpec& gates = experiment.gates;
+  if (gates.needs_bins())
+    found_at(root, {"gates"}).fail("start, width and count are missing", "required without a target's file of bins");
+  if (gates.kind != "modulated") return;
+  if (experiment.estimator.sampling == Sampling::ellipsoidal)
+    found_at(root, {"estimator", "sampling"})
+        .fail("modulated gates let light of every length through, so that no lengths can be drawn",
+              "allowed: auto, standard");
+  if (experiment.target.photons > 0)
+    found_at(root, {"target", "noise"}).fail("readings under modulated gates may be negative, which no count is");
+}
+
 }  // namespace
 
 Field ExperimentFolder::file(std::string& variable) const {
@@ -130,7 +154,8 @@ Field ExperimentFolder::values(std::vector<double>& variable) {
           [&variable] { return variable.size() == 1 ? fmt::format("{}", variable[0]) : yaml_list(variable); }};
 }
 
-std::vector<std::vector<double>> ExperimentFolder::read_numbers(const YamlValue& value, int columns) {
+std::vector<std::vector<double>> ExperimentFolder::read_numbers(const YamlValue& value,
+                                                                const std::vector<std::string>& columns) {
   number_files.push_back(existing_file(value, path));
   return read_number_file(number_files.back(), columns);
 }
@@ -177,7 +202,10 @@ void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
   std::string version;
   keys.value("version", field::text(version), "of the program, in the `experiment.yaml` of a run; without effect",
              {.unset = true});
-  keys.check([&](const YamlValue&) { check_parameters(e); });
+  keys.check([&](const YamlValue& root) {
+    check_parameters(e);
+    check_use_of_gates(e, root);
+  });
 }
 
 }  // namespace isochron

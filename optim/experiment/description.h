@@ -19,13 +19,16 @@ struct ExperimentFolder {
   /// A number, a list of them, or a text file of them.
   Field values(std::vector<double>& variable);
   /// Rows of a text file of numbers, see read_number_file.
-  std::vector<std::vector<double>> read_numbers(const YamlValue& value, int columns = 0);
+  std::vector<std::vector<double>> read_numbers(const YamlValue& value, const std::vector<std::string>& columns = {});
 };
 
 /// Names that become names of files and columns.
 Field file_name(std::string& variable);
 
+/// Bins that were not given (GateSpec::needs_bins) are left to whoever sets them, who is to call check_gates.
 void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder);
+/// Throws InputError at `value` where no gates can be made or double precision does not resolve them.
+void check_gates(const GateSpec& gates, const YamlValue& value);
 /// `target_required`: whether there is no target without the parameter's.
 void describe(Keys& keys, ParameterSpec& parameter, ExperimentFolder& folder, bool target_required);
 /// A target's max_bounces below 0 stands for the experiment's.

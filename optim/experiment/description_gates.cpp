@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "core/base/error.h"
@@ -9,9 +10,6 @@
 
 namespace isochron {
 namespace {
-
-constexpr double kSpeedOfLight = 299792458;  // m/s
-constexpr int kMostGates = 100000;
 
 /// A list of numbers, or {start, stop, count}.
 Field centers(std::vector<double>& variable) {
@@ -39,18 +37,19 @@ Field centers(std::vector<double>& variable) {
 /// see nothing but rounding, and in the end their peaks overflow.
 void require_resolved(const GateSet& gates, const YamlValue& value) {
   constexpr double kLeastRelativeWidth = 1e-12, kLeastWidth = 1e-100, kMostWidth = 1e100;
-  if (gates.shape().is_steady()) return;
+  if (gates.shape().is_unbounded()) return;
   double longest = 0;
-  for (int g = 0; g < gates.size(); ++g) longest = std::max(longest, gates.center(g));
-  const double least = std::max(kLeastWidth, kLeastRelativeWidth * longest), width = gates.shape().width();
+  for (int g = 0; g < gates.size(); ++g) longest = std::max(longest, std::abs(gates.center(g)));
+  const double least = std::max(kLeastWidth, kLeastRelativeWidth * longest), width = gates.shape().detail();
   if (width < least)
     value.fail(fmt::format("gates of a standard deviation of {:.3g} scene units cannot be told from rounding", width),
                fmt::format("at least {:.3g}, {} of the longest centre", least, kLeastRelativeWidth));
   if (!(width <= kMostWidth)) value.fail(fmt::format("gates are {:.3g} scene units wide", width), "at most 1e100");
 }
 
+}  // namespace
+
 void check_gates(const GateSpec& gates, const YamlValue& value) {
-  gates.shape->check(value);
   const GateSet set = [&] {
     try {
       return make_gates(gates);
@@ -60,8 +59,6 @@ void check_gates(const GateSpec& gates, const YamlValue& value) {
   }();
   require_resolved(set, value);
 }
-
-}  // namespace
 
 void GateSpec::choose(const std::string& other_kind) {
   for (const GateKindEntry* each : gate_kinds())
@@ -73,10 +70,15 @@ void GateSpec::choose(const std::string& other_kind) {
   throw std::logic_error("no kind of gate: " + other_kind);
 }
 
+void GateSpec::set_bins(double start, double width, int count) {
+  const double unit_length = length_unit(*this);
+  shape = shape->with_bins(start / unit_length, width / unit_length, count);
+}
+
 void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
   std::vector<Keys::Kind> kinds;
   for (const GateKindEntry* each : gate_kinds()) kinds.push_back({each->name, each->meaning});
-  const ReadNumbers read_numbers = [&folder](const YamlValue& value, std::size_t columns) {
+  const ReadNumbers read_numbers = [&folder](const YamlValue& value, const std::vector<std::string>& columns) {
     return folder.read_numbers(value, columns);
   };
   const auto describe_kind = [&](Keys& inner, const std::string& kind) {
@@ -88,16 +90,21 @@ void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
   keys.kinds(
       "kind", kinds, gates.kind, [&](const std::string& kind) { gates.choose(kind); }, describe_kind,
       "path-length importance: how much light of a length counts");
-  const Only not_steady{!gates.steady(), "every kind but steady", ""};
+  const Only placed{gates.shape->has_centers(), "every kind but steady, bins and modulated", ""};
   keys.value("centers", centers(gates.centers),
              "one per gate: lengths of whole paths, camera and light segments included",
-             {.required = true, .only = not_steady, .unit = "`unit`"});
+             {.required = true, .only = placed, .unit = "`unit`"});
   keys.value("unit", field::choice(gates.unit), "of all lengths here; of a time, how far light travels in it");
-  const bool timed = gates.unit != LengthUnit::scene;
-  keys.value(
-      "scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
-      {.required = timed, .unit = "metres", .unset = gates.scene_unit_m == 0, .otherwise = "required for ns, ps"});
-  keys.check([&](const YamlValue& value) { check_gates(gates, value); });
+  const bool in_metres = gates.unit != LengthUnit::scene || gates.shape->needs_metres();
+  keys.value("scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
+             {.required = in_metres,
+              .unit = "metres",
+              .unset = gates.scene_unit_m == 0,
+              .otherwise = "required for ns, ps, modulated"});
+  keys.check([&](const YamlValue& value) {
+    gates.shape->check(value);
+    if (!gates.needs_bins()) check_gates(gates, value);
+  });
 }
 
 double length_unit(const GateSpec& spec) {
@@ -106,12 +113,19 @@ double length_unit(const GateSpec& spec) {
 }
 
 GateSet make_gates(const GateSpec& spec) {
-  const double unit = length_unit(spec);
-  const GateShape shape = spec.shape->shape(unit);
-  if (shape.is_steady()) return GateSet(shape, {0.0});
+  const GateUnits units{length_unit(spec), spec.scene_unit_m};
+  const GateShape shape = spec.shape->shape(units);
+  if (!spec.shape->has_centers()) return GateSet(shape, spec.shape->own_centers(units));
   std::vector<double> centers = spec.centers;
-  for (double& center : centers) center *= unit;
+  for (double& center : centers) center *= units.length;
   return GateSet(shape, centers);
+}
+
+GateMarks gate_marks(const GateSpec& spec) {
+  GateMarks marks = spec.shape->marks();
+  if (spec.shape->has_centers()) marks.numbers = spec.centers;
+  if (marks.unit.empty()) marks.unit = name(spec.unit);
+  return marks;
 }
 
 }  // namespace isochron

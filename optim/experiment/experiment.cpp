@@ -13,10 +13,10 @@ const char* name(LengthUnit unit) {
 }
 
 ExrNotes exr_notes(const GateSpec& spec) {
-  const bool steady = spec.steady();
-  return {{"isochron.gateCenters", steady ? "" : fmt::format("{}", fmt::join(spec.centers, " "))},
-          {"isochron.gateUnit", name(spec.unit)},
-          {"isochron.quantity", steady ? "radiance" : "radiance per scene unit of path length"}};
+  const GateMarks marks = gate_marks(spec);
+  return {{"isochron.gateCenters", fmt::format("{}", fmt::join(marks.numbers, " "))},
+          {"isochron.gateUnit", marks.unit},
+          {"isochron.quantity", spec.unbounded() ? "radiance" : "radiance per scene unit of path length"}};
 }
 
 void ParameterSpec::fail(const std::string& key, const std::string& wrong, const std::string& allowed) const {

@@ -29,12 +29,19 @@ struct GateSpec {
   std::string kind = "steady";
   std::shared_ptr<GateDescription> shape = gate_kinds()[0]->make();  ///< of that kind
   LengthUnit unit = LengthUnit::scene;
-  double scene_unit_m = 0;      ///< metres per scene unit; > 0 where unit is a time, else unused
-  std::vector<double> centers;  ///< steady: empty
+  double scene_unit_m = 0;      ///< metres per scene unit; > 0 where unit is a time or gates are modulated, else unused
+  std::vector<double> centers;  ///< as the key says; empty for kinds that have centres of their own, see gate_marks
 
   bool steady() const { return kind == "steady"; }
+  /// Light of every length counts, whatever the gate: there is no width, and no lengths can be drawn.
+  bool unbounded() const { return shape->unbounded(); }
   /// Becomes another kind, with its defaults.
   void choose(const std::string& other_kind);
+  /// Whether the bins of the kind `bins` are still to be set: those of the target's file.
+  bool needs_bins() const { return shape->needs_bins(); }
+  /// `count` bins, each `width` scene units wide, the first beginning at `start` scene units. check_gates tells whether they
+  /// can be used.
+  void set_bins(double start, double width, int count);
 };
 
 /// Scene units per unit of the gates' lengths.
@@ -44,8 +51,12 @@ double length_unit(const GateSpec& spec);
 /// zeros).
 GateSet make_gates(const GateSpec& spec);
 
-/// What an EXR file says of its gates, so that it can be drawn by itself: isochron.gateCenters (numbers in the unit of
-/// `spec`, separated by spaces; none where steady), isochron.gateUnit (scene units, ns, ps), isochron.quantity (what a
+/// A number for each gate, by which people know it, and its unit (scene units, ns, ps, degrees): centres, middles of bins,
+/// phases. No numbers where steady.
+GateMarks gate_marks(const GateSpec& spec);
+
+/// What an EXR file says of its gates, so that it can be drawn by itself: isochron.gateCenters (numbers of gate_marks,
+/// separated by spaces; none where steady), isochron.gateUnit (their unit), isochron.quantity (what a
 /// pixel's value is).
 ExrNotes exr_notes(const GateSpec& spec);
 

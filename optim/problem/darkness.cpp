@@ -102,7 +102,7 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
   const auto range = path_length_range(problem, theta);
   text += range ? fmt::format("; paths with light are about {} long", shown(range->first, range->second))
                 : "; no path with light was found at all: does a lamp face the scene?";
-  if (range && !spec.steady()) {
+  if (range && !spec.unbounded()) {
     const auto by_center = [&](int a, int b) { return problem.gates().center(a) < problem.gates().center(b); };
     const auto [first, last] = std::minmax_element(dark.begin(), dark.end(), by_center);
     const double low = problem.gates().center(*first), high = problem.gates().center(*last);

@@ -68,7 +68,7 @@ double image_bytes(const Problem& problem) {
 /// Standard sampling shares one image; what automatic sampling settles on is not known before its trial.
 bool shares_one_image(const Problem& problem) {
   const Experiment& experiment = problem.experiment();
-  return experiment.estimator.sampling == Sampling::standard || experiment.gates.steady();
+  return experiment.estimator.sampling == Sampling::standard || experiment.gates.unbounded();
 }
 
 std::string amount(double bytes) {

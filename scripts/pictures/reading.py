@@ -63,8 +63,8 @@ class Folder:
             self.unit = "scene units" if unit == "scene" else str(unit)
         except (yaml.YAMLError, AttributeError, KeyError, TypeError, ValueError) as error:
             raise PlotError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
-        steady = gates.get("kind") == "steady"
-        self.quantity = "radiance" if steady else "radiance per scene unit of path length"
+        not_per_length = gates.get("kind") in ("steady", "modulated")
+        self.quantity = "radiance" if not_per_length else "radiance per scene unit of path length"
 
     def gates(self, path, count):
         """Gates of one EXR file."""

@@ -13,6 +13,9 @@ namespace isochron {
 
 inline const std::vector<double> kMeasuredOffsets{-1, -0.4, -0.4, -0.1, 0.2, 0.2, 0.5, 0.9, 0.9, 1.6, 2.5};
 inline const std::vector<double> kMeasuredValues{0.2, 0.5, 1.5, 4, 3, 2.2, 2.2, 1, 1.4, 0.3, 0};
+/// A detector's: light is counted later, mostly by 0.2, now and then by much more.
+inline const std::vector<double> kResponseOffsets{0, 0.2, 0.4, 0.6, 0.8, 1, 1.2, 1.4, 1.6};
+inline const std::vector<double> kResponseValues{0, 5, 3, 2, 1.2, 0.7, 0.4, 0.2, 0};
 
 /// Every kind but steady, at several proportions.
 inline std::vector<std::pair<std::string, GateShape>> finite_gates() {
@@ -25,7 +28,10 @@ inline std::vector<std::pair<std::string, GateShape>> finite_gates() {
           {"triangle", GateShape::tabulated({-0.5, 0, 0.5}, {0, 1, 0})},
           {"box as a table", GateShape::tabulated({-0.5, 0.1, 0.5}, {3, 3, 3})},
           {"falling saw", GateShape::tabulated({0, 0, 1}, {0, 1, 0})},
-          {"measured", GateShape::tabulated(kMeasuredOffsets, kMeasuredValues)}};
+          {"measured", GateShape::tabulated(kMeasuredOffsets, kMeasuredValues)},
+          {"bin", GateShape::bin(0.4, kResponseOffsets, kResponseValues)},
+          {"bin wider than its response", GateShape::bin(2.5, kResponseOffsets, kResponseValues)},
+          {"bin, response with jumps", GateShape::bin(0.5, kMeasuredOffsets, kMeasuredValues)}};
 }
 
 /// Integral of f over the gate's support up to `to`: Gauss-Legendre of 5 points on 400 panels that end at the
@@ -41,8 +47,13 @@ double integrate(const GateShape& gate, F&& f, double to = std::numeric_limits<d
     for (const double x : {-1.0, -0.5, -0.4, -0.1, 0.0, 0.1, 0.2, 0.5, 0.9, 1.6}) {
       if (x > gate.lower() && x < last) ends.push_back(x);
     }
-    std::sort(ends.begin(), ends.end());
   }
+  if (gate.kind() == GateKind::bin) {
+    for (const LinearDensity::Knot& knot : gate.response().knots())
+      for (const double x : {gate.begin() - knot.offset, gate.end() - knot.offset})
+        if (x > gate.lower() && x < last) ends.push_back(x);
+  }
+  std::sort(ends.begin(), ends.end());
   constexpr int kPanels = 400;
   double sum = 0;
   for (std::size_t i = 0; i + 1 < ends.size(); ++i) {

@@ -2,9 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include <span>
-
 #include <filesystem>
+#include <span>
 
 #include "core/base/error.h"
 #include "tests/optim/gate_spec.h"
@@ -53,7 +52,8 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "3:1: max_bounce: is not a known key, did you mean 'max_bounces'? (allowed: name, "},
       {"kind: gaussian", "kind: boxcar, width: 1",
        "4:54: gates.sigma: belongs to gaussian and truncated_gaussian, not to boxcar (allowed: kind, "},
-      {gates, "{kind: steady, centers: [4]}", "4:23: gates.centers: belongs to every kind but steady (allowed: kind"},
+      {gates, "{kind: steady, centers: [4]}",
+       "4:23: gates.centers: belongs to every kind but steady, bins and modulated (allowed: kind"},
       {"sigma: 0.3", "sigma: 1e-300",
        "4:8: gates: gates of a standard deviation of 1e-300 scene units cannot be told "
        "from rounding (at least 5.5e-12, 1e-12 of the longest centre)"},
@@ -72,9 +72,10 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"centers: [4.5, 5.5]", "centers: 5",
        "4:34: gates.centers: is neither (a list of numbers, or {start, stop, count})"},
       {"sigma: 0.3", "sigma: 0", "4:53: gates.sigma: 0 is out of range (a number above 0)"},
-      {"sigma: 0.3", "sigma: 0.3, width: 1", "4:58: gates.width: belongs to boxcar, not to gaussian"},
+      {"sigma: 0.3", "sigma: 0.3, width: 1", "4:58: gates.width: belongs to boxcar and bins, not to gaussian"},
       {"sigma: 0.3", "sigma: 0.3, unit: ns", "4:8: gates.scene_unit_m: is missing"},
-      {gates, "{kind: steady, centers: [1]}", "4:23: gates.centers: belongs to every kind but steady"},
+      {gates, "{kind: steady, centers: [1]}",
+       "4:23: gates.centers: belongs to every kind but steady, bins and modulated"},
       {gates, "{kind: boxcar, centers: [1], width: .inf}", "4:44: gates.width: '.inf' is not a finite number"},
       {gates, "{kind: truncated_gaussian, centers: [1], sigma: 1}", "4:8: gates.half_width: is missing"},
       {gates, "{kind: tabulated, centers: [1], offsets: [0, 1], values: [1]}",

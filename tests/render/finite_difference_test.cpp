@@ -33,6 +33,9 @@ void PrintTo(const Case& c, std::ostream* out) {
   *out << c.name;
 }
 
+/// With a response that comes late and has a tail.
+const GateShape kBin = GateShape::bin(0.5, {-0.3, 0, 1.2}, {0, 1, 0});
+
 class FiniteDifference : public ::testing::TestWithParam<Case> {};
 
 TEST_P(FiniteDifference, TotalDerivative) {
@@ -143,6 +146,9 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"diffuse_boxcar_standard", Look::diffuse, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
         Case{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3),
              Sampling::ellipsoidal, 40, 400},
+        Case{"diffuse_bins_standard", Look::diffuse, kBin, Sampling::standard, 120, 125},
+        Case{"diffuse_bins_ellipsoidal", Look::diffuse, kBin, Sampling::ellipsoidal, 60, 125},
+        Case{"diffuse_modulated_standard", Look::diffuse, GateShape::modulated(1.5), Sampling::standard, 120, 125},
         Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 125},
         Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 200},
         Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60,
