@@ -38,7 +38,7 @@ Times time_evaluation(const Problem& problem, const std::vector<double>& theta, 
   const Renderer renderer(scene, problem.gates(), problem.estimator(samples[2]), &basis);
   lap(0);
   const SplitImage image = render_halves(renderer, stream_of(problem, Pass::primal, index), {0, samples[0]});
-  const GatedImage adjoint = loss_adjoint(image, target, problem.robust_loss(target));
+  const GatedImage adjoint = loss_adjoint(image, target, problem.reading_loss(target));
   lap(1);
   std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
   for (int t = 0; t < 3; ++t) {
@@ -149,7 +149,7 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
   const TangentBasis basis = problem.parameters().tangent(theta);
   const int visibility = problem.experiment().samples.visibility;
   const Renderer renderer(scene, problem.gates(), problem.estimator(visibility), &basis);
-  const RobustLoss robust = problem.robust_loss(target);
+  const ReadingLoss robust = problem.reading_loss(target);
   std::vector<GatedImage> adjoints;
   for (int i = 0; i < kImages; ++i) {
     const SplitImage image = render_halves(renderer, stream_of(problem, Pass::primal, i), {0, samples[0]});

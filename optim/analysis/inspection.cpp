@@ -174,7 +174,7 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
   /// Of the images up to most, most - 1, ... bounces.
   const auto adjoints = [&](const ImageBreakdown& breakdown) {
     std::vector<GatedImage> all;
-    const RobustLoss robust = problem.robust_loss(target);
+    const ReadingLoss robust = problem.reading_loss(target);
     for (int limit = most; limit >= 0; --limit)
       all.push_back(loss_adjoint(image_up_to(breakdown.image, gates, limit), target, robust));
     return all;

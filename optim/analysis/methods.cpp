@@ -216,9 +216,9 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
       return renderer.render(problem_.stream(Pass::primal, number), {0, primal});
     });
   }
-  const GatedImage adjoint = loss_adjoint(image, target, problem_.robust_loss(target));
+  const GatedImage adjoint = loss_adjoint(image, target, problem_.reading_loss(target));
   std::vector<double> penalty(theta.size(), 0.0);
-  problem_.penalty().add_gradient(theta, mean_square(target), penalty);
+  problem_.penalty().add_gradient(theta, mean_square(target, problem_.readings()), penalty);
   const double before_derivatives = cpu_seconds();
   Estimate result;
   for (int component : components_) {

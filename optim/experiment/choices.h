@@ -34,6 +34,7 @@ template <>
 inline constexpr auto kChoices<LossKind> = std::to_array<Choice<LossKind>>(
     {{LossKind::squared, "squared", "its square"},
      {LossKind::huber, "huber", "beyond `scale`, residuals pull like their size, not its square"},
-     {LossKind::cauchy, "cauchy", "large residuals hardly pull"}});
+     {LossKind::cauchy, "cauchy", "large residuals hardly pull"},
+     {LossKind::poisson, "poisson", "half the deviance of counts: their negative log likelihood"}});
 
 }  // namespace isochron

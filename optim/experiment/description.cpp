@@ -38,6 +38,17 @@ Field resolution(std::array<int, 2>& size) {
   return field;
 }
 
+/// [start, stop], the second the larger.
+Field interval(std::array<double, 2>& ends) {
+  return {"list of 2 numbers", "start below stop",
+          [&ends](const YamlValue& value) {
+            const std::vector<double> numbers = value.numbers();
+            if (numbers.size() != 2 || !(numbers[0] < numbers[1])) value.fail("is no interval", "[start, stop], start below stop");
+            ends = {numbers[0], numbers[1]};
+          },
+          [&ends] { return yaml_list({ends[0], ends[1]}); }};
+}
+
 void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
   keys.value("images", folder.file(target.images),
              "EXR file of measured images, one channel or three per gate; without it the target is rendered",
@@ -50,9 +61,19 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
   const auto noise = [&](Keys& inner) {
     // So many that their noise, a millionth, no longer matters.
     inner.value("photons", field::number(target.photons, {.low = 0, .high = 1e12, .low_open = true}),
-                "mean count of a pixel and colour in the brightest gate", {.required = true});
+                "mean count of a pixel and colour in the brightest gate", {.unset = target.photons == 0});
+    inner.value("counts", field::boolean(target.counts), "the images are expected counts, taken as they are");
+    inner.check([&](const YamlValue& value) {
+      if ((target.photons > 0) == target.counts) value.fail("has to say how many", "photons: N, or counts: true");
+    });
   };
-  keys.map("noise", noise, "Poisson noise of the rendered target", {.only = rendered, .unset = target.photons == 0});
+  keys.map("noise", noise, "Poisson noise of the rendered target",
+           {.only = rendered, .unset = target.photons == 0 && !target.counts});
+  keys.value("window", interval(target.window), "gates whose centre lies outside are not used",
+             {.unit = "scene units", .unset = !target.windowed(), .otherwise = "all are"});
+  keys.value("mask", folder.file(target.mask),
+             "NumPy array (.npy) [columns, rows] of the pixels; those with a zero are not used",
+             {.unset = target.mask.empty(), .otherwise = "all are"});
 }
 
 void describe(Keys& keys, SampleSpec& s) {

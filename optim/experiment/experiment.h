@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <memory>
 #include <string>
@@ -66,6 +67,11 @@ struct TargetSpec {
   std::uint64_t seed = 7;
   int max_bounces = 8;  ///< of the rendered target; the experiment's own where the file does not say
   double photons = 0;   ///< of add_photon_noise; 0: no noise
+  bool counts = false;  ///< rendered values are expected counts, the target Poisson numbers of them
+  /// Gates whose centre lies outside are not used, in scene units; [-infinity, infinity]: all are.
+  std::array<double, 2> window{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  std::string mask;  ///< absolute path of a .npy file [columns, rows]: pixels with a zero are not used; empty: all are
+  bool windowed() const { return std::isfinite(window[0]) || std::isfinite(window[1]); }
 };
 
 /// Samples per pixel. A derivative term with 0 samples is left out; primal is at least 1, for runs 2.
@@ -86,9 +92,9 @@ struct GradientSpec {
   bool common_numbers = true;
 };
 
-enum class LossKind { squared, huber, cauchy };
+enum class LossKind { squared, huber, cauchy, poisson };
 
-/// What is minimised: see RobustLoss.
+/// What is minimised: see ReadingLoss.
 struct LossSpec {
   LossKind kind = LossKind::squared;
   double scale = 1;  ///< in units of the target's root mean square

@@ -18,15 +18,14 @@ void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint, 
   const Eigen::VectorXd root = weights.cwiseSqrt();
   a.array().colwise() *= root.array();
   b.array().colwise() *= root.array();
-  const double scale = 2.0 / static_cast<double>(rows);
   into.curvature.resize(jacobian.unknowns * jacobian.unknowns);
   into.curvature_bound.resize(into.curvature.size());
   Eigen::Map<Eigen::MatrixXd> curvature(into.curvature.data(), columns, columns),
       bound(into.curvature_bound.data(), columns, columns);
   const Eigen::MatrixXd product = a.transpose() * b;
-  curvature = scale / 2 * (product + product.transpose());
+  curvature = (product + product.transpose()) / 2;
   a += b;
-  bound.noalias() = scale / 4 * (a.transpose() * a);
+  bound.noalias() = (a.transpose() * a) / 4;
 }
 
 }  // namespace isochron

@@ -13,8 +13,8 @@ struct JacobianHalves {
       : residuals(r), unknowns(u), half{std::vector<double>(r * u, 0.0), half[0]} {}
 };
 
-/// Gradient and curvatures of a loss 1/R sum rho(r): gradient = J'adjoint with adjoint = dLoss/dr, and the
-/// curvature 2/R J' W J with W = diag(weight). The Jacobian is overwritten.
+/// Gradient and curvatures of a loss: gradient = J'adjoint with adjoint = dLoss/dr, and the curvature J' W J with
+/// W = diag(weight), the curvature of the loss in each residual. The Jacobian is overwritten.
 void gauss_newton(JacobianHalves& jacobian, const std::vector<double>& adjoint, const std::vector<double>& weight,
                   Evaluation& into);
 

@@ -37,6 +37,18 @@ double poisson_by_rejection(double mean, Rng& rng) {
   }
 }
 
+/// Of entries above zero; all others become zero.
+template <class Count>
+void replace_by_counts(GatedImage& image, const Stream& stream, const Count& count) {
+  for (int pixel = 0; pixel < image.pixels(); ++pixel)
+    for (int g = 0; g < image.gates; ++g)
+      for (int c = 0; c < image.channels; ++c) {
+        double& value = image.at(pixel, g, c);
+        Rng rng(stream, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(g * image.channels + c));
+        value = value > 0 ? count(value, rng) : 0;
+      }
+}
+
 }  // namespace
 
 double poisson(double mean, Rng& rng) {
@@ -46,17 +58,13 @@ double poisson(double mean, Rng& rng) {
 void add_photon_noise(GatedImage& image, double photons, const Stream& stream) {
   double brightest = 0;
   for (int g = 0; g < image.gates; ++g) brightest = std::max(brightest, image.mean(g));
-  for (int pixel = 0; pixel < image.pixels(); ++pixel)
-    for (int g = 0; g < image.gates; ++g)
-      for (int c = 0; c < image.channels; ++c) {
-        double& value = image.at(pixel, g, c);
-        if (!(value > 0)) {
-          value = 0;
-          continue;
-        }
-        Rng rng(stream, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(g * image.channels + c));
-        value = poisson(photons * (value / brightest), rng) * (brightest / photons);
-      }
+  replace_by_counts(image, stream, [&](double value, Rng& rng) {
+    return poisson(photons * (value / brightest), rng) * (brightest / photons);
+  });
+}
+
+void draw_counts(GatedImage& image, const Stream& stream) {
+  replace_by_counts(image, stream, poisson);
 }
 
 }  // namespace isochron

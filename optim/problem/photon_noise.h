@@ -16,4 +16,8 @@ double poisson(double mean, Rng& rng);
 /// its own, from `stream`. Entries below zero become zero; a black image stays black.
 void add_photon_noise(GatedImage& image, double photons, const Stream& stream);
 
+/// Replaces every entry, an expected count, by a Poisson number of that mean, with random numbers as above. Entries below
+/// zero become zero.
+void draw_counts(GatedImage& image, const Stream& stream);
+
 }  // namespace isochron

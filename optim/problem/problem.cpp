@@ -85,6 +85,7 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       gates_(make_gates(experiment_.gates)),
       parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters, length_unit(experiment_.gates))),
       cache_(std::make_unique<SceneCache>(scene_, caster_update(experiment_, scene_))),
+      readings_(make_readings(experiment_, gates_, scene_.camera.width, scene_.camera.height)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
   for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
     const ParameterSpec& spec = experiment_.parameters[i];
@@ -180,6 +181,7 @@ GatedImage Problem::read_target(const std::string& file) const {
   const int channels = scene_.grey ? 1 : 3;
   require(image.channels == channels, image.channels == 1 ? "one grey channel (Y)" : "three channels (R, G, B)",
           channels == 1 ? "one grey channel, Y" : "three channels, R, G and B");
+  require_usable(image, file);
   return image;
 }
 
@@ -202,18 +204,28 @@ GatedImage Problem::make_target(const Poll& poll) const {
     poll();
   }
   GatedImage image = mean.mean();
-  if (target.photons > 0) add_photon_noise(image, target.photons, {target.seed, 0, pass_number(Pass::photon_noise)});
+  const Stream noise{target.seed, 0, pass_number(Pass::photon_noise)};
+  if (target.photons > 0) add_photon_noise(image, target.photons, noise);
+  if (target.counts) draw_counts(image, noise);
+  require_usable(image, experiment_.file + ": target");
   return image;
 }
 
-RobustLoss Problem::robust_loss(const GatedImage& target) const {
-  const double scale = experiment_.loss.scale * std::sqrt(mean_square(target));
-  return scale > 0 ? RobustLoss{experiment_.loss.kind, scale} : RobustLoss{};
+void Problem::require_usable(const GatedImage& target, const std::string& what) const {
+  if (experiment_.loss.kind == LossKind::poisson) require_counts(target, readings_, what);
+}
+
+ReadingLoss Problem::reading_loss(const GatedImage& target) const {
+  constexpr double kLeastMean = 0.02;  // see loss.h
+  const LossSpec& loss = experiment_.loss;
+  const double scale =
+      loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings_) : loss.scale * std::sqrt(mean_square(target, readings_));
+  return scale > 0 ? ReadingLoss{loss.kind, scale, readings_} : ReadingLoss{LossKind::squared, 0, readings_};
 }
 
 LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
-  LossEstimate estimate = estimate_loss(image, target, robust_loss(target));
-  if (!penalty_.empty()) estimate.value += mean_square(target) * penalty_.value(theta);
+  LossEstimate estimate = estimate_loss(image, target, reading_loss(target));
+  if (!penalty_.empty()) estimate.value += mean_square(target, readings_) * penalty_.value(theta);
   return estimate;
 }
 
@@ -238,7 +250,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
   stage.advance();
   set_loss(loss(image, target, theta), result);
-  const GatedImage adjoint = loss_adjoint(image, target, robust_loss(target));
+  const GatedImage adjoint = loss_adjoint(image, target, reading_loss(target));
   result.image = std::move(image.image);
   poll();
   if (differences) {
@@ -253,7 +265,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
         (*parts)[k / values % kGradientParts][i] += adjoint.data[k] * derivative.data[k];
       poll();
     }
-    penalty_.add_gradient(theta, mean_square(target), result.gradient);
+    penalty_.add_gradient(theta, mean_square(target, readings_), result.gradient);
     return result;
   }
   std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
@@ -268,7 +280,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
     poll();
   }
   result.gradient = basis.transpose_apply(dof_gradient);
-  penalty_.add_gradient(theta, mean_square(target), result.gradient);
+  penalty_.add_gradient(theta, mean_square(target, readings_), result.gradient);
   return result;
 }
 

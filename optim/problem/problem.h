@@ -17,6 +17,7 @@
 #include "optim/problem/loss.h"
 #include "optim/problem/objective.h"
 #include "optim/problem/parameters.h"
+#include "optim/problem/readings.h"
 #include "optim/problem/smoothing.h"
 
 namespace isochron {
@@ -95,16 +96,21 @@ class Problem {
   /// asked for, or read from a file. Throws InputError when the file's shape is not that of this experiment's
   /// images.
   GatedImage make_target(const Poll& poll) const;
-  /// Reads a target image and checks its shape against this experiment's.
+  /// Reads a target image and checks its shape against this experiment's, and whether the loss has a use for it.
   GatedImage read_target(const std::string& file) const;
 
   /// The experiment's options for a renderer that will take so many visibility samples per pixel: guiding learns from
   /// a small share of their number.
   EstimatorOptions estimator(int visibility_samples, Purpose purpose = Purpose::gradients) const;
 
-  /// The experiment's loss, made absolute by the target's root mean square. Squared where the target is
-  /// black.
-  RobustLoss robust_loss(const GatedImage& target) const;
+  /// Which of a target's readings count.
+  const Readings& readings() const { return readings_; }
+  /// Throws InputError, which begins with `what`, where the loss has no use for a target.
+  void require_usable(const GatedImage& target, const std::string& what) const;
+
+  /// The experiment's loss, made absolute by the target's root mean square, for counts by their mean. Squared where the
+  /// target is black.
+  ReadingLoss reading_loss(const GatedImage& target) const;
 
   /// Loss of an image rendered at theta, the penalty included.
   LossEstimate loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const;
@@ -129,6 +135,7 @@ class Problem {
   GateSet gates_;
   std::unique_ptr<Parameters> parameters_;
   std::unique_ptr<SceneCache> cache_;
+  Readings readings_;
   Preconditioner preconditioner_;
   PairPenalty penalty_;
   int evaluations_;                                                   ///< of the loss gradient

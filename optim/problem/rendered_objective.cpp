@@ -97,19 +97,16 @@ Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::ui
 
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
   if (!problem_.can_render(theta)) return problem_.no_evaluation(target_);
-  const RobustLoss robust = problem_.robust_loss(target_);
+  const ReadingLoss rho = problem_.reading_loss(target_);
   SplitImage image = render(theta, iteration);
   Evaluation result;
   set_loss(problem_.loss(image, target_, theta), result);
 
   JacobianHalves jacobian(target_.data.size(), theta.size());
   for (int half : {0, 1}) add_half(problem_, theta, iteration, half, poll_, jacobian);
-  std::vector<double> weight;  // Gauss-Newton for a robust loss: rho'' is left out
-  for (std::size_t i = 0; i < target_.data.size(); ++i)
-    weight.push_back(robust.weight(image.image.data[i] - target_.data[i]));
-  gauss_newton(jacobian, loss_adjoint(image, target_, robust).data, weight, result);
+  gauss_newton(jacobian, loss_adjoint(image, target_, rho).data, curvature_weights(image.image, target_, rho), result);
   result.image = std::move(image.image);
-  const double mean = mean_square(target_);
+  const double mean = mean_square(target_, problem_.readings());
   const int unknowns = static_cast<int>(theta.size());
   problem_.penalty().add_gradient(theta, mean, result.gradient);
   problem_.penalty().add_curvature(unknowns, mean, result.curvature);

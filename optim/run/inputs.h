@@ -2,7 +2,7 @@
 //   DIR/inputs/inputs.yaml      which files they are copies of, with checksums
 //   DIR/inputs/experiment.yaml  the experiment as the user wrote it (what counts is DIR/experiment.yaml)
 //   DIR/inputs/scene/           the scene file and its meshes
-//   DIR/inputs/                 target images, and files of numbers, whose values stand in DIR/experiment.yaml too
+//   DIR/inputs/                 target images and mask, and files of numbers, whose values stand in DIR/experiment.yaml too
 // So a run needs nothing outside its folder, which can be moved.
 #pragma once
 #include <functional>

@@ -103,7 +103,7 @@ class Run {
     const int first = state_.iteration;
     LoopOptions loop;
     loop.iterations = spec.iterations;
-    loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_));
+    loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_, problem_.readings()));
     loop.warning = options_.warning;
     loop.row = [&](const Evaluation& now, const std::vector<double>& theta, bool closing) {
       last_ = {state_.iteration + (closing ? 1 : 0),

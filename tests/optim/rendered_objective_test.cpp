@@ -49,7 +49,7 @@ TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
           for (std::size_t k = 0; k < images[i].data.size(); ++k) jacobian[i].data[k] += 0.5 * images[i].data[k];
       }
     }
-    const RobustLoss robust = problem.robust_loss(target);
+    const ReadingLoss robust = problem.reading_loss(target);
     const SplitImage image = render_halves(renderer, problem.stream(Pass::primal, 5), {0, 16});
     EXPECT_EQ(image.image.data, at.image.data);
     const GatedImage adjoint = loss_adjoint(image, target, robust);
@@ -59,7 +59,7 @@ TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
       for (int j : {0, 1}) {
         double sum = 0;
         for (std::size_t k = 0; k < target.data.size(); ++k)
-          sum += robust.weight(at.image.data[k] - target.data[k]) * jacobian[i].data[k] * jacobian[j].data[k];
+          sum += robust.weight(at.image.data[k], target.data[k]) * jacobian[i].data[k] * jacobian[j].data[k];
         EXPECT_NEAR(at.curvature_bound[2 * i + j], 2 * sum / 128, 1e-12 * at.curvature_bound[0]);
       }
     }

@@ -1,0 +1,63 @@
+#include "optim/problem/readings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/base/error.h"
+#include "core/image/npy.h"
+
+namespace isochron {
+
+double Readings::pixels(const GatedImage& image) const {
+  return pixel.empty() ? image.pixels() : static_cast<double>(pixel.size() - std::count(pixel.begin(), pixel.end(), 0));
+}
+
+double Readings::count(const GatedImage& image) const {
+  const auto gates =
+      gate.empty() ? image.gates : static_cast<double>(gate.size() - std::count(gate.begin(), gate.end(), 0));
+  return pixels(image) * gates * image.channels;
+}
+
+Readings make_readings(const Experiment& experiment, const GateSet& gates, int width, int height, int spots) {
+  const TargetSpec& target = experiment.target;
+  Readings readings;
+  if (target.windowed()) {
+    const auto [start, stop] = target.window;
+    if (gates.shape().is_steady())
+      throw InputError(experiment.file + ": target.window: the steady sensor has no gates to choose from");
+    for (int g = 0; g < gates.size(); ++g)
+      readings.gate.push_back(gates.center(g) >= start && gates.center(g) <= stop);
+    if (std::count(readings.gate.begin(), readings.gate.end(), 1) == 0)
+      throw InputError(fmt::format("{}: target.window: no gate has its centre within {} to {} (they lie at {:.4g} to "
+                                   "{:.4g} scene units)",
+                                   experiment.file, start, stop, gates.center(0), gates.center(gates.size() - 1)));
+  }
+  if (!target.mask.empty()) {
+    const NumberArray mask = read_npy(target.mask);
+    const auto rows = static_cast<std::size_t>(height / spots), columns = static_cast<std::size_t>(width);
+    if (mask.shape != std::vector<std::size_t>{columns, rows})
+      throw InputError(fmt::format("{}: an array of [{}] (allowed: [{}, {}], columns and rows of the {})", target.mask,
+                                   fmt::join(mask.shape, ", "), columns, rows,
+                                   spots > 1 ? "images of one spot" : "images"));
+    for (std::size_t y = 0; y < rows * spots; ++y)
+      for (std::size_t x = 0; x < columns; ++x) readings.pixel.push_back(mask.values[x * rows + y % rows] != 0);
+    if (std::count(readings.pixel.begin(), readings.pixel.end(), 1) == 0)
+      throw InputError(target.mask + ": leaves no pixel (at least one entry other than zero)");
+  }
+  return readings;
+}
+
+void require_counts(const GatedImage& target, const Readings& readings, const std::string& what) {
+  for (int pixel = 0; pixel < target.pixels(); ++pixel)
+    for_each_reading(target, readings, pixel, [&](std::size_t i) {
+      if (const double value = target.data[i]; !(value >= 0) || !std::isfinite(value))
+        throw InputError(fmt::format("{}: {} at column {}, row {}, gate {} is no count (loss.kind: poisson needs numbers "
+                                     "of at least 0; target.mask and target.window leave readings out)",
+                                     what, value, pixel % target.width, pixel / target.width,
+                                     i / target.channels % target.gates));
+    });
+}
+
+}  // namespace isochron
