@@ -7,6 +7,7 @@
 #include "app/progress.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
+#include "optim/problem/capture_data.h"
 #include "optim/problem/darkness.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/gate_columns.h"
@@ -44,6 +45,8 @@ int render(const CommonOptions& options) {
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
   const bool plotted = !options.no_plots && draw_plots(folder);
   std::vector<std::string> files = {"render.exr", "render.csv"};
+  if (write_histograms(folder + "/render.h5", problem.experiment(), problem.scene(), estimate.image))
+    files.push_back("render.h5");
   if (plotted) files.push_back("render.png");
   say_written(folder, files);
   return options.no_plots || plotted ? 0 : 1;

@@ -58,6 +58,9 @@ class Bins final : public GateDescription {
     return centers;
   }
   bool needs_bins() const override { return given_ == 0; }
+  std::optional<BinGrid> bins(const GateUnits& units) const override {
+    return BinGrid{units.length * start_, units.length * width_, count_};
+  }
   std::shared_ptr<GateDescription> with_bins(double start, double width, int count) const override {
     auto copy = std::make_shared<Bins>(*this);
     copy->given_ = kKeys;

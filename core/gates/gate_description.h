@@ -3,6 +3,7 @@
 #pragma once
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -33,6 +34,12 @@ struct GateMarks {
   std::string unit;  ///< empty: the unit of the gates' lengths
 };
 
+/// Contiguous bins, in scene units.
+struct BinGrid {
+  double start, width;
+  int count;
+};
+
 class GateDescription {
  public:
   virtual ~GateDescription() = default;
@@ -57,6 +64,8 @@ class GateDescription {
 
   /// Whether its bins were not given: they are those of the target's file. Until with_bins there is neither shape nor centre.
   virtual bool needs_bins() const { return false; }
+  /// Those that it has.
+  virtual std::optional<BinGrid> bins(const GateUnits&) const { return std::nullopt; }
   /// The same with `count` bins, each so wide, the first beginning at `start`, in the unit of lengths.
   virtual std::shared_ptr<GateDescription> with_bins(double /*start*/, double /*width*/, int /*count*/) const {
     throw std::logic_error("this kind of gate has no bins");

@@ -221,6 +221,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   work = 0;
   if (options.sampling == Sampling::standard || gates.shape().is_unbounded()) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
+  if (scene.capture) return {0, 0};  // one technique serves all gates, see Passes
   const double width = gates.relative_width(), coverage = gates.relative_coverage();
   EstimatorOptions plain = options;
   plain.mix.reset();

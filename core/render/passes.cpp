@@ -40,12 +40,13 @@ SamplingMix mix_of(const EstimatorOptions& options, const GateSet& gates, const 
 Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator,
                const TangentBasis* tangent, SceneCache* cache)
     : ready(ready_scene(source, tangent, {estimator.follow_radius, estimator.follow}, cache)),
-      gates(gate_set),
+      // What is counted later by t meets a gate of length l + t.
+      gates(source.detector.time_offset == 0 ? gate_set : gate_set.shifted(-source.detector.time_offset)),
       options(estimator),
       basis(tangent),
       scene(ready->scene),
-      mix(mix_of(estimator, gate_set, source)),
-      every_gate(gate_set),
+      mix(mix_of(estimator, gates, source)),
+      every_gate(gates),
       cache_(cache) {
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
   // (measured on the cube and the box, 0.1 % to 10 %).

@@ -56,7 +56,7 @@ class Passes {
   void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
 
   const std::shared_ptr<ReadyScene> ready;
-  const GateSet& gates;
+  const GateSet gates;  ///< as the detector's time offset shifts them
   const EstimatorOptions options;
   const TangentBasis* const basis;
   const PreparedScene& scene;

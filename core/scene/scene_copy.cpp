@@ -42,8 +42,8 @@ std::vector<FileCopy> copy_of_scene(const std::string& file) {
   std::vector<FileCopy> copies{copy_of_file(file, fs::path(file).filename().string())};
   YAML::Node scene = YAML::Load(copies[0].contents);
   bool changed = false;
-  for (YAML::Node shape : scene["shapes"]) {
-    const std::string text = shape["file"].Scalar();
+  const auto copy_file_of = [&](YAML::Node owner) {
+    const std::string text = owner["file"].Scalar();
     const std::string original = (fs::path(file).parent_path() / text).lexically_normal().string();
     const auto known =
         std::find_if(copies.begin() + 1, copies.end(), [&](const FileCopy& copy) { return copy.original == original; });
@@ -56,14 +56,16 @@ std::vector<FileCopy> copy_of_scene(const std::string& file) {
       name = free_name(name, copies);
       copies.push_back(copy_of_file(original, name));
     }
-    if (name == normal) continue;
-    shape["file"] = name;
+    if (name == normal) return;
+    owner["file"] = name;
     changed = true;
-  }
+  };
+  for (YAML::Node shape : scene["shapes"]) copy_file_of(shape);
+  if (scene["capture"] && scene["capture"]["file"]) copy_file_of(scene["capture"]);
   if (changed) {
     YAML::Emitter text;
     text << scene;
-    copies[0].contents = std::string("# Written anew, as its meshes have moved.\n") + text.c_str() + "\n";
+    copies[0].contents = std::string("# Written anew, as its files have moved.\n") + text.c_str() + "\n";
   }
   return copies;
 }

@@ -159,7 +159,7 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
 }
 
 Experiment advised(Experiment experiment, const Setting& setting) {
-  if (experiment.target.images.empty())
+  if (!experiment.target.measured())
     experiment.target.max_bounces = std::max(experiment.target.max_bounces, experiment.estimator.max_bounces);
   experiment.estimator.max_bounces = setting.max_bounces;
   experiment.estimator.sampling = setting.sampling;

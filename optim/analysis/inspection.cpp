@@ -133,7 +133,7 @@ std::vector<InspectedPoint> points_to_inspect(const Parameters& parameters, cons
 
 int full_bounces(const Experiment& experiment) {
   const int own = experiment.estimator.max_bounces;
-  return experiment.target.images.empty() ? std::max(own, experiment.target.max_bounces) : own;
+  return !experiment.target.measured() ? std::max(own, experiment.target.max_bounces) : own;
 }
 
 PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds, const Poll& poll) {
@@ -148,14 +148,14 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
   const Renderer renderer(scene, problem.gates(), options, &basis);
 
   // A target from a file is fixed; else every replicate has its own.
-  const bool rendered = experiment.target.images.empty();
+  const bool rendered = !experiment.target.measured();
   const Scene target_scene = rendered ? parameters.apply(parameters.target()) : Scene();
   std::optional<Renderer> target_renderer;
   GatedImage target;
   if (rendered)
     target_renderer.emplace(target_scene, problem.gates(), options);
   else
-    target = problem.read_target(experiment.target.images);
+    target = problem.make_target([] {});
 
   PointInspection result;
   result.point = point;

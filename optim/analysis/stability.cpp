@@ -156,7 +156,7 @@ GateSpec with_relative_width(const GateSpec& gates, double width) {
 
 Stability map_stability(const Experiment& experiment, const StabilityOptions& options) {
   if (experiment.gates.unbounded()) with_relative_width(experiment.gates, 1);  // throws
-  if (!experiment.target.images.empty())
+  if (experiment.target.measured())
     throw InputError(experiment.file +
                      ": target.images: measured images have one width of gates (a target to be rendered)");
   Stability map;

@@ -53,7 +53,10 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
   keys.value("images", folder.file(target.images),
              "EXR file of measured images, one channel or three per gate; without it the target is rendered",
              {.unset = target.images.empty()});
-  const Only rendered{target.images.empty(), "rendered targets", "images"};
+  keys.value("capture", folder.file(target.capture),
+             "HDF5 file of a measurement's counts; gates of kind `bins` may leave theirs to it, or combine some of its",
+             {.only = {target.images.empty(), "targets without images", "images"}, .unset = target.capture.empty()});
+  const Only rendered{!target.measured(), "rendered targets", target.images.empty() ? "a capture" : "images"};
   keys.value("samples", field::integer(target.samples, 1, kMostSamples), "per pixel", {.only = rendered});
   keys.value("seed", field::seed(target.seed), "of its random numbers", {.only = rendered});
   keys.value("max_bounces", field::integer(target.max_bounces, 0, kMostBounces), "of its light",
@@ -140,7 +143,9 @@ YamlValue found_at(YamlValue value, const std::vector<std::string>& path) {
 /// What gates ask of the rest of the experiment.
 void check_use_of_gates(const Experiment& experiment, const YamlValue& root) {
   const GateSpec& gates = experiment.gates;
-  if (gates.needs_bins())
+  if (!experiment.target.capture.empty() && gates.kind != "bins")
+    found_at(root, {"target", "capture"}).fail("a capture has bins", "gates of kind bins");
+  if (gates.needs_bins() && experiment.target.capture.empty())
     found_at(root, {"gates"}).fail("start, width and count are missing", "required without a target's file of bins");
   if (gates.kind != "modulated") return;
   if (experiment.estimator.sampling == Sampling::ellipsoidal)
@@ -204,7 +209,7 @@ void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
   keys.map(
       "target", [&](Keys& inner) { describe(inner, e.target, folder); }, "the images to be matched");
   keys.list("parameters", e.parameters,
-            [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, e.target.images.empty()); },
+            [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, !e.target.measured()); },
             "the unknowns; those of one shape act in this order", {.otherwise = "none"});
   keys.map(
       "samples", [&](Keys& inner) { describe(inner, e.samples); }, "per pixel and iteration");

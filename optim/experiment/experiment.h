@@ -62,7 +62,8 @@ GateMarks gate_marks(const GateSpec& spec);
 ExrNotes exr_notes(const GateSpec& spec);
 
 struct TargetSpec {
-  std::string images;  ///< absolute path of an EXR; empty: render at the target values
+  std::string images;   ///< absolute path of an EXR
+  std::string capture;  ///< absolute path of an HDF5 file of counts
   int samples = 4096;
   std::uint64_t seed = 7;
   int max_bounces = 8;  ///< of the rendered target; the experiment's own where the file does not say
@@ -71,6 +72,8 @@ struct TargetSpec {
   /// Gates whose centre lies outside are not used, in scene units; [-infinity, infinity]: all are.
   std::array<double, 2> window{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::string mask;  ///< absolute path of a .npy file [columns, rows]: pixels with a zero are not used; empty: all are
+  /// Whether it is read from a file; else it is rendered at the target values.
+  bool measured() const { return !images.empty() || !capture.empty(); }
   bool windowed() const { return std::isfinite(window[0]) || std::isfinite(window[1]); }
 };
 

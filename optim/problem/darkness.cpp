@@ -61,9 +61,12 @@ std::optional<std::pair<double, double>> path_length_range(const Problem& proble
   Scene scene = problem.parameters().apply(theta);
   int& width = scene.camera.width;
   int& height = scene.camera.height;
-  const double shrink = std::min(1.0, static_cast<double>(kMostPixels) / std::max(width, height));
-  width = std::max(1, static_cast<int>(width * shrink));
-  height = std::max(1, static_cast<int>(height * shrink));
+  if (!scene.capture) {
+    const double shrink = std::min(1.0, static_cast<double>(kMostPixels) / std::max(width, height));
+    width = std::max(1, static_cast<int>(width * shrink));
+    height = std::max(1, static_cast<int>(height * shrink));
+  }
+  scene.detector = {.gain = 1, .background = std::vector<double>(scene.detector.background.size()), .time_offset = 0};
   // A path of n bounces has n + 1 segments or, seen directly, one; none is longer than the scene.
   Vec3 low = scene.camera.position, high = low;
   for (const Vec3& p : scene.positions)
@@ -90,6 +93,8 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
     if (std::all_of(images.begin(), images.end(), [&](const GatedImage* image) { return is_black(*image, g); }))
       dark.push_back(g);
   if (dark.empty()) return {};
+  // The first bins of a histogram are often dark.
+  if (static_cast<int>(dark.size()) < gates && problem.experiment().gates.kind == "bins") return {};
   std::string text = "no light reaches the gates of " + what;
   if (static_cast<int>(dark.size()) < gates)
     text = fmt::format("no light reaches {} {} of {} of {}", dark.size() == 1 ? "gate" : "gates", ranges(dark), gates,

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/scene/coincidence.h"
 #include "core/scene/scene_loader.h"
+#include "optim/problem/capture_data.h"
 #include "optim/problem/loss.h"
 #include "optim/problem/photon_noise.h"
 
@@ -82,6 +83,7 @@ void set_loss(const LossEstimate& estimate, Evaluation& into) {
 Problem::Problem(Experiment experiment, const std::function<void(const std::string&)>& warning)
     : experiment_(std::move(experiment)),
       scene_(load_scene_at(experiment_)),
+      counts_(read_counts(experiment_, scene_)),
       gates_(make_gates(experiment_.gates)),
       parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters, length_unit(experiment_.gates))),
       cache_(std::make_unique<SceneCache>(scene_, caster_update(experiment_, scene_))),
@@ -118,7 +120,7 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
       const double images =
           experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;
       job = {evaluations_ * images * samples.primal, evaluations_ * job.interior, evaluations_ * job.path_length};
-      if (experiment_.target.images.empty()) job.image += experiment_.target.samples;
+      if (!experiment_.target.measured()) job.image += experiment_.target.samples;
     }
     options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose, job);
     known = options;
@@ -188,6 +190,7 @@ GatedImage Problem::read_target(const std::string& file) const {
 GatedImage Problem::make_target(const Poll& poll) const {
   const TargetSpec& target = experiment_.target;
   if (!target.images.empty()) return read_target(target.images);
+  if (counts_) return *counts_;
   // Rendered in parts so that a request to stop does not wait for thousands of samples per pixel.
   const int parts = std::min(32, target.samples);
   const Stream stream{target.seed, 0, pass_number(Pass::target)};

@@ -132,6 +132,7 @@ class Problem {
 
   Experiment experiment_;
   Scene scene_;
+  std::optional<GatedImage> counts_;  ///< of the target's file; reading them may set the gates' bins
   GateSet gates_;
   std::unique_ptr<Parameters> parameters_;
   std::unique_ptr<SceneCache> cache_;

@@ -47,7 +47,7 @@ std::vector<FileCopy> collect_inputs(const Experiment& experiment) {
   };
   add(experiment.file, "experiment.yaml");
   for (const std::string& file : experiment.number_files) add(file, fs::path(file).filename().string());
-  for (const std::string& file : {experiment.target.images, experiment.target.mask})
+  for (const std::string& file : {experiment.target.images, experiment.target.capture, experiment.target.mask})
     if (!file.empty()) add(file, fs::path(file).filename().string());
   std::erase_if(inputs, [](const FileCopy& copy) { return copy.original.empty(); });
   return inputs;
@@ -75,7 +75,7 @@ void write_inputs(const std::string& folder, const std::vector<FileCopy>& inputs
     write_file_atomically(file.string(), copy.contents);
   }
   experiment.scene = (place / find(inputs, experiment.scene)->name).string();
-  for (std::string* file : {&experiment.target.images, &experiment.target.mask})
+  for (std::string* file : {&experiment.target.images, &experiment.target.capture, &experiment.target.mask})
     if (!file->empty()) *file = (place / find(inputs, *file)->name).string();
 }
 

@@ -11,6 +11,7 @@
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/darkness.h"
+#include "optim/problem/capture_data.h"
 #include "optim/problem/loss.h"
 #include "optim/problem/memory.h"
 #include "optim/problem/problem.h"
@@ -141,6 +142,7 @@ class Run {
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
     geometry.write("final", state_.theta);
     write_exr(path("final.exr"), final_image, notes_);
+    write_histograms(path("final.h5"), problem_.experiment(), problem_.scene(), final_image);
     return result;
   }
 

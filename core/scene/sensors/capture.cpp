@@ -4,8 +4,11 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
 #include <string>
 
+#include "core/base/error.h"
+#include "core/image/capture_file.h"
 #include "core/scene/coordinates.h"
 #include "core/scene/sensors/pinhole.h"
 
@@ -89,6 +92,25 @@ Field laser(std::vector<Vec3>& spots) {
           "`confocal`: the laser lights the point that is looked at; `points`: every sensor point is seen with every spot"};
 }
 
+std::vector<WallPoint> wall_points(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
+  std::vector<WallPoint> result;
+  for (std::size_t i = 0; i < points.size(); ++i) result.push_back({points[i], normals[i]});
+  return result;
+}
+
+/// The geometry that the measurement's file holds, a metre being a scene unit.
+Capture read_capture_of(const std::string& file) {
+  const CaptureGeometry g = read_capture_geometry(file);
+  Capture capture;
+  capture.file = file;
+  capture.columns = g.columns;
+  capture.rows = g.rows;
+  capture.sensor = wall_points(g.sensor, g.sensor_normal);
+  capture.spots = wall_points(g.laser, g.laser_normal);
+  if (g.accounts_first_and_last) capture.origin = {g.laser_origin, g.sensor_origin};
+  return capture;
+}
+
 std::vector<WallPoint> with_normal(const std::vector<Vec3>& points, const Vec3& n) {
   std::vector<WallPoint> result;
   result.reserve(points.size());
@@ -105,18 +127,34 @@ void describe(Keys& keys, Capture& capture) {
   Capture::Origin origin;
   Keys::Places places;
   keys.remember(places);
+  const auto read_file = [&capture](const YamlValue& value) {
+    const std::string file =
+        (std::filesystem::path(value.file()).parent_path() / value.text()).lexically_normal().string();
+    try {
+      capture = read_capture_of(file);
+    } catch (const InputError& error) {
+      value.fail(error.what());
+    }
+  };
+  const bool from_file =
+      keys.value("file", {"file", "relative to the scene file", read_file, [&] { return yaml_text(capture.file); }},
+                 "HDF5 file of a measurement, whose geometry it is, in metres; in place of all other keys",
+                 {.unset = true});
+  const Only in_place{!from_file, "captures without a file", "`file`"};
   keys.map("sensor", [&](Keys& inner) { sensor.describe(inner); }, "the points of the wall that are looked at",
-           {.required = true});
-  keys.value("normal", unit_direction(normal), "of the wall, towards what is hidden", {.required = true});
-  keys.value("laser", laser(spots), "where the wall is lit");
+           {.required = true, .only = in_place});
+  keys.value("normal", unit_direction(normal), "of the wall, towards what is hidden",
+             {.required = true, .only = in_place});
+  keys.value("laser", laser(spots), "where the wall is lit", {.only = in_place});
   const auto stands = [&](Keys& inner) {
     inner.value("laser", field::vec3(origin.laser), "where the laser stands", {.required = true, .unit = "scene units"});
     inner.value("sensor", field::vec3(origin.sensor), "where the detector stands",
                 {.required = true, .unit = "scene units"});
   };
   keys.map("origin", stands, "so that the ways from the laser to the wall and from there to the detector count, too",
-           {.otherwise = "paths begin and end at the wall"});
+           {.only = in_place, .otherwise = "paths begin and end at the wall"});
   keys.check([&](const YamlValue& value) {
+    if (!capture.file.empty()) return;
     if (static_cast<double>(sensor.points.size()) * static_cast<double>(std::max<std::size_t>(1, spots.size())) >
         static_cast<double>(kMostPoints))
       value.fail("has too many pairs of sensor points and spots", fmt::format("at most {}", kMostPoints));

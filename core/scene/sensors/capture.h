@@ -5,6 +5,7 @@
 //   I = integral of G(s,x1)/pi f(x1) G(x1,x2) ... f(x(K-1)) G(x(K-1),l)/pi W(length),     G = cos cos / r^2 with visibility.
 #pragma once
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/base/description.h"
@@ -18,6 +19,7 @@ struct WallPoint {
 };
 
 struct Capture {
+  std::string file;               ///< that the geometry was read from; empty: from the scene file
   int columns = 0, rows = 0;      ///< of the grid of sensor points
   std::vector<WallPoint> sensor;  ///< row by row
   std::vector<WallPoint> spots;   ///< of the laser; none: confocal, each sensor point is lit while it is looked at

@@ -1,0 +1,21 @@
+// Histograms of captures: counts of a target's file for the experiment's bins, and readings written like them.
+#pragma once
+#include <optional>
+#include <string>
+
+#include "core/image/image.h"
+#include "core/scene/scene.h"
+#include "optim/experiment/experiment.h"
+
+namespace isochron {
+
+/// Counts of the file that the target names, for the bins of the experiment's gates, each of which holds one or several of the
+/// file's; gates without bins of their own get the file's. Empty where the target is none of a capture. Throws InputError where
+/// bins or sensor points do not fit.
+std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene);
+
+/// Writes readings of a capture's bins as the HDF5 file of a measurement; false where they are none.
+bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
+                      const GatedImage& readings);
+
+}  // namespace isochron

@@ -1,0 +1,248 @@
+// Readings of captures and their derivatives against quadrature: a tilted board, with and without an occluder before it, confocal
+// and with one spot. Means over replicates with seeds of their own; a test has at most some 60 comparisons, each of which fails
+// by chance with a probability of 3e-5 (Student's law, 15 degrees of freedom, 6 standard errors).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/render/renderer.h"
+#include "scene_building.h"
+#include "tests/render/shadow_quadrature.h"
+
+namespace isochron::testing {
+namespace {
+
+constexpr int kReplicates = 16, kCells = 14;
+constexpr double kStandardErrors = 6;
+
+/// How far each unknown is from where the scene has it.
+struct Offsets {
+  double board_x = 0, board_z = 0, occluder_x = 0, occluder_z = 0, albedo = 0, length = 0;
+};
+
+struct Setup {
+  bool confocal = true, occluded = true;
+  std::vector<Vec3> sensor{{-0.3, 0.25, 0}, {0.2, 0.3, 0}, {-0.15, -0.2, 0}, {0.35, -0.3, 0}};
+  Vec3 spot{0.1, -0.2, 0}, normal{0, 0, 1};
+
+  BoardAndOccluder at(const Offsets& o) const {
+    BoardAndOccluder b;
+    b.board = {{{-0.2, -0.25, 0.4}, {0.25, -0.25, 0.55}, {0.25, 0.2, 0.55}, {-0.2, 0.2, 0.4}}};
+    b.occluder = {{{-0.1, -0.05, 0.25}, {0.05, -0.05, 0.25}, {0.05, 0.15, 0.25}, {-0.1, 0.15, 0.25}}};
+    for (Vec3& p : b.board) p += {o.board_x, 0, o.board_z};
+    for (Vec3& p : b.occluder) p += {o.occluder_x, 0, o.occluder_z};
+    b.occluded = occluded;
+    b.albedo += o.albedo;
+    return b;
+  }
+  /// Mean over sensor points, per gate.
+  std::vector<double> readings(const GateSet& gates, const Offsets& o) const {
+    std::vector<double> sums(gates.size(), 0.0);
+    const BoardAndOccluder scene = at(o);
+    for (const Vec3& s : sensor)
+      for (int g = 0; g < gates.size(); ++g)
+        sums[g] += scene.reading(
+                       s, confocal ? s : spot, normal,
+                       [&](double l) { return gates.shape().value(l + o.length - gates.center(g)); }, kCells) /
+                   static_cast<double>(sensor.size());
+    return sums;
+  }
+  std::vector<double> differences(const GateSet& gates, double Offsets::*unknown, double step) const {
+    Offsets up, down;
+    up.*unknown = step;
+    down.*unknown = -step;
+    std::vector<double> result = readings(gates, up);
+    const std::vector<double> below = readings(gates, down);
+    for (std::size_t g = 0; g < result.size(); ++g) result[g] = (result[g] - below[g]) / (2 * step);
+    return result;
+  }
+
+  Scene scene() const {
+    const BoardAndOccluder b = at({});
+    Scene scene;
+    scene.capture.emplace();
+    Capture& capture = *scene.capture;
+    capture.columns = static_cast<int>(sensor.size());
+    capture.rows = 1;
+    for (const Vec3& s : sensor) capture.sensor.push_back({s, normal});
+    if (!confocal) capture.spots = {{spot, normal}};
+    scene.camera.width = capture.columns;
+    scene.camera.height = 1;
+    scene.camera.look_at = {0, 0, 1};
+    add_shape(scene, "board", quad(b.board[0], b.board[1], b.board[2], b.board[3]), diffuse(Rgb(b.albedo), true));
+    if (occluded)
+      add_shape(scene, "occluder", quad(b.occluder[0], b.occluder[1], b.occluder[2], b.occluder[3]),
+                diffuse(Rgb(0.0), true));
+    scene.shapes[0].sought = true;
+    return scene;
+  }
+};
+
+/// board x, board z, [occluder x, occluder z,] albedo, time offset
+TangentBasis basis_of(const Scene& scene, bool occluded) {
+  const DofLayout layout(scene);
+  std::vector<std::vector<TangentBasis::Entry>> rows(layout.size());
+  int column = 0;
+  for (int s = 0; s < (occluded ? 2 : 1); ++s)
+    for (const int axis : {0, 2}) {
+      const Shape& shape = scene.shapes[s];
+      for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v)
+        rows[layout.vertex(v, axis)].push_back({column, 1.0});
+      ++column;
+    }
+  for (int c = 0; c < 3; ++c) rows[layout.number(0, c)].push_back({column, 1.0});
+  rows[layout.time_offset()].push_back({column + 1, 1.0});
+  TangentBasis basis;
+  basis.columns = column + 2;
+  for (const auto& row : rows) {
+    basis.row_begin.push_back(static_cast<int>(basis.entries.size()));
+    basis.entries.insert(basis.entries.end(), row.begin(), row.end());
+  }
+  basis.row_begin.push_back(static_cast<int>(basis.entries.size()));
+  return basis;
+}
+
+struct Means {
+  std::vector<double> mean, error;  // per gate
+};
+
+Means over_replicates(int gates, const std::function<GatedImage(int)>& image_of) {
+  Means m{std::vector<double>(gates, 0.0), std::vector<double>(gates, 0.0)};
+  std::vector<std::vector<double>> all;
+  for (int r = 0; r < kReplicates; ++r) {
+    const GatedImage image = image_of(r);
+    std::vector<double>& row = all.emplace_back();
+    for (int g = 0; g < gates; ++g) {
+      row.push_back(image.mean(g));
+      m.mean[g] += row[g] / kReplicates;
+    }
+  }
+  for (int g = 0; g < gates; ++g) {
+    for (const auto& row : all) m.error[g] += (row[g] - m.mean[g]) * (row[g] - m.mean[g]);
+    m.error[g] = std::sqrt(m.error[g] / (kReplicates * (kReplicates - 1.0)));
+  }
+  return m;
+}
+
+void expect_means(const Means& m, const std::vector<double>& expected, double precision, const std::string& what) {
+  double scale = 0;
+  for (const double e : expected) scale = std::max(scale, std::abs(e));
+  ASSERT_GT(scale, 0) << what;
+  for (std::size_t g = 0; g < expected.size(); ++g) {
+    EXPECT_NEAR(m.mean[g], expected[g], kStandardErrors * m.error[g] + 1e-6 * scale) << what << ", gate " << g;
+    EXPECT_LT(m.error[g], precision * scale) << what << ", gate " << g;
+  }
+}
+
+void expect_readings_and_derivatives(const Setup& setup, const GateSet& gates, EstimatorOptions options, int samples,
+                                     double precision, double step = 3e-4) {
+  options.max_bounces = 1;
+  const Scene scene = setup.scene();
+  const TangentBasis basis = basis_of(scene, setup.occluded);
+  const Renderer renderer(scene, gates, options, &basis);
+  const SampleRange range{0, samples};
+  const auto seed = [](int r) { return static_cast<std::uint64_t>(r + 1); };
+  expect_means(over_replicates(gates.size(), [&](int r) { return renderer.render({seed(r), 0, 0}, range); }),
+               setup.readings(gates, {}), precision, "readings");
+  std::vector<std::vector<GatedImage>> derivatives;
+  for (int r = 0; r < kReplicates; ++r) {
+    std::vector<GatedImage> sum;
+    for (const Term term : kTerms) {
+      const auto part = renderer.derive(term, {seed(r), 0, 1 + static_cast<std::uint32_t>(term)}, range);
+      if (sum.empty()) {
+        sum = part;
+        continue;
+      }
+      for (std::size_t i = 0; i < sum.size(); ++i)
+        for (std::size_t k = 0; k < sum[i].data.size(); ++k) sum[i].data[k] += part[i].data[k];
+    }
+    derivatives.push_back(std::move(sum));
+  }
+  std::vector<std::pair<const char*, double Offsets::*>> unknowns{{"board x", &Offsets::board_x},
+                                                                  {"board z", &Offsets::board_z}};
+  if (setup.occluded) {
+    unknowns.emplace_back("occluder x", &Offsets::occluder_x);
+    unknowns.emplace_back("occluder z", &Offsets::occluder_z);
+  }
+  unknowns.emplace_back("albedo", &Offsets::albedo);
+  unknowns.emplace_back("time offset", &Offsets::length);
+  for (std::size_t i = 0; i < unknowns.size(); ++i)
+    expect_means(over_replicates(gates.size(), [&](int r) { return derivatives[r][i]; }),
+                 setup.differences(gates, unknowns[i].second, step), 10 * precision, unknowns[i].first);
+}
+
+const GateSet kWide(GateShape::gaussian(0.02), {0.9, 1.0, 1.1, 1.2});
+
+TEST(CaptureReadings, Confocal) {
+  expect_readings_and_derivatives({.confocal = true, .occluded = false}, kWide, {}, 1024, 0.003);
+}
+
+TEST(CaptureReadings, OneSpot) {
+  expect_readings_and_derivatives({.confocal = false, .occluded = false}, kWide, {}, 1024, 0.003);
+}
+
+TEST(CaptureReadings, ConfocalWithOccluder) {
+  expect_readings_and_derivatives({.confocal = true, .occluded = true}, kWide, {}, 2048, 0.006);
+}
+
+TEST(CaptureReadings, OneSpotWithOccluder) {
+  expect_readings_and_derivatives({.confocal = false, .occluded = true}, kWide, {}, 2048, 0.006);
+}
+
+TEST(CaptureReadings, NarrowGates) {
+  const GateSet narrow(GateShape::gaussian(0.004), {1.0, 1.1});
+  expect_readings_and_derivatives({.confocal = true, .occluded = true}, narrow, {}, 8192, 0.006, 6e-5);
+}
+
+TEST(CaptureReadings, BinsWithResponse) {
+  std::vector<double> centers;
+  for (int i = 0; i < 8; ++i) centers.push_back(0.9 + 0.06 * i);
+  // Rises at once, then decays: light is counted later than it comes.
+  const GateSet bins(GateShape::bin(0.06, {0, 0.03, 0.1}, {1, 0.4, 0}), centers);
+  expect_readings_and_derivatives({.confocal = true, .occluded = false}, bins, {}, 1024, 0.003);
+}
+
+TEST(CaptureReadings, BinsWithoutResponseHaveDiracParts) {
+  const GateSet bins(GateShape::boxcar(0.08), {0.9, 0.98, 1.06, 1.14});
+  Setup setup{.confocal = true, .occluded = false};
+  expect_readings_and_derivatives(setup, bins, {}, 2048, 0.02, 2e-3);
+  setup.confocal = false;
+  expect_readings_and_derivatives(setup, bins, {}, 2048, 0.02, 2e-3);
+}
+
+TEST(CaptureReadings, EllipsoidalSampling) {
+  EstimatorOptions options;
+  options.sampling = Sampling::ellipsoidal;
+  const GateSet narrow(GateShape::gaussian(0.004), {1.0, 1.1});
+  expect_readings_and_derivatives({.confocal = true, .occluded = false}, narrow, options, 1024, 0.006, 6e-5);
+  expect_readings_and_derivatives({.confocal = false, .occluded = false}, narrow, options, 1024, 0.006, 6e-5);
+}
+
+/// The gradient for some adjoint is the weighted sum of derivative images.
+TEST(CaptureReadings, GradientsAreSumsOfDerivatives) {
+  const Setup setup{.confocal = false, .occluded = true};
+  const Scene scene = setup.scene();
+  const TangentBasis basis = basis_of(scene, true);
+  EstimatorOptions options;
+  options.max_bounces = 2;
+  const Renderer renderer(scene, kWide, options, &basis);
+  GatedImage weights(scene.camera.width, scene.camera.height, kWide.size(), 1);
+  for (std::size_t i = 0; i < weights.data.size(); ++i) weights.data[i] = 1.0 + 0.1 * static_cast<double>(i % 7);
+  for (const Term term : {Term::interior, Term::visibility}) {
+    std::vector<double> dofs(DofLayout(scene).size(), 0.0);
+    renderer.add_gradient(term, weights, {5, 0, 0}, {0, 4096}, dofs);
+    const std::vector<double> gradient = basis.transpose_apply(dofs);
+    const auto images = renderer.derive(term, {6, 0, 0}, {0, 4096});
+    for (int column = 0; column < basis.columns; ++column) {
+      double sum = 0, size = 0;
+      for (std::size_t i = 0; i < weights.data.size(); ++i) {
+        sum += weights.data[i] * images[column].data[i];
+        size += std::abs(weights.data[i] * images[column].data[i]);
+      }
+      EXPECT_NEAR(gradient[column], sum, 0.05 * size) << name(term) << ", column " << column;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace isochron::testing
