@@ -85,7 +85,7 @@ inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const Ga
     recorder.closest_hit(scene.camera.position, direction);
     const auto hit = scene.trace_camera(direction);
     if (!hit) continue;
-    worker.start_at_camera(path);
+    worker.start_at_sensor(path, 0);
     path.push(scene, *hit);
     StandardWalk<Visitor> walk(worker, path, max_bounces, {gates.lower(), gates.upper()}, {recorder, next_event});
     walk.begin(rng);

@@ -97,7 +97,7 @@ void BM_PathStep(benchmark::State& state) {
     Rng rng = base.with_sample(sample);
     path.start(eye, 0);
     path.push(prepared, points[sample++ % points.size()]);
-    walk_standard(worker, path, 1, {0, 1e30}, rng, Visitor{sum});
+    walk_standard(worker, path, 0, 1, {0, 1e30}, rng, Visitor{sum});
   }
   benchmark::DoNotOptimize(sum);
 }

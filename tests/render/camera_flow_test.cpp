@@ -185,7 +185,7 @@ TEST(CameraFlow, ShadowsMoveWithEverything) {
     SecondaryBoundary boundary(worker, edges, unguided, false);
     for (int i = 0; i < 2000; ++i) {
       Rng rng(Stream{9, 0, 0}, i, 0);
-      boundary.sample_from_edge(1, rng);
+      boundary.sample_from_edge(0, 1, rng);
       boundary.sample_from_camera(i % 64, 1, rng);
     }
     EXPECT_GT(sink.segments, 100);

@@ -20,7 +20,7 @@ struct Offsets {
   double board_x = 0, board_z = 0, occluder_x = 0, occluder_z = 0, albedo = 0, length = 0;
 };
 
-struct Setup {
+struct CaptureSetup {
   bool confocal = true, occluded = true;
   std::vector<Vec3> sensor{{-0.3, 0.25, 0}, {0.2, 0.3, 0}, {-0.15, -0.2, 0}, {0.35, -0.3, 0}};
   Vec3 spot{0.1, -0.2, 0}, normal{0, 0, 1};
@@ -134,7 +134,7 @@ void expect_means(const Means& m, const std::vector<double>& expected, double pr
   }
 }
 
-void expect_readings_and_derivatives(const Setup& setup, const GateSet& gates, EstimatorOptions options, int samples,
+void expect_readings_and_derivatives(const CaptureSetup& setup, const GateSet& gates, EstimatorOptions options, int samples,
                                      double precision, double step = 3e-4) {
   options.max_bounces = 1;
   const Scene scene = setup.scene();
@@ -204,7 +204,7 @@ TEST(CaptureReadings, BinsWithResponse) {
 
 TEST(CaptureReadings, BinsWithoutResponseHaveDiracParts) {
   const GateSet bins(GateShape::boxcar(0.08), {0.9, 0.98, 1.06, 1.14});
-  Setup setup{.confocal = true, .occluded = false};
+  CaptureSetup setup{.confocal = true, .occluded = false};
   expect_readings_and_derivatives(setup, bins, {}, 2048, 0.02, 2e-3);
   setup.confocal = false;
   expect_readings_and_derivatives(setup, bins, {}, 2048, 0.02, 2e-3);
@@ -220,7 +220,7 @@ TEST(CaptureReadings, EllipsoidalSampling) {
 
 /// The gradient for some adjoint is the weighted sum of derivative images.
 TEST(CaptureReadings, GradientsAreSumsOfDerivatives) {
-  const Setup setup{.confocal = false, .occluded = true};
+  const CaptureSetup setup{.confocal = false, .occluded = true};
   const Scene scene = setup.scene();
   const TangentBasis basis = basis_of(scene, true);
   EstimatorOptions options;

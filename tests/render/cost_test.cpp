@@ -171,7 +171,7 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
       if (from_camera)
         boundary.sample_from_camera(i % prepared.camera.pixels(), 1, rng);
       else
-        boundary.sample_from_edge(1, rng);
+        boundary.sample_from_edge(0, 1, rng);
     }
     return static_cast<double>(worker.rays) / kSearches - from_camera;  // but for the camera's own
   };
