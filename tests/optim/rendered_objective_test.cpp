@@ -159,7 +159,8 @@ TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
 TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
   for (const char* optimizer : {"{method: adam, learning_rate: 0.05, iterations: 120}",
                                 "{method: lbfgs, learning_rate: 0.05, iterations: 12, inner_iterations: 5}",
-                                "{method: levenberg_marquardt, iterations: 12}"}) {
+                                "{method: levenberg_marquardt, iterations: 12}",
+                                "{method: quasi_newton, iterations: 12, inner_iterations: 5}"}) {
     const Problem problem(load_experiment(file_, {std::string("optimizer=") + optimizer, "target.samples=4096"}));
     const GatedImage target = problem.make_target(kGoOn);
     const RenderedObjective objective(problem, target, kGoOn);
