@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <optional>
 
 #include "optim/solvers/optimizer.h"
 
@@ -89,33 +90,53 @@ class QuasiNewton : public Optimizer {
     }
   }
 
-  /// One line search along the projected direction; false where no trial lowers the loss. Trials take the gradient with
-  /// the loss, since the first is nearly always the one.
+  /// A point along the projected direction.
+  struct Trial {
+    double slope;  ///< that of the loss at the start times the way there
+    Vector theta;
+    Evaluation at;
+  };
+
+  /// One line search; false where no trial lowers the loss. Trials take the gradient with the loss, since the first is nearly
+  /// always the one. Noise of the Jacobian makes the diagonal too large and steps too short; so they also become longer.
   bool descend(const Objective& objective, std::uint32_t iteration, Vector& at, Evaluation& here) {
-    const Vector &low = objective.lower(), &high = objective.upper();
-    const Vector direction = find_direction(at, here.gradient, low, high);
+    constexpr double kLonger = 2;  // by how much, where the loss still falls there
+    const Vector direction = find_direction(at, here.gradient, objective.lower(), objective.upper());
+    std::optional<Trial> best;
     double length = 1;
-    for (int trial = 0; trial < kMostTrials; ++trial) {
-      Vector next = at;
-      double slope = 0;
-      for (std::size_t i = 0; i < at.size(); ++i) {
-        next[i] = std::clamp(at[i] + length * direction[i], low[i], high[i]);
-        slope += here.gradient[i] * (next[i] - at[i]);
-      }
-      if (!(slope < 0)) return false;
-      Evaluation there = objective.evaluate(next, iteration);
+    for (int i = 0; i < kMostTrials; ++i) {
+      Trial trial = try_length(objective, iteration, at, here, direction, length);
+      if (!(trial.slope < 0)) break;
       constexpr double kLeastFall = 1e-4;  // Armijo's condition
-      if (finite(there) && there.loss <= here.loss + kLeastFall * slope) {
-        remember(at, here.gradient, next, there.gradient);
-        at = std::move(next);
-        here = std::move(there);
-        return true;
-      }
+      const bool falls = finite(trial.at) && trial.at.loss <= here.loss + kLeastFall * trial.slope;
+      if (best && (!falls || trial.at.loss >= best->at.loss)) break;
       // To the minimum of the parabola through both losses and the slope.
-      const double excess = there.loss - here.loss - slope;
-      length *= std::isfinite(excess) && excess > 0 ? std::clamp(-slope / (2 * excess), 0.1, 0.5) : 0.1;
+      const double excess = trial.at.loss - here.loss - trial.slope;
+      const double factor = excess > 0 ? -trial.slope / (2 * excess) : std::isfinite(excess) ? kLonger : 0;
+      if (falls) {
+        best = std::move(trial);
+        if (factor < kLonger) break;
+        length *= kLonger;
+      } else {
+        length *= std::clamp(factor, 0.1, 0.5);
+      }
     }
-    return false;
+    if (!best) return false;
+    remember(at, here.gradient, best->theta, best->at.gradient);
+    at = std::move(best->theta);
+    here = std::move(best->at);
+    return true;
+  }
+
+  static Trial try_length(const Objective& objective, std::uint32_t iteration, const Vector& at, const Evaluation& here,
+                          const Vector& direction, double length) {
+    Trial trial{0, at, {}};
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      trial.theta[i] = std::clamp(at[i] + length * direction[i], objective.lower()[i], objective.upper()[i]);
+      trial.slope += here.gradient[i] * (trial.theta[i] - at[i]);
+    }
+    if (trial.slope < 0) trial.at = objective.evaluate(trial.theta, iteration);
+    return trial;
   }
 
   void remember(const Vector& from, const Vector& gradient_from, const Vector& to, const Vector& gradient_to) {
