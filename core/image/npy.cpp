@@ -36,10 +36,12 @@ ElementType element_type() {
 /// By the kind and size that a descriptor ends with.
 const std::map<std::string, ElementType, std::less<>>& element_types() {
   static const std::map<std::string, ElementType, std::less<>> types = {
-      {"b1", element_type<std::uint8_t>()},  {"u1", element_type<std::uint8_t>()},  {"u2", element_type<std::uint16_t>()},
-      {"u4", element_type<std::uint32_t>()}, {"u8", element_type<std::uint64_t>()}, {"i1", element_type<std::int8_t>()},
-      {"i2", element_type<std::int16_t>()},  {"i4", element_type<std::int32_t>()},  {"i8", element_type<std::int64_t>()},
-      {"f4", element_type<float>()},         {"f8", element_type<double>()}};
+      {"b1", element_type<std::uint8_t>()},  {"u1", element_type<std::uint8_t>()},
+      {"u2", element_type<std::uint16_t>()}, {"u4", element_type<std::uint32_t>()},
+      {"u8", element_type<std::uint64_t>()}, {"i1", element_type<std::int8_t>()},
+      {"i2", element_type<std::int16_t>()},  {"i4", element_type<std::int32_t>()},
+      {"i8", element_type<std::int64_t>()},  {"f4", element_type<float>()},
+      {"f8", element_type<double>()}};
   return types;
 }
 
@@ -109,7 +111,8 @@ NumberArray read_npy(const std::string& file) {
   const std::size_t available = (contents->size() - begin) / element.size;
   std::size_t count = 1;
   for (const std::size_t extent : *shape) {
-    if (extent > 0 && count > available / extent) fail(fmt::format("ends before its {} elements", fmt::join(*shape, " x ")));
+    if (extent > 0 && count > available / extent)
+      fail(fmt::format("ends before its {} elements", fmt::join(*shape, " x ")));
     count *= extent;
   }
   NumberArray array{*shape, std::vector<double>(count)};

@@ -43,10 +43,13 @@ Field interval(std::array<double, 2>& ends) {
   return {"list of 2 numbers", "start below stop",
           [&ends](const YamlValue& value) {
             const std::vector<double> numbers = value.numbers();
-            if (numbers.size() != 2 || !(numbers[0] < numbers[1])) value.fail("is no interval", "[start, stop], start below stop");
+            if (numbers.size() != 2 || !(numbers[0] < numbers[1]))
+              value.fail("is no interval", "[start, stop], start below stop");
             ends = {numbers[0], numbers[1]};
           },
-          [&ends] { return yaml_list({ends[0], ends[1]}); }};
+          [&ends] {
+            return yaml_list({ends[0], ends[1]});
+          }};
 }
 
 void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {

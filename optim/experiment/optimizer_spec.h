@@ -9,13 +9,14 @@ namespace isochron {
 
 inline constexpr int kMostIterations = std::numeric_limits<int>::max() - 2;
 
-enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt };
+enum class OptimizerMethod { adam, lbfgs, levenberg_marquardt, quasi_newton };
 
 template <>
 inline constexpr auto kChoices<OptimizerMethod> = std::to_array<Choice<OptimizerMethod>>(
     {{OptimizerMethod::adam, "adam", "for many unknowns, few samples, long runs"},
      {OptimizerMethod::lbfgs, "lbfgs", "for smooth problems of some hundred unknowns"},
-     {OptimizerMethod::levenberg_marquardt, "levenberg_marquardt", "for few unknowns"}});
+     {OptimizerMethod::levenberg_marquardt, "levenberg_marquardt", "for few unknowns"},
+     {OptimizerMethod::quasi_newton, "quasi_newton", "for many unknowns of different units; needs no rate"}});
 
 /// Steps shrink so that noise averages out: from iteration `start` on they halve every `half_life` iterations.
 struct RateDecay {
@@ -29,13 +30,13 @@ struct RateDecay {
 struct OptimizerSpec {
   OptimizerMethod method = OptimizerMethod::adam;
   /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
-  /// levenberg_marquardt: without meaning.
+  /// levenberg_marquardt, quasi_newton: without meaning.
   double learning_rate = 0.02;
   int iterations = 100;
   double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
   int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
   RateDecay decay;           ///< adam
-  int inner_iterations = 5;  ///< lbfgs: steps on the random numbers of one iteration
+  int inner_iterations = 5;  ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
 };
 
 inline void describe(Keys& keys, OptimizerSpec& optimizer) {
@@ -64,7 +65,8 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   keys.map("decay", halving, "steps shrink, so that the noise that they carry averages out",
            {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
   keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
-             "line searches of an iteration, all on the same random numbers", {.only = of(OptimizerMethod::lbfgs)});
+             "line searches of an iteration, all on the same random numbers",
+             {.only = only(optimizer.method, {OptimizerMethod::lbfgs, OptimizerMethod::quasi_newton})});
 }
 
 }  // namespace isochron

@@ -108,7 +108,9 @@ std::vector<MemoryUse> run_memory(const Problem& problem) {
   std::vector<MemoryUse> parts = rendering_memory(problem, 4.5);
   const double image = image_bytes(problem), unknowns = problem.parameters().size();
   parts.push_back({"target, residual and adjoint images", 3 * image});
-  if (problem.experiment().optimizer.method != OptimizerMethod::levenberg_marquardt) return parts;
+  const OptimizerMethod method = problem.experiment().optimizer.method;
+  if (method == OptimizerMethod::quasi_newton) parts.push_back({"images of a line search", 3 * image});
+  if (method != OptimizerMethod::levenberg_marquardt) return parts;
   parts.push_back(
       {fmt::format("two halves of the Jacobian of {:.0f} residuals by {:.0f} unknowns", image / 8, unknowns),
        2 * image * unknowns});

@@ -37,6 +37,11 @@ class Objective {
   virtual Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
   /// The same with curvatures.
   virtual Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
+  /// An estimate of the diagonal of the Gauss-Newton matrix at theta, >= 0, right on average but for noise of the Jacobian J,
+  /// which makes it too large: (J' W^(1/2) z)^2 with random signs z, one for each reading and number of the probe, and what W
+  /// the loss has by its image. `now` is evaluate(theta, iteration). Costs about as much as a gradient.
+  virtual std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                              const Evaluation& now, int probe) const = 0;
 };
 
 }  // namespace isochron

@@ -221,8 +221,8 @@ void Problem::require_usable(const GatedImage& target, const std::string& what) 
 ReadingLoss Problem::reading_loss(const GatedImage& target) const {
   constexpr double kLeastMean = 0.02;  // see loss.h
   const LossSpec& loss = experiment_.loss;
-  const double scale =
-      loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings_) : loss.scale * std::sqrt(mean_square(target, readings_));
+  const double scale = loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings_)
+                                                      : loss.scale * std::sqrt(mean_square(target, readings_));
   return scale > 0 ? ReadingLoss{loss.kind, scale, readings_} : ReadingLoss{LossKind::squared, 0, readings_};
 }
 
@@ -285,6 +285,30 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   result.gradient = basis.transpose_apply(dof_gradient);
   penalty_.add_gradient(theta, mean_square(target, readings_), result.gradient);
   return result;
+}
+
+std::vector<double> Problem::transpose_apply(const std::vector<double>& theta, const GatedImage& image,
+                                             std::uint32_t iteration, const Poll& poll) const {
+  const SampleSpec& samples = experiment_.samples;
+  if (experiment_.gradient.method == GradientMethod::finite_difference) {
+    std::vector<double> product;
+    for (int i = 0; i < parameters_->size(); ++i) {
+      product.push_back(inner_product(
+          image, finite_difference(theta, i, stream(Pass::finite_difference, iteration), {0, samples.primal})));
+      poll();
+    }
+    return product;
+  }
+  const Scene scene = parameters_->apply(theta);
+  const TangentBasis basis = parameters_->tangent(theta);
+  const Renderer renderer = this->renderer(scene, estimator(samples.visibility), &basis);
+  std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
+  for (Term term : kTerms) {
+    if (samples.term(term) == 0) continue;
+    renderer.add_gradient(term, image, stream(pass_of(term), iteration), {0, samples.term(term)}, dof_gradient);
+    poll();
+  }
+  return basis.transpose_apply(dof_gradient);
 }
 
 GatedImage Problem::finite_difference(const std::vector<double>& theta, int component, const Stream& stream,

@@ -32,6 +32,7 @@ enum class Pass : std::uint32_t {
   finite_difference = 5,
   photon_noise = 6,
   mix = 7,
+  probe = 9,
   other_side = 8  ///< of a finite difference, where its images take random numbers of their own
 };
 
@@ -121,6 +122,11 @@ class Problem {
   /// [part][unknown], the same terms and pixels whatever the share.
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
+
+  /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. What of theta cannot
+  /// be rendered must not be asked for.
+  std::vector<double> transpose_apply(const std::vector<double>& theta, const GatedImage& image,
+                                      std::uint32_t iteration, const Poll& poll) const;
 
   /// Central difference of the images along one unknown with common random numbers. Where theta +- step
   /// leaves the bounds, the difference is taken between the bound and the other side.

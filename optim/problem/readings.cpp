@@ -27,12 +27,12 @@ Readings make_readings(const Experiment& experiment, const GateSet& gates, int w
     const auto [start, stop] = target.window;
     if (gates.shape().is_steady())
       throw InputError(experiment.file + ": target.window: the steady sensor has no gates to choose from");
-    for (int g = 0; g < gates.size(); ++g)
-      readings.gate.push_back(gates.center(g) >= start && gates.center(g) <= stop);
+    for (int g = 0; g < gates.size(); ++g) readings.gate.push_back(gates.center(g) >= start && gates.center(g) <= stop);
     if (std::count(readings.gate.begin(), readings.gate.end(), 1) == 0)
-      throw InputError(fmt::format("{}: target.window: no gate has its centre within {} to {} (they lie at {:.4g} to "
-                                   "{:.4g} scene units)",
-                                   experiment.file, start, stop, gates.center(0), gates.center(gates.size() - 1)));
+      throw InputError(
+          fmt::format("{}: target.window: no gate has its centre within {} to {} (they lie at {:.4g} to "
+                      "{:.4g} scene units)",
+                      experiment.file, start, stop, gates.center(0), gates.center(gates.size() - 1)));
   }
   if (!target.mask.empty()) {
     const NumberArray mask = read_npy(target.mask);
@@ -53,10 +53,10 @@ void require_counts(const GatedImage& target, const Readings& readings, const st
   for (int pixel = 0; pixel < target.pixels(); ++pixel)
     for_each_reading(target, readings, pixel, [&](std::size_t i) {
       if (const double value = target.data[i]; !(value >= 0) || !std::isfinite(value))
-        throw InputError(fmt::format("{}: {} at column {}, row {}, gate {} is no count (loss.kind: poisson needs numbers "
-                                     "of at least 0; target.mask and target.window leave readings out)",
-                                     what, value, pixel % target.width, pixel / target.width,
-                                     i / target.channels % target.gates));
+        throw InputError(
+            fmt::format("{}: {} at column {}, row {}, gate {} is no count (loss.kind: poisson needs numbers "
+                        "of at least 0; target.mask and target.window leave readings out)",
+                        what, value, pixel % target.width, pixel / target.width, i / target.channels % target.gates));
     });
 }
 

@@ -114,4 +114,18 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
   return result;
 }
 
+std::vector<double> RenderedObjective::probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                       const Evaluation& now, int probe) const {
+  GatedImage signs = now.image;
+  signs.data = curvature_weights(now.image, target_, problem_.reading_loss(target_));
+  for (std::size_t i = 0; i < signs.data.size(); ++i) {
+    Rng rng(problem_.stream(Pass::probe, iteration), i, static_cast<std::uint32_t>(probe));
+    signs.data[i] = std::copysign(std::sqrt(signs.data[i]), rng.uniform() - 0.5);
+  }
+  std::vector<double> diagonal = problem_.transpose_apply(theta, signs, iteration, poll_);
+  for (double& d : diagonal) d *= d;
+  problem_.penalty().add_diagonal(mean_square(target_, problem_.readings()), diagonal);
+  return diagonal;
+}
+
 }  // namespace isochron

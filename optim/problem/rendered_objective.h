@@ -29,6 +29,8 @@ class RenderedObjective : public Objective {
   /// Each term's samples are cut into two halves, an odd number rounded up. The Jacobian is rendered for a
   /// group of unknowns at a time, each time from the same random numbers.
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
+  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
+                                      int probe) const override;
 
  private:
   SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;

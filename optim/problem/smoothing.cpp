@@ -98,6 +98,11 @@ void PairPenalty::add_gradient(const std::vector<double>& theta, double scale, s
   }
 }
 
+void PairPenalty::add_diagonal(double scale, std::vector<double>& diagonal) const {
+  for (const Pair& p : pairs_)
+    for (const int i : {p.a, p.b}) diagonal[i] += 2 * scale * p.weight;
+}
+
 void PairPenalty::add_curvature(int unknowns, double scale, std::vector<double>& curvature) const {
   const auto n = static_cast<std::size_t>(unknowns);
   for (const Pair& p : pairs_) {

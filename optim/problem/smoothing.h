@@ -42,6 +42,8 @@ class PairPenalty {
   void add_gradient(const std::vector<double>& theta, double scale, std::vector<double>& gradient) const;
   /// Adds scale times the second derivative, n x n row after row.
   void add_curvature(int unknowns, double scale, std::vector<double>& curvature) const;
+  /// The diagonal of that.
+  void add_diagonal(double scale, std::vector<double>& diagonal) const;
 
  private:
   struct Pair {

@@ -24,6 +24,12 @@ class ScaledObjective : public Objective {
   Evaluation linearise(const std::vector<double>& u, std::uint32_t iteration) const override {
     return scaled(objective_.linearise(to_theta(u), iteration));
   }
+  std::vector<double> probe_curvature(const std::vector<double>& u, std::uint32_t iteration, const Evaluation& now,
+                                      int probe) const override {
+    std::vector<double> diagonal = objective_.probe_curvature(to_theta(u), iteration, now, probe);
+    for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] *= scales_[i] * scales_[i];
+    return diagonal;
+  }
 
   std::vector<double> to_u(std::vector<double> theta) const {
     for (std::size_t i = 0; i < theta.size(); ++i) theta[i] /= scales_[i];
@@ -90,6 +96,8 @@ std::unique_ptr<Optimizer> make_unscaled(const OptimizerSpec& spec, const Precon
       return make_lbfgs(spec.learning_rate, spec.inner_iterations);
     case OptimizerMethod::levenberg_marquardt:
       return make_levenberg_marquardt();
+    case OptimizerMethod::quasi_newton:
+      return make_quasi_newton(spec.inner_iterations);
   }
   throw std::logic_error("unknown method");
 }

@@ -55,6 +55,11 @@ std::unique_ptr<Optimizer> make_lbfgs(double first_step, int inner_iterations);
 /// next.
 std::unique_ptr<Optimizer> make_levenberg_marquardt();
 
+/// L-BFGS within bounds, scaled by the diagonal of the Gauss-Newton matrix, which random signs estimate: needs no rate and no
+/// scales. One iteration makes up to `inner_iterations` steps, all on its random numbers. Diagonal and pairs are carried from
+/// one iteration to the next: each pair is a difference on common random numbers, whichever they were.
+std::unique_ptr<Optimizer> make_quasi_newton(int inner_iterations);
+
 /// `inner` works on u = theta / scale, one scale > 0 per unknown, so that its steps mean the same for unknowns of
 /// different units; everybody else deals with theta. With equal scales within each of a preconditioner's blocks, that
 /// acts on u as it would on theta. Scales of 1 change no bit.

@@ -35,7 +35,8 @@ TEST(Loss, AdjointIsItsDerivative) {
     image.difference.data[i] = 0.3 * std::cos(5.0 * static_cast<double>(i));
     target.data[i] = std::cos(2.0 * static_cast<double>(i));
   }
-  for (const ReadingLoss& rho : {ReadingLoss{}, ReadingLoss{LossKind::huber, 0.5}, ReadingLoss{LossKind::cauchy, 0.5}}) {
+  for (const ReadingLoss& rho :
+       {ReadingLoss{}, ReadingLoss{LossKind::huber, 0.5}, ReadingLoss{LossKind::cauchy, 0.5}}) {
     const GatedImage adjoint = loss_adjoint(image, target, rho);
     for (std::size_t i = 0; i < target.data.size(); ++i) {
       SplitImage up = image, down = image;
@@ -79,7 +80,8 @@ TEST(Loss, HasNoBiasFromNoise) {
   const GatedImage target(kPixels, 1, 2, 1);
   for (const auto& [first, second] : {std::pair{4, 4}, {2, 1}})
     for (double residual : {0.0, 0.8})
-      for (const ReadingLoss& rho : {ReadingLoss{}, ReadingLoss{LossKind::huber, 1}, ReadingLoss{LossKind::cauchy, 2}}) {
+      for (const ReadingLoss& rho :
+           {ReadingLoss{}, ReadingLoss{LossKind::huber, 1}, ReadingLoss{LossKind::cauchy, 2}}) {
         ReplicateStatistics statistics;
         double squared_noise = 0, plain = 0;
         for (std::uint32_t i = 0; i < kImages; ++i) {

@@ -106,6 +106,35 @@ TEST_F(Rendered, CurvatureIsUnbiased) {
   EXPECT_GT(mean.mean[3] - expected[0], 10 * mean.standard_error[3]);  // what the halves are for
 }
 
+// By adjoint passes with random signs, against derivative images of the same samples. 5 standard errors, 6e-7 by chance.
+TEST_F(Rendered, ProbesAreTheDiagonalOfTheCurvature) {
+  for (const char* loss : {"loss={kind: squared}", "loss={kind: poisson}"}) {
+    const Problem problem(
+        load_experiment(file_, {loss, "estimator={sampling: standard, guiding: false}", "target.window=[5, 6]"}));
+    const GatedImage target = problem.make_target(kGoOn);
+    const RenderedObjective objective(problem, target, kGoOn);
+    const std::vector<double> theta = problem.parameters().initial();
+    const Evaluation now = objective.evaluate(theta, 3);
+    const Scene scene = problem.parameters().apply(theta);
+    const TangentBasis basis = problem.parameters().tangent(theta);
+    const Renderer renderer(scene, problem.gates(), problem.estimator(16), &basis);
+    const auto interior = renderer.derive(Term::interior, problem.stream(Pass::interior, 3), {0, 16});
+    const auto visibility = renderer.derive(Term::visibility, problem.stream(Pass::visibility, 3), {0, 16});
+    const std::vector<double> weights = curvature_weights(now.image, target, problem.reading_loss(target));
+    double exact[] = {0, 0};
+    for (int i : {0, 1})
+      for (std::size_t k = 0; k < weights.size(); ++k)
+        exact[i] += weights[k] * std::pow(interior[i].data[k] + visibility[i].data[k], 2);
+    ReplicateStatistics statistics;
+    for (int probe = 0; probe < 300; ++probe) statistics.add(objective.probe_curvature(theta, 3, now, probe), 1);
+    const Statistics found = statistics.result();
+    for (int i : {0, 1}) {
+      EXPECT_LT(std::abs(found.mean[i] - exact[i]), 5 * found.standard_error[i]) << loss << i;
+      EXPECT_LT(found.standard_error[i], 0.15 * found.mean[i]) << loss << i;
+    }
+  }
+}
+
 TEST_F(Rendered, LossNeedsTwoSamples) {
   EXPECT_NO_THROW(require_two_samples(Problem(load_experiment(file_, {"samples.primal=2"}))));
   EXPECT_THROW(require_two_samples(Problem(load_experiment(file_, {"samples.primal=1"}))), InputError);
@@ -159,7 +188,8 @@ TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
 TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
   for (const char* optimizer : {"{method: adam, learning_rate: 0.05, iterations: 120}",
                                 "{method: lbfgs, learning_rate: 0.05, iterations: 12, inner_iterations: 5}",
-                                "{method: levenberg_marquardt, iterations: 12}"}) {
+                                "{method: levenberg_marquardt, iterations: 12}",
+                                "{method: quasi_newton, iterations: 12, inner_iterations: 5}"}) {
     const Problem problem(load_experiment(file_, {std::string("optimizer=") + optimizer, "target.samples=4096"}));
     const GatedImage target = problem.make_target(kGoOn);
     const RenderedObjective objective(problem, target, kGoOn);

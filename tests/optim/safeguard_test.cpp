@@ -35,6 +35,10 @@ class NoisyQuadratic : public Objective {
     return result;
   }
   Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
+  std::vector<double> probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
+                                      int) const override {
+    throw std::logic_error("unused");
+  }
 };
 
 struct Outcome {

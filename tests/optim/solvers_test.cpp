@@ -42,7 +42,7 @@ class Solvers : public testing::TestWithParam<OptimizerMethod> {
 
 INSTANTIATE_TEST_SUITE_P(Methods, Solvers,
                          testing::Values(OptimizerMethod::adam, OptimizerMethod::lbfgs,
-                                         OptimizerMethod::levenberg_marquardt),
+                                         OptimizerMethod::levenberg_marquardt, OptimizerMethod::quasi_newton),
                          [](const auto& method) { return std::string(name_of(method.param)); });
 
 TEST_P(Solvers, ReachTheTargetOfAnExactProblem) {
@@ -76,6 +76,12 @@ class InOtherUnits : public Objective {
   }
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override {
     return converted(fit_.linearise(own(theta), iteration));
+  }
+  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
+                                      int probe) const override {
+    std::vector<double> diagonal = fit_.probe_curvature(own(theta), iteration, now, probe);
+    for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] /= unit_[i] * unit_[i];
+    return diagonal;
   }
 
  private:
@@ -137,6 +143,12 @@ TEST_P(Solvers, DoNotDependOnTheUnits) {
       for (auto* v : {&result.gradient, &result.curvature, &result.curvature_bound})
         for (double& x : *v) x *= 0x1p-100;
       return result;
+    }
+    std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                        const Evaluation& now, int probe) const override {
+      std::vector<double> diagonal = ExponentialFit::probe_curvature(theta, iteration, now, probe);
+      for (double& d : diagonal) d *= 0x1p-100;
+      return diagonal;
     }
   } scaled;
   scaled.inject = [](auto&, double loss) { return 0x1p-100 * loss; };

@@ -62,6 +62,18 @@ class ExponentialFit : public Objective {
     return result;
   }
 
+  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation&,
+                                      int probe) const override {
+    double sum[2] = {0, 0};
+    for (int k = 0; k < kPoints; ++k) {
+      Rng rng({5, iteration, 2}, k, probe);
+      const double sign = rng.uniform() < 0.5 ? -1 : 1, x = point(k);
+      sum[0] += sign * std::exp(-theta[1] * x) * std::sqrt(2.0 / kPoints);
+      sum[1] -= sign * theta[0] * x * std::exp(-theta[1] * x) * std::sqrt(2.0 / kPoints);
+    }
+    return {sum[0] * sum[0], sum[1] * sum[1]};
+  }
+
   static double normal(Rng& rng) {
     const double radius = std::sqrt(-2 * std::log(rng.uniform()));
     return radius * std::cos(2 * std::numbers::pi * rng.uniform());

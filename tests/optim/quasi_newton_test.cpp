@@ -1,0 +1,188 @@
+// The solver that needs no rates, on counts whose unknowns have units apart by eight orders of magnitude.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "optim/problem/loss.h"
+#include "optim/problem/photon_noise.h"
+#include "optim/run/loop.h"
+#include "tests/optim/synthetic_objective.h"
+
+namespace isochron {
+namespace {
+
+constexpr int kUnknowns = 40, kReadings = 600;
+
+/// Expected counts that are linear in the unknowns: overlapping bumps, each in a unit of its own, on a background. Every third
+/// bump is dark in truth, so that its best height within the bounds is mostly 0. The counts are Poisson numbers, or exact.
+class Bumps : public Objective {
+ public:
+  explicit Bumps(bool counted, double image_noise = 0) : image_noise_(image_noise), target_(kReadings, 1, 1, 1) {
+    for (int j = 0; j < kUnknowns; ++j) {
+      unit_.push_back(std::pow(10.0, -4 + 8.0 * (j % 9) / 8));
+      truth_.push_back((j % 3 == 1 ? 0.0 : 2.0 + j % 5) * unit_[j]);
+      lower_.push_back(0);
+      upper_.push_back(std::numeric_limits<double>::infinity());
+      start_.push_back(unit_[j]);
+    }
+    target_.data = means(truth_);
+    for (int i = 0; i < kReadings; ++i) {
+      Rng rng({31, 0, 0}, static_cast<std::uint64_t>(i), 0);
+      if (counted) target_.data[i] = poisson(target_.data[i], rng);
+    }
+  }
+  const std::vector<double>& lower() const override { return lower_; }
+  const std::vector<double>& upper() const override { return upper_; }
+  double loss(const std::vector<double>& theta, std::uint32_t iteration) const override {
+    return estimate_loss(image(theta, iteration), target_, kLoss).value;
+  }
+  Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override {
+    ++evaluations;
+    const SplitImage split = image(theta, iteration);
+    Evaluation result;
+    result.image = split.image;
+    result.loss = estimate_loss(split, target_, kLoss).value;
+    result.gradient = transpose_apply(loss_adjoint(split, target_, kLoss).data);
+    return result;
+  }
+  Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
+  std::vector<double> probe_curvature(const std::vector<double>&, std::uint32_t iteration, const Evaluation& now,
+                                      int probe) const override {
+    ++probes;
+    std::vector<double> signs = curvature_weights(now.image, target_, kLoss);
+    for (int i = 0; i < kReadings; ++i) {
+      Rng rng({31, iteration, 2}, static_cast<std::uint64_t>(i), static_cast<std::uint32_t>(probe));
+      signs[i] = std::copysign(std::sqrt(signs[i]), rng.uniform() - 0.5);
+    }
+    std::vector<double> diagonal = transpose_apply(signs);
+    for (double& d : diagonal) d *= d;
+    return diagonal;
+  }
+  /// The largest slope that can still be followed, per standard deviation of its unknown alone; 1 / sqrt(kReadings) would be
+  /// one of them.
+  double slope_left(const std::vector<double>& theta) const {
+    const Evaluation at = evaluate(theta, 0);
+    const std::vector<double> weights = curvature_weights(at.image, target_, kLoss);
+    double largest = 0;
+    for (int j = 0; j < kUnknowns; ++j) {
+      double curvature = 0;
+      for (int i = 0; i < kReadings; ++i) curvature += weights[i] * entry(i, j) * entry(i, j);
+      const double slope = theta[j] <= 0 ? std::max(0.0, -at.gradient[j]) : std::abs(at.gradient[j]);
+      largest = std::max(largest, slope / std::sqrt(curvature));
+    }
+    return largest;
+  }
+
+  const std::vector<double>& start() const { return start_; }
+  const std::vector<double>& truth() const { return truth_; }
+  const std::vector<double>& unit() const { return unit_; }
+  mutable int evaluations = 0, probes = 0;
+
+ private:
+  static constexpr double kBackground = 0.5;
+  const ReadingLoss kLoss{LossKind::poisson, 0.05};
+
+  double entry(int reading, int unknown) const {
+    const double x = (reading - 14.5 * unknown - 15) / 14.0;
+    return std::exp(-x * x / 2) / unit_[unknown];
+  }
+  std::vector<double> means(const std::vector<double>& theta) const {
+    std::vector<double> mean(kReadings, kBackground);
+    for (int i = 0; i < kReadings; ++i)
+      for (int j = 0; j < kUnknowns; ++j) mean[i] += entry(i, j) * theta[j];
+    return mean;
+  }
+  /// Both halves with noise of their own, relative to the mean.
+  SplitImage image(const std::vector<double>& theta, std::uint32_t iteration) const {
+    GatedImage halves[] = {target_, target_};
+    for (std::uint32_t h : {0u, 1u}) {
+      halves[h].data = means(theta);
+      for (int i = 0; i < kReadings; ++i) {
+        Rng rng({37, iteration, h}, static_cast<std::uint64_t>(i), 0);
+        halves[h].data[i] *= std::max(0.0, 1 + image_noise_ * ExponentialFit::normal(rng));
+      }
+    }
+    return join_halves(halves[0], 1, halves[1], 1);
+  }
+  std::vector<double> transpose_apply(const std::vector<double>& readings) const {
+    std::vector<double> product(kUnknowns, 0.0);
+    for (int i = 0; i < kReadings; ++i)
+      for (int j = 0; j < kUnknowns; ++j) product[j] += entry(i, j) * readings[i];
+    return product;
+  }
+
+  double image_noise_;
+  GatedImage target_;
+  std::vector<double> unit_, truth_, lower_, upper_, start_;
+};
+
+Checkpoint run(const Bumps& bumps, int iterations, Checkpoint state = {}) {
+  const auto optimizer = make_quasi_newton(10);
+  if (state.theta.empty()) state.theta = bumps.start();
+  LoopOptions options;
+  options.iterations = iterations;
+  options.row = [&](const Evaluation&, const std::vector<double>& theta, bool) {
+    for (double value : theta) EXPECT_GE(value, 0);
+  };
+  options.save = [] {};
+  run_loop(bumps, *optimizer, 0, options, state);
+  return state;
+}
+
+TEST(QuasiNewton, FitsExactCountsInAnyUnits) {
+  const Bumps bumps(false);
+  const Checkpoint state = run(bumps, 20);
+  for (int j = 0; j < kUnknowns; ++j)
+    EXPECT_NEAR(state.theta[j] / bumps.unit()[j], bumps.truth()[j] / bumps.unit()[j], 0.01) << j;
+}
+
+TEST(QuasiNewton, FindsTheMostLikelyPointWithinBounds) {
+  const Bumps bumps(true);
+  EXPECT_GT(bumps.slope_left(bumps.start()), 0.5);
+  bumps.evaluations = 0;
+  const Checkpoint state = run(bumps, 10);
+  EXPECT_LT(bumps.evaluations + bumps.probes, 200);
+  EXPECT_LT(bumps.slope_left(state.theta), 1e-3);
+  EXPECT_GT(std::count(state.theta.begin(), state.theta.end(), 0.0), 4);
+}
+
+// 20 % of noise in each half of the image. Every iteration finds the best point of its own noise; their mean over 60 iterations
+// has to be nearer to that of exact images than the mean over 8, by a factor of 2.7 if all of it were noise: no bias that shows.
+TEST(QuasiNewton, NoisyImagesLeadToTheSamePoint) {
+  const Bumps exact(true), noisy(true, 0.2);
+  const std::vector<double> best = run(exact, 10).theta;
+  const auto distance = [&](int iterations) {
+    const std::vector<double> found = run(noisy, iterations).theta;
+    double squares = 0;
+    for (int j = 0; j < kUnknowns; ++j) squares += std::pow((found[j] - best[j]) / exact.unit()[j], 2) / kUnknowns;
+    return std::sqrt(squares);
+  };
+  const double few = distance(11), many = distance(80);
+  EXPECT_LT(many, 0.6 * few) << few;
+  EXPECT_LT(many, 0.4);
+}
+
+TEST(QuasiNewton, WhatNothingDependsOnStays) {
+  class Idle : public ExponentialFit {
+   public:
+    Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override {
+      Evaluation at = ExponentialFit::evaluate(theta, iteration);
+      at.gradient[0] = 0;
+      return at;
+    }
+    std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                        const Evaluation& now, int probe) const override {
+      return {0, ExponentialFit::probe_curvature(theta, iteration, now, probe)[1]};
+    }
+  } fit;
+  const auto optimizer = make_quasi_newton(5);
+  const std::vector<double> theta = {2, 0.3};
+  const std::vector<double> next = optimizer->step(fit, fit.evaluate(theta, 0), theta, 0, 1);
+  EXPECT_EQ(next[0], 2);
+  EXPECT_NEAR(next[1], 0.7, 0.05);
+}
+
+}  // namespace
+}  // namespace isochron
