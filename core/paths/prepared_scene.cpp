@@ -112,8 +112,8 @@ void PreparedScene::update_record(int t) {
   record.normal = doubled > 0 ? normal / doubled : Vec3();
   record.moving_corners = 0;
   for (int k = 0; k < 3; ++k) record.moving_corners |= (differentiable.vertex[v[k]] != 0) << k;
-  record.has_gradient = differentiable.every_path || record.moving_corners ||
-                        differentiable.material[shapes_[record.shape].material];
+  record.has_gradient =
+      differentiable.every_path || record.moving_corners || differentiable.material[shapes_[record.shape].material];
   if (shapes_[record.shape].painted)
     for (const int vertex : v) record.has_gradient |= differentiable.paint[vertex] != 0;
 }
@@ -143,7 +143,8 @@ void PreparedScene::update_hidden() {
     Bounds box;
     for (const WallPoint& s : scene.capture->sensor) box.add(s.p);
     for (int i = 0; i < 8; ++i)
-      corners.push_back({i & 1 ? box.high.x : box.low.x, i & 2 ? box.high.y : box.low.y, i & 4 ? box.high.z : box.low.z});
+      corners.push_back(
+          {i & 1 ? box.high.x : box.low.x, i & 2 ? box.high.y : box.low.y, i & 4 ? box.high.z : box.low.z});
   }
   const auto seen = [&](int t) {
     if (two_sided(t) || transparent(t)) return true;

@@ -149,15 +149,12 @@ void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partitio
     if (scene.captures()) {
       // Every segment serves the pixel that it is drawn for.
       const double pick = worker.pick.rate(pixel);
-      points.in_pixel(Technique::from_edge, pixel, from_edge_rate * pick, [&](Rng& rng) {
-        secondary.sample_from_edge(pixel, scale / (from_edge_rate * pick), rng);
-      });
-      points.in_pixel(Technique::from_light, pixel, from_light_rate * pick, [&](Rng& rng) {
-        secondary.sample_from_light(pixel, scale / (from_light_rate * pick), rng);
-      });
-      points.in_pixel(Technique::from_camera, pixel, from_camera_rate * pick, [&](Rng& rng) {
-        secondary.sample_from_camera(pixel, scale / (from_camera_rate * pick), rng);
-      });
+      points.in_pixel(Technique::from_edge, pixel, from_edge_rate * pick,
+                      [&](Rng& rng) { secondary.sample_from_edge(pixel, scale / (from_edge_rate * pick), rng); });
+      points.in_pixel(Technique::from_light, pixel, from_light_rate * pick,
+                      [&](Rng& rng) { secondary.sample_from_light(pixel, scale / (from_light_rate * pick), rng); });
+      points.in_pixel(Technique::from_camera, pixel, from_camera_rate * pick,
+                      [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / (from_camera_rate * pick), rng); });
       return;
     }
     points.in_image(of_light_edges, pixel, from_light_rate,

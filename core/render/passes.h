@@ -42,9 +42,7 @@ class Passes {
   /// Whether every sample of images or of the term adds to its own pixel alone, and has no numbers in common with those of
   /// others.
   bool stays_in_pixels() const { return mix.image == 0 || scene.captures(); }
-  bool stays_in_pixels(Term term) const {
-    return (term == Term::interior && mix.interior == 0) || scene.captures();
-  }
+  bool stays_in_pixels(Term term) const { return (term == Term::interior && mix.interior == 0) || scene.captures(); }
 
   /// To be called before a term is run: the visibility term needs its edges, and its guiding learns. What is learned depends
   /// on scene, gates, basis and options alone.

@@ -68,8 +68,8 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   const double along = rng.uniform();
   const double pick = rng.uniform(), thinning = rng.uniform();
   double pdf_y = 1;
-  const SurfacePoint y = scene_.captures() ? scene_.point_of_light(scene_.spot_of(pixel))
-                                           : scene_.sample_emitter(u0, u1, u2, pdf_y);
+  const SurfacePoint y =
+      scene_.captures() ? scene_.point_of_light(scene_.spot_of(pixel)) : scene_.sample_emitter(u0, u1, u2, pdf_y);
   const Path& path = worker_.path;
   const SurfacePoint& x = path.back();
   const double before = path.length.back();

@@ -104,7 +104,8 @@ void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
   if (intensity.is_black() || !g.orient()) return;
   if (!(g.y.edge->moves || may_flow(g.light) || may_meet_flowing(g, -g.w)) || !find_camera_end(g)) return;
   ++worker_.rays;
-  if (scene_.caster.occluded(scene_.offset_ray_origin(g.light, -g.w), g.offset_ray_origin(scene_.caster.offset()))) return;
+  if (scene_.caster.occluded(scene_.offset_ray_origin(g.light, -g.w), g.offset_ray_origin(scene_.caster.offset())))
+    return;
 
   connections_.clear();
   const double lights = scene_.captures() ? 1 : count;
@@ -236,8 +237,8 @@ double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint&
   const Vec3 eye = scene_.sensor_point(pixel).p;
   const double received = scene_.importance(pixel, normalize(x1.p - eye)) * solid_angle_to_area(eye, x1);
   // Segments from an edge serve all pixels of a camera, but one of a capture.
-  const double found = scene_.captures() ? scene_.first_vertex_pdf(x1, received)
-                                         : worker_.pick.rate(pixel) * received / scene_.pixels();
+  const double found =
+      scene_.captures() ? scene_.first_vertex_pdf(x1, received) : worker_.pick.rate(pixel) * received / scene_.pixels();
   const double by_camera = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) /
                            edge_warp().density(g.y.x()) * found * walk.towards_light;
   const double by_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, g.camera_end) * walk.towards_camera;

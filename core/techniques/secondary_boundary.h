@@ -151,7 +151,7 @@ class SecondaryBoundary {
   std::vector<SurfacePoint> walk_;
   WalkDensities camera_densities_;  ///< of the worker's path, up to its last vertex but one
   std::vector<Connection> connections_;
-  GatheredLight light_of_end_;  ///< of a segment from a light
+  GatheredLight light_of_end_;      ///< of a segment from a light
   std::vector<CameraSide> before_;  ///< up to S, one per connection
 };
 

@@ -137,7 +137,7 @@ class StandardWalk {
   Vec3 w_o_;        ///< unit, back along the last ray
   double distance_o_ = 0;
   double light_draw_ = 0;
-  int light_;              ///< the emitter of the next estimation
+  int light_;  ///< the emitter of the next estimation
   const bool light_is_given_;
   int hit_triangle_ = -1;  ///< of the last ray; -1: none
   double pdf_ = 0;         ///< of the last ray's direction, per solid angle
@@ -145,9 +145,11 @@ class StandardWalk {
 
 /// A whole walk. Leaves the path as it was.
 template <class Visitor>
-void walk_standard(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Rng& rng, Visitor&& visitor) {
+void walk_standard(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Rng& rng,
+                   Visitor&& visitor) {
   const int base = path.size();
-  StandardWalk<std::remove_cvref_t<Visitor>> walk(worker, path, pixel, max_bounces, reach, std::forward<Visitor>(visitor));
+  StandardWalk<std::remove_cvref_t<Visitor>> walk(worker, path, pixel, max_bounces, reach,
+                                                  std::forward<Visitor>(visitor));
   walk.begin(rng);
   for (bool goes_on = max_bounces > 0; goes_on;) goes_on = walk.next_event_and_sample(rng) && walk.intersect(rng);
   while (path.size() > base) path.pop();

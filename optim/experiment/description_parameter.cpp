@@ -137,7 +137,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
              {.only = {albedo || spec.type == background, "albedo and background", type_name(spec)},
               .unset = spec.per == Per::all});
   keys.value("light", field::text(spec.light), "which moves, turns about its position or changes; in place of a shape",
-             {.required = spec.type == intensity, .only = of({translation, rotation, intensity}), .unset = spec.light.empty()});
+             {.required = spec.type == intensity,
+              .only = of({translation, rotation, intensity}),
+              .unset = spec.light.empty()});
   const bool of_light = !spec.light.empty();
   Only with_shape = of({translation, rotation, vertices, emission, paint});
   if (of_light && with_shape.here) with_shape = {false, "parameters of shapes", "one of a light"};

@@ -82,7 +82,8 @@ inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterTy
      {ParameterType::time_offset, "time_offset", "light is counted later by it, in the unit of the gates"},
      {ParameterType::camera_translation, "camera_translation", "of camera or capture along `direction`, scene units"},
      {ParameterType::camera_rotation, "camera_rotation",
-      "of camera or capture about `axis`, degrees, through the camera's position (a capture's: the mean of its points)"}});
+      "of camera or capture about `axis`, degrees, through the camera's position (a capture's: the mean of its "
+      "points)"}});
 
 template <>
 inline constexpr auto kChoices<Per> =

@@ -54,8 +54,8 @@ std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene
   const BinGrid bins = *grid_of(gates);
   const double ratio = bins.width / width, offset = (bins.start - start) / width;
   const int each = static_cast<int>(std::lround(ratio)), first = static_cast<int>(std::lround(offset));
-  const std::string has = fmt::format("the file's {} bins begin at {:.6g} and are {:.6g} scene units wide", counts.gates,
-                                      start, width);
+  const std::string has =
+      fmt::format("the file's {} bins begin at {:.6g} and are {:.6g} scene units wide", counts.gates, start, width);
   if (each < 1 || std::abs(ratio - each) > kSame || std::abs(offset - first) > kSame)
     fail(fmt::format("the gates' bins, from {:.6g} on, {:.6g} wide, do not hold whole bins of the file", bins.start,
                      bins.width),

@@ -394,7 +394,8 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
   for (int v = 0; v < layout.vertices; ++v) {
     moved.clear();
     const int s = shape_of[v];
-    if (s >= 0 && !(motions_[s].empty() && camera_motions_.empty())) move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
+    if (s >= 0 && !(motions_[s].empty() && camera_motions_.empty()))
+      move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
     for (int axis = 0; axis < 3; ++axis) {
       for (const Moved& entry : moved)  // in the listed order within shape and camera
         if (entry.velocity[axis] != 0) basis.entries.push_back({entry.column, entry.velocity[axis]});
@@ -402,7 +403,9 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
     }
   }
   std::vector<std::vector<TangentBasis::Entry>> rates(layout.size() - 3 * layout.vertices);
-  const auto rates_of = [&](int dof) -> auto& { return rates[dof - 3 * layout.vertices]; };
+  const auto rates_of = [&](int dof) -> auto& {
+    return rates[dof - 3 * layout.vertices];
+  };
   for (const Value& value : values_)
     for (int i = 0; i < value.numbers; ++i)
       rates_of(value.dof + i).push_back({value.first_component + (value.count == 1 ? 0 : i), value.factor});

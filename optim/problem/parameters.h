@@ -149,7 +149,7 @@ class Parameters {
   void view(const std::vector<double>& theta, bool is_point, Vec3& p, std::vector<Moved>* tangent) const;
 
   const Scene& scene_;
-  std::vector<std::vector<Motion>> motions_;  ///< per shape, in the listed order
+  std::vector<std::vector<Motion>> motions_;             ///< per shape, in the listed order
   std::vector<std::vector<RigidMotion>> light_motions_;  ///< per light, likewise
   std::vector<RigidMotion> camera_motions_;
   std::vector<Value> values_;

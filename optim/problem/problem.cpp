@@ -87,7 +87,8 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       gates_(make_gates(experiment_.gates)),
       parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters, length_unit(experiment_.gates))),
       cache_(std::make_unique<SceneCache>(scene_, caster_update(experiment_, scene_))),
-      readings_(make_readings(experiment_, gates_, scene_.camera.width, scene_.camera.height)),
+      readings_(make_readings(experiment_, gates_, scene_.camera.width, scene_.camera.height,
+                              scene_.capture ? scene_.camera.height / scene_.capture->rows : 1)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
   for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
     const ParameterSpec& spec = experiment_.parameters[i];

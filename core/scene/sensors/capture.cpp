@@ -88,8 +88,9 @@ Field laser(std::vector<Vec3>& spots) {
   const auto write = [&spots]() -> std::string {
     return spots.empty() ? "confocal" : "{points: " + points(spots).write() + "}";
   };
-  return {"word or {points: [[x, y, z], ...]}", "`confocal`", read, write,
-          "`confocal`: the laser lights the point that is looked at; `points`: every sensor point is seen with every spot"};
+  return {
+      "word or {points: [[x, y, z], ...]}", "`confocal`", read, write,
+      "`confocal`: the laser lights the point that is looked at; `points`: every sensor point is seen with every spot"};
 }
 
 std::vector<WallPoint> wall_points(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
@@ -136,10 +137,9 @@ void describe(Keys& keys, Capture& capture) {
       value.fail(error.what());
     }
   };
-  const bool from_file =
-      keys.value("file", {"file", "relative to the scene file", read_file, [&] { return yaml_text(capture.file); }},
-                 "HDF5 file of a measurement, whose geometry it is, in metres; in place of all other keys",
-                 {.unset = true});
+  const bool from_file = keys.value(
+      "file", {"file", "relative to the scene file", read_file, [&] { return yaml_text(capture.file); }},
+      "HDF5 file of a measurement, whose geometry it is, in metres; in place of all other keys", {.unset = true});
   const Only in_place{!from_file, "captures without a file", "`file`"};
   keys.map("sensor", [&](Keys& inner) { sensor.describe(inner); }, "the points of the wall that are looked at",
            {.required = true, .only = in_place});
@@ -147,7 +147,8 @@ void describe(Keys& keys, Capture& capture) {
              {.required = true, .only = in_place});
   keys.value("laser", laser(spots), "where the wall is lit", {.only = in_place});
   const auto stands = [&](Keys& inner) {
-    inner.value("laser", field::vec3(origin.laser), "where the laser stands", {.required = true, .unit = "scene units"});
+    inner.value("laser", field::vec3(origin.laser), "where the laser stands",
+                {.required = true, .unit = "scene units"});
     inner.value("sensor", field::vec3(origin.sensor), "where the detector stands",
                 {.required = true, .unit = "scene units"});
   };
