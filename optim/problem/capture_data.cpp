@@ -67,10 +67,14 @@ std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene
   return combined(counts, first, each, bins.count);
 }
 
+bool has_histograms(const Experiment& experiment, const Scene& scene) {
+  return scene.capture && scene.grey && grid_of(experiment.gates);
+}
+
 bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
                       const GatedImage& readings) {
+  if (!has_histograms(experiment, scene)) return false;
   const auto bins = grid_of(experiment.gates);
-  if (!scene.capture || !bins || readings.channels != 1) return false;
   const Capture& capture = *scene.capture;
   const double unit = metres(experiment.gates);
   CaptureFile out;

@@ -14,6 +14,9 @@ namespace isochron {
 /// bins or sensor points do not fit.
 std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene);
 
+/// Whether readings are histograms of a capture, so that write_histograms has something to write.
+bool has_histograms(const Experiment& experiment, const Scene& scene);
+
 /// Writes readings of a capture's bins as the HDF5 file of a measurement; false where they are none.
 bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
                       const GatedImage& readings);

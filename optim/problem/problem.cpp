@@ -188,26 +188,36 @@ GatedImage Problem::read_target(const std::string& file) const {
   return image;
 }
 
-GatedImage Problem::make_target(const Poll& poll) const {
-  const TargetSpec& target = experiment_.target;
-  if (!target.images.empty()) return read_target(target.images);
-  if (counts_) return *counts_;
-  // Rendered in parts so that a request to stop does not wait for thousands of samples per pixel.
-  const int parts = std::min(32, target.samples);
-  const Stream stream{target.seed, 0, pass_number(Pass::target)};
-  const Scene scene = parameters_->apply(parameters_->target());
-  EstimatorOptions options = estimator();
-  options.max_bounces = target.max_bounces;
+GatedImage Problem::in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
+                             int samples, const std::string& name, const Poll& poll) const {
+  // So that a request to stop does not wait for thousands of samples per pixel.
+  const int parts = std::min(32, samples);
+  const Scene scene = parameters_->apply(theta);
   const Renderer renderer(scene, gates_, options);
   ImageMean mean;
-  ProgressStage stage("rendering the target", parts);
+  ProgressStage stage(name, parts);
   for (int i = 0; i < parts; ++i) {
-    const SampleRange range = Share{i, parts}.of(target.samples);
+    const SampleRange range = Share{i, parts}.of(samples);
     mean.add(renderer.render(stream, range), range.count());
     stage.advance();
     poll();
   }
-  GatedImage image = mean.mean();
+  return mean.mean();
+}
+
+GatedImage Problem::render_in_parts(const std::vector<double>& theta, const Stream& stream, int samples,
+                                    const std::string& stage, const Poll& poll) const {
+  return in_parts(theta, estimator(), stream, samples, stage, poll);
+}
+
+GatedImage Problem::make_target(const Poll& poll) const {
+  const TargetSpec& target = experiment_.target;
+  if (!target.images.empty()) return read_target(target.images);
+  if (counts_) return *counts_;
+  const Stream stream{target.seed, 0, pass_number(Pass::target)};
+  EstimatorOptions options = estimator();
+  options.max_bounces = target.max_bounces;
+  GatedImage image = in_parts(parameters_->target(), options, stream, target.samples, "rendering the target", poll);
   const Stream noise{target.seed, 0, pass_number(Pass::photon_noise)};
   if (target.photons > 0) add_photon_noise(image, target.photons, noise);
   if (target.counts) draw_counts(image, noise);

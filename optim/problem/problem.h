@@ -33,7 +33,8 @@ enum class Pass : std::uint32_t {
   photon_noise = 6,
   mix = 7,
   probe = 9,
-  other_side = 8  ///< of a finite difference, where its images take random numbers of their own
+  histograms = 9,  ///< of final.h5
+  other_side = 8   ///< of a finite difference, where its images take random numbers of their own
 };
 
 /// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.
@@ -90,6 +91,10 @@ class Problem {
   /// Gated images at theta. Throws InputError where it cannot be rendered.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
+  /// The same of many samples, in parts, between which `poll` is called.
+  GatedImage render_in_parts(const std::vector<double>& theta, const Stream& stream, int samples,
+                             const std::string& stage, const Poll& poll) const;
+
   /// A renderer of a scene that parameters() made. Scene and basis must outlive it.
   Renderer renderer(const Scene& scene, const EstimatorOptions& options, const TangentBasis* basis = nullptr) const;
 
@@ -135,6 +140,9 @@ class Problem {
 
  private:
   static std::uint32_t pass_number(Pass pass) { return static_cast<std::uint32_t>(pass); }
+
+  GatedImage in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
+                      int samples, const std::string& name, const Poll& poll) const;
 
   Experiment experiment_;
   Scene scene_;

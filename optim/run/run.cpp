@@ -142,8 +142,18 @@ class Run {
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
     geometry.write("final", state_.theta);
     write_exr(path("final.exr"), final_image, notes_);
-    write_histograms(path("final.h5"), problem_.experiment(), problem_.scene(), final_image);
+    write_expected_counts();
     return result;
+  }
+
+  /// In its own time: the run has ended, whatever happens to this.
+  void write_expected_counts() const {
+    const Experiment& experiment = problem_.experiment();
+    if (!has_histograms(experiment, problem_.scene())) return;
+    const GatedImage expected =
+        problem_.render_in_parts(state_.theta, problem_.stream(Pass::histograms), experiment.output.histogram_samples,
+                                 "rendering the expected counts", [] {});
+    write_histograms(path("final.h5"), experiment, problem_.scene(), expected);
   }
 
   double scaled_norm(std::vector<double> gradient) const {

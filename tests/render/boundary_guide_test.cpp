@@ -89,7 +89,7 @@ TEST(BoundaryGuide, LearnsWhereContributionsAre) {
   std::vector<GuideRecord> records;
   for (int i = 0; i < 1000; ++i) records.push_back({BoundaryGuide::from_edge, 0.25 * (i + 0.5) / 1000, 1});
   for (int i = 0; i < 10; ++i) records.push_back({BoundaryGuide::primary, 0.5, 4});
-  const BoundaryGuide guide({true, false, true, true}, records, {1, 0, 4, 5});
+  const BoundaryGuide guide({true, false, true, false, true}, records, {1, 0, 4, 0, 5});
   const Warp& warp = guide.warp(BoundaryGuide::table(BoundaryGuide::from_edge));
   EXPECT_GT(warp.below(0.25), 0.75);
   for (int i = 0; i < 100; ++i) EXPECT_GT(warp.density((i + 0.5) / 100), 0.2);
@@ -140,7 +140,7 @@ TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
 }
 
 TEST(BoundaryGuide, LearnsNothingFromNothing) {
-  const BoundaryGuide guide({true, true, true, true}, {}, {1, 1, 1, 1});
+  const BoundaryGuide guide({true, true, true, false, true}, {}, {1, 1, 1, 0, 1});
   EXPECT_EQ(guide.rate(BoundaryGuide::primary), 0.25);
   EXPECT_EQ(guide.warp(0).density(0.3), 1);
 }

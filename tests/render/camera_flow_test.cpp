@@ -175,7 +175,7 @@ TEST(CameraFlow, ShadowsMoveWithEverything) {
   const TangentBasis basis = make_basis(scene, all);
   const GateSet gates(GateShape::steady(), {0.0});
   const EstimatorOptions options{.max_bounces = 1};  // D is x1
-  const BoundaryGuide unguided({true, true, true, true});
+  const BoundaryGuide unguided({true, true, true, false, true});
   for (const double radius : {1e9, 0.0}) {
     const PreparedScene prepared(scene, &basis, {radius, 0});
     const BoundaryEdges edges(prepared);

@@ -156,7 +156,7 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
   add_shape(scene, "lamp", quad({-1, 4, -1}, {1, 4, -1}, {1, 4, 1}, {-1, 4, 1}), diffuse(Rgb(0.0)), Rgb(10.0));
   const GateSet gates(GateShape::steady(), {0.0});
   const EstimatorOptions options{.max_bounces = 1};
-  const BoundaryGuide unguided({true, true, true, true});
+  const BoundaryGuide unguided({true, true, true, false, true});
   const GatePick every_gate(gates);
   const TangentBasis basis = make_basis(scene, {translate(scene, "plate0", {0, 1, 0})});
   const auto rays = [&](bool from_camera) {

@@ -102,7 +102,9 @@ PathValue<T> evaluate(const Scene& scene, const PathSpec& spec, const std::vecto
     }
   }
   const int emitter = scene.triangles[spec.triangle.back()].shape;
-  for (int c = 0; c < 3; ++c) result.log_f[c] += log_all + log(dofs[layout.emission(emitter, c)]);
+  for (int c = 0; c < 3; ++c)
+    result.log_f[c] += log_all + log(dofs[layout.emission(emitter, c)]) + log(dofs[layout.gain()]);
+  result.length += dofs[layout.time_offset()];
   return result;
 }
 
@@ -115,6 +117,7 @@ inline std::vector<double> all_dofs(const Scene& scene) {
     for (int k = 0; k < layout.numbers(m); ++k) dofs[layout.number(m, k)] = scene.materials[m].number(k);
   for (int s = 0; s < layout.shapes; ++s)
     for (int c = 0; c < 3; ++c) dofs[layout.emission(s, c)] = scene.shapes[s].emission.radiance[c];
+  dofs[layout.gain()] = scene.detector.gain;
   return dofs;
 }
 
