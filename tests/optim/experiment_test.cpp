@@ -60,7 +60,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"sigma: 0.3", "sigma: 1e-11, unit: scene, file: table.txt",
        "4:73: gates.file: belongs to tabulated, not to gau"},
       {"direction: [0, 1, 0],", "direction: [0, 1, 0], axis: [0, 1, 0],",
-       "6:75: parameters[0].axis: belongs to rotation, not to translation (allowed: name"},
+       "6:75: parameters[0].axis: belongs to rotation and camera_rotation, not to transl"},
       {"method: adam", "method: lbfgs, decay: {half_life: 3}",
        "10:28: optimizer.decay: belongs to adam, not to lbfgs (allowed: method"},
       {"kind: gaussian", "kind: gauss", "4:15: gates.kind: 'gauss' is not known"},
@@ -171,7 +171,7 @@ TEST(Experiment, MessagesAboutMapsNameTheirKeys) {
       {"seed: 3", "loss: huber", "11:7: loss: is not a map (keys and values; its keys: kind, scale)"},
       {"seed: 3", "loss: {scale: 1}", "11:7: loss.kind: is missing"},
       {"  - {name: power, type: emission, shape: lamp, initial: 8, target: 10}", "  - power",
-       "7:5: parameters[1]: is not a map (keys and values; its keys: name, type, shape, material, "},
+       "7:5: parameters[1]: is not a map (keys and values; its keys: name, type, per, light, shape"},
       {gates, "", "1:1: gates: is missing (a map with the keys kind, centers, unit, scene_unit_m"},
       {"name: tiny\n", "", "1:1: name: is missing"},
   };

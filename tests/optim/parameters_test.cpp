@@ -88,6 +88,12 @@ std::vector<double> dofs(const Scene& scene) {
     for (int k = 0; k < m.numbers(); ++k) all.push_back(m.number(k));
   for (const Shape& s : scene.shapes)
     for (int c = 0; c < 3; ++c) all.push_back(s.emission.radiance[c]);
+  all.insert(all.end(), scene.paint.begin(), scene.paint.end());
+  for (const PointLight& light : scene.lights)
+    for (const Vec3& v : {light.position, light.direction, Vec3{light.intensity.r, light.intensity.g, light.intensity.b}})
+      all.insert(all.end(), {v.x, v.y, v.z});
+  all.insert(all.end(), {scene.detector.gain, scene.detector.time_offset});
+  all.insert(all.end(), scene.detector.background.begin(), scene.detector.background.end());
   return all;
 }
 
@@ -212,6 +218,70 @@ TEST(Parameters, ScalesByTypeAndAsGiven) {
   EXPECT_NEAR(parameters.distance_to_target(parameters.initial(), parameters.blocks().front()), 0.5, 1e-12);
   EXPECT_NEAR(parameters.distance_to_target(parameters.initial(), parameters.blocks().back()), 1e3 / std::sqrt(3),
               1e-9);
+}
+
+/// Paint, lights, the detector and the camera's pose.
+TEST(Parameters, TangentIsTheDerivativeOfApplyForDetectorLightsAndPaint) {
+  Scene scene = two_shapes(true);
+  scene.camera.position = {0.3, -0.2, 5};
+  scene.lights.resize(2);
+  scene.lights[0].name = "flash";
+  scene.lights[0].position = {1, 2, 3};
+  scene.lights[1] = scene.lights[0];
+  scene.lights[1].name = "torch";
+  scene.lights[1].kind = PointLight::Kind::spot;
+  scene.lights[1].direction = {0, 0.6, 0.8};
+  scene.capture.emplace();
+  scene.capture->sensor.resize(3);
+  std::vector<ParameterSpec> specs;
+  specs.push_back(spec("move", ParameterType::translation, "tetra", 0.3));
+  specs.back().direction = {0.5, 1, -2};
+  specs.push_back(spec("pan", ParameterType::camera_rotation, "", 20));
+  specs.back().axis = {0.1, 1, 0.3};
+  specs.push_back(spec("step", ParameterType::camera_translation, "", 0.4));
+  specs.back().direction = {1, -0.5, 0.2};
+  specs.push_back(spec("tilt", ParameterType::camera_rotation, "", -35));
+  specs.back().axis = {1, 0.2, 0};
+  specs.push_back(spec("paint", ParameterType::paint, "quad", 0.4));
+  specs.push_back(spec("light_x", ParameterType::translation, "", 0.2));
+  specs.back().light = "torch";
+  specs.back().direction = {1, 0, 2};
+  specs.push_back(spec("light_turn", ParameterType::rotation, "", 15));
+  specs.back().light = "torch";
+  specs.back().axis = {1, 0, 0.5};
+  specs.push_back(spec("bright", ParameterType::intensity, "", 3));
+  specs.back().light = "flash";
+  specs.push_back(spec("gain", ParameterType::gain, "", 2));
+  specs.push_back(spec("dark", ParameterType::background, "", 0.5));
+  specs.back().per = Per::pixel;
+  specs.push_back(spec("late", ParameterType::time_offset, "", 0.1));
+  make_room(scene, specs);
+  EXPECT_TRUE(scene.shapes[0].sought && scene.shapes[1].sought && scene.shapes[1].painted);
+  const Parameters parameters(scene, specs, 0.3);
+  ASSERT_EQ(parameters.size(), 4 + 4 + 2 + 1 + 1 + 3 + 1);
+  const std::vector<double> theta = point_near_initial(parameters, 5);
+  EXPECT_EQ(parameters.apply(theta).detector.time_offset, 0.3 * theta.back());
+  expect_central_differences(parameters, theta, parameters.tangent(theta));
+}
+
+/// The camera is where it was, and all else where it is seen from the moved camera: distances to it are those in the world.
+TEST(Parameters, CameraPoseIsAMotionOfAllElse) {
+  Scene scene = two_shapes(true);
+  scene.camera.position = {0.3, -0.2, 5};
+  std::vector<ParameterSpec> specs{spec("step", ParameterType::camera_translation, "", 0.4),
+                                   spec("pan", ParameterType::camera_rotation, "", 90)};
+  specs[0].direction = {1, 0, 0};
+  specs[1].axis = {0, 1, 0};
+  const Parameters parameters(scene, specs);
+  const Scene seen = parameters.apply(parameters.initial());
+  // The camera moves by 0.4 along x and turns by 90 degrees about y: its axis -z turns to -x.
+  const Vec3 camera{0.7, -0.2, 5};
+  for (std::size_t v = 0; v < scene.positions.size(); ++v) {
+    const Vec3 d = scene.positions[v] - camera, e = seen.positions[v] - scene.camera.position;
+    EXPECT_NEAR(length(d), length(e), 1e-12);
+    EXPECT_NEAR(e.z, d.x, 1e-12);  // what lies ahead of the turned camera, along -x, lies along -z
+    EXPECT_NEAR(e.y, d.y, 1e-12);
+  }
 }
 
 TEST(Parameters, TransposeIsTheAdjointOfTheTangent) {
