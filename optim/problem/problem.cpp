@@ -101,6 +101,10 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
         fmt::format("{}: parameters: initial or target values put a vertex too far away (allowed: "
                     "coordinates of at most {})",
                     experiment_.file, kLargestCoordinate));
+  for (const std::vector<double>* theta : {&parameters_->initial(), &parameters_->target()})
+    if (scene_.capture && (theta == &parameters_->initial() || parameters_->target_known()))
+      if (const std::string complaint = behind_wall(parameters_->apply(*theta)); !complaint.empty())
+        throw InputError(experiment_.scene + ": " + complaint);
   if (!warning) return;
   std::string coincidences = coincidence_warning(parameters_->apply(parameters_->initial()));
   if (coincidences.empty() && parameters_->target_known())

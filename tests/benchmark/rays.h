@@ -87,7 +87,7 @@ inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const Ga
     if (!hit) continue;
     worker.start_at_sensor(path, 0);
     path.push(scene, *hit);
-    StandardWalk<Visitor> walk(worker, path, max_bounces, {gates.lower(), gates.upper()}, {recorder, next_event});
+    StandardWalk<Visitor> walk(worker, path, 0, max_bounces, {gates.lower(), gates.upper()}, {recorder, next_event});
     walk.begin(rng);
     for (bool goes_on = max_bounces > 0; goes_on;) {
       const std::size_t recorded = recorder.rays.size();
