@@ -308,9 +308,9 @@ TEST_F(SceneLoader, ShapeErrors) {
             "scene.yaml:12:62: shapes[1].emision: is not a known key, did you mean 'emission'? "
             "(allowed: name, file, material, emission, transform)");
   EXPECT_EQ(error(", emission: 10", ""),
-            "scene.yaml:11:3: shapes: no shape emits light (emission above 0 on at least one)");
+            "scene.yaml:11:3: shapes: no shape emits light (emission above 0 on at least one, or `lights`)");
   EXPECT_EQ(error("emission: 10", "emission: 0"),
-            "scene.yaml:11:3: shapes: no shape emits light (emission above 0 on at least one)");
+            "scene.yaml:11:3: shapes: no shape emits light (emission above 0 on at least one, or `lights`)");
   EXPECT_EQ(error("emission: 10", "emission: 10, transform: {scale: 0}"),
             "scene.yaml:12:95: shapes[1].transform.scale: 0 is out of range (a number above 0)");
   EXPECT_EQ(error("emission: 10", "emission: 10, transform: {rotate: {axis: [0, 0, 0], degrees: 3}}"),
@@ -354,8 +354,8 @@ TEST_F(SceneLoader, FileErrors) {
             folder.path("none.yaml") + ":1:1: file: cannot be opened: No such file or directory");
   EXPECT_EQ(error("materials:\n", "materials: {}\nother:\n"),
             "scene.yaml:7:12: materials: has no material (at least one)");
-  EXPECT_EQ(error("shapes:\n", "light: 3\nshapes:\n"),
-            "scene.yaml:10:1: light: is not a known key (allowed: camera, materials, shapes)");
+  EXPECT_EQ(error("shapes:\n", "colour: 3\nshapes:\n"),
+            "scene.yaml:10:1: colour: is not a known key (allowed: capture, camera, materials, shapes, lights)");
 }
 
 }  // namespace

@@ -65,7 +65,8 @@ class ReproduceTest(unittest.TestCase):
         self.assertEqual(*[[row[:1] + row[2:] for row in log] for log in logs])
 
     def test_every_experiment_with_a_target_is_in_the_catalogue(self):
-        files = {f.stem for f in ROOT.glob("experiments/*.yaml") if "target" in yaml.safe_load(f.read_text())}
+        targets = {f.stem: yaml.safe_load(f.read_text()).get("target") for f in ROOT.glob("experiments/*.yaml")}
+        files = {name for name, target in targets.items() if target and "capture" not in target}
         self.assertEqual(files, set(RECONSTRUCTIONS))
 
     def test_unknown_names_are_refused(self):
