@@ -104,7 +104,7 @@ class CaptureTest(unittest.TestCase):
                 with h5py.File(run / "final.h5") as file:
                     fitted = file["H"][()].astype(float)
                 # The fit is closer than counts are by far: seven unknowns for 800 counts.
-                self.assertLess(((fitted - expected) ** 2 / expected).mean(), 0.05)
+                self.assertLess(((fitted - expected) ** 2 / expected).mean(), 0.1)
         # Two bins of the file in each: counts add up, and so do gain and background.
         done, run = self.fit("--set", "gates={kind: bins, unit: ps, scene_unit_m: 1, start: 3064, width: 64, count: 18, response: "
                              "response.csv}", "--set", "parameters[2].upper=601", "--set", "parameters[2].initial=600")
