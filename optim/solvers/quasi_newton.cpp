@@ -1,8 +1,7 @@
 // Projected L-BFGS whose metric is the diagonal of the Gauss-Newton matrix. That diagonal knows the units of all unknowns, so
 // that metres, degrees, albedos and counts need no rates; pairs of steps and changes of the gradient add how the unknowns
 // act together. Products with the Jacobian, as conjugate gradients on the Gauss-Newton matrix would take, cost as much as
-// gradients of the loss itself, which know more than a linearisation: in fits of albedos and a plane's pose to counts that
-// solver needed twice the passes.
+// gradients of the loss itself, which know more than a linearisation; optim/README.md has a comparison.
 #include <algorithm>
 #include <cmath>
 #include <deque>
