@@ -8,7 +8,7 @@ import numpy as np
 import yaml
 
 import exr
-from pictures.mesh_files import read_mesh
+from pictures.mesh_files import read_mesh, read_scene_mesh
 from pictures.reading import PlotError
 from pictures.wall import Wall
 
@@ -163,18 +163,37 @@ class CaptureRun:
         return "°" if kind in ("rotation", "camera_rotation") else ""
 
     def _read_surfaces(self):
+        """Shapes that moved, of which the run wrote meshes; and those that were painted where the scene has them."""
         paints = {str(spec.get("shape")): name for name, spec in self.specs.items()
                   if spec.get("type") == "albedo" and spec.get("per") == "vertex" and name in self.values}
         self.surfaces = []
         for path in sorted((self.directory / "geometry").glob("final_*")):
-            points, triangles = read_mesh(path)
             name = path.stem.removeprefix("final_")
             # Files are named after shapes, but for letters that file systems may not have.
             shape = next((s for s in paints if re.sub(r"[^A-Za-z0-9_-]", "_", s) == name), name)
-            albedo = self.values[paints[shape]] if shape in paints else None
-            if albedo is not None and len(albedo) != len(points):
-                raise PlotError(f"{path}: {len(points)} vertices, but {len(albedo)} albedos in {paints[shape]}")
-            self.surfaces.append(Surface(shape, self.wall.place(points * self.scene_unit), triangles, albedo))
+            self._add_surface(path, shape, read_mesh(path), paints.pop(shape, None))
+        moved = {str(spec.get("shape")) for spec in self.specs.values() if spec.get("type") != "albedo"}
+        for shape, paint in paints.items():
+            path, transform = self._find_shape(shape)
+            if path is not None and shape not in moved:
+                self._add_surface(path, shape, read_scene_mesh(path, transform), paint)
+
+    def _find_shape(self, name):
+        """File and transform of a shape of the scene; None where there is none, or its file is of another kind."""
+        scene = self.directory / str(self.experiment.get("scene", ""))
+        if scene.is_file():
+            for entry in read_yaml(scene).get("shapes") or []:
+                path = scene.parent / str(entry.get("file", ""))
+                if str(entry.get("name")) == name and path.suffix in (".obj", ".ply"):
+                    return path, entry.get("transform") or {}
+        return None, {}
+
+    def _add_surface(self, path, name, mesh, paint):
+        points, triangles = mesh
+        albedo = self.values[paint] if paint else None
+        if albedo is not None and len(albedo) != len(points):
+            raise PlotError(f"{path}: {len(points)} vertices, but {len(albedo)} albedos in {paint}")
+        self.surfaces.append(Surface(name, self.wall.place(points * self.scene_unit), triangles, albedo))
 
 
 def is_capture(directory, experiment):
