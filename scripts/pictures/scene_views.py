@@ -10,6 +10,7 @@ from pictures.deviance import Fit
 from pictures.wall import Plane
 
 MOST_SCALARS = 8
+VALUES = 92  # points from the left of the box of numbers: where values begin, wider than the longest name
 
 
 def residuals(counts, means):
@@ -27,7 +28,7 @@ def extent_of(run):
         low, high = np.minimum(low, places.min(axis=0)), np.maximum(high, places.max(axis=0))
     low, high = np.maximum(low, run.wall.low - size), np.minimum(high, run.wall.high + size)
     # A wall that is a line still needs a picture.
-    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.05 * size)
+    middle, half = (low + high) / 2, np.maximum((high - low) / 2, 0.25 * size)
     return middle - half, middle + half
 
 
@@ -49,7 +50,7 @@ class Views:
 
     def __init__(self, figure, run, low, high, chosen, count):
         self.figure, self.run, self.low, self.high, self.chosen = figure, run, low, high, chosen
-        *self.free, self.box = figure.subplots(1, count + 1, width_ratios=[1] * count + [0.85 if count > 2 else 0.62])
+        *self.free, self.box = figure.subplots(1, count + 1, width_ratios=[1] * count + [0.8 if count > 2 else 0.62])
 
     def add(self, title, draw, label, extend="neither"):
         axes = self.free.pop(0)
@@ -70,8 +71,8 @@ class Views:
         axes.set_xlabel(wall.across.label)
         axes.set_ylabel(wall.up.label)
         axes.set_title(title)
-        bar = self.figure.colorbar(mesh, ax=axes, extend=extend, pad=0.02, aspect=24)
-        bar.set_label(label)
+        # Beside the picture itself, whose height depends on the wall's shape.
+        self.figure.colorbar(mesh, cax=axes.inset_axes([1.025, 0, 0.04, 1]), extend=extend).set_label(label)
 
 
 def _scale_of_albedo(values):
@@ -119,9 +120,9 @@ def write_box(axes, run, planes, projection):
     step = min(0.056, 1.0 / len(lines))
     for i, (name, value) in enumerate(lines):
         y = 1.02 - i * step
-        axes.text(0, y, name, transform=axes.transAxes, va="top", weight="bold" if value is None else "normal")
-        if value is not None:
-            axes.text(0.34, y, value, transform=axes.transAxes, va="top")
+        for text, place in ((name, 0), (value or "", VALUES)):
+            axes.annotate(text, (0, y), (place, 0), xycoords="axes fraction", textcoords="offset points", va="top",
+                          weight="bold" if value is None else "normal", annotation_clip=False)
 
 
 def about_data(run):
@@ -136,13 +137,15 @@ def about_data(run):
     yield "bins", f"{len(run.fit)} of {run.delta / run.ps:.4g} ps, from {run.times[0]:.4g} ps"
     if not run.used_bins.all():
         yield "", f"{run.used_bins.sum()} of them used"
-    yield "counts per point", f"{used.mean():.4g} ({used.min():.4g} to {used.max():.4g})"
+    yield "counts of a point", f"{used.mean():.4g} ({used.min():.4g} to {used.max():.4g})"
 
 
 def about_fit(run):
     fit = Fit(run)
     if run.summary:
-        yield "run", f"{run.summary.get('iterations')} iterations, {str(run.summary.get('status')).replace('_', ' ')}"
+        status = str(run.summary.get("status")).replace("_", " ")
+        end = "" if status == "iterations reached" else f", {status}"
+        yield "run", f"{run.summary.get('iterations')} iterations{end}"
     yield "deviance per degree of freedom", ""
     yield "   fit", f"{fit.fitted:.4f}"
     yield "   drawn from it", f"{fit.drawn:.4f} (Poisson numbers)"
