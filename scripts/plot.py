@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Draws what the program wrote into a folder: a false-colour PNG beside every EXR, residual.png (final - target), and
-rmse.png from log.csv. With --pixel or --row, instead of these, one pixel's or one row's light over the gates.
+rmse.png from log.csv; of the run of a capture also capture.png (plot_capture.py). With --pixel or --row, instead of
+these, one pixel's or one row's light over the gates.
 
 usage: plot.py DIR [--pixel COLUMN,ROW] [--row ROW]
 
@@ -78,6 +79,15 @@ class Pictures:
         if self.log.exists():
             quantity = next((g.quantity for g in self.gates.values()), self.folder.quantity)
             self.attempt(plot_log, self.log, self.log, self.folder.experiment, quantity)
+        if (self.directory / "final.h5").exists():  # only captures have it
+            self.attempt(self.draw_capture, self.directory / "capture.png")
+
+    def draw_capture(self):
+        # Imported here as h5py and SciPy take longer to load than most folders to be drawn.
+        from pictures.capture_run import CaptureRun
+        from pictures.capture_sheet import draw_sheet
+
+        draw_sheet(CaptureRun(self.directory), self.directory / "capture.png")
 
     def draw_residual(self):
         final, target = (self.stacks.get(self.directory / f"{name}.exr", {}).get("") for name in ("final", "target"))

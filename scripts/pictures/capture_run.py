@@ -1,0 +1,207 @@
+"""A run that fitted a capture: counts, expected counts, the wall and the recovered surfaces, as arrays in metres."""
+
+import pathlib
+import re
+
+import h5py
+import numpy as np
+import yaml
+
+import exr
+from pictures.mesh_files import read_mesh, read_scene_mesh
+from pictures.reading import PlotError
+from pictures.wall import Wall
+
+METRES_PER_PS = 299792458e-12
+METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time; light's way in it
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in Python alone, a number per sensor point takes seconds
+
+
+def read_yaml(path):
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8"), LOADER)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise PlotError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+    if not isinstance(data, dict):
+        raise PlotError(f"{path}: no keys")
+    return data
+
+
+def numbers(values):
+    """A value or a list of them; YAML takes 1e-05 for text."""
+    return np.array([float(v) for v in (values if isinstance(values, list) else [values])])
+
+
+class Surface:
+    """A shape as the fit left it: vertices in the wall's frame, an albedo for each of them or None."""
+
+    def __init__(self, name, points, triangles, albedo):
+        self.name, self.points, self.triangles, self.albedo = name, points, triangles, albedo
+
+
+class CaptureRun:
+    """What the pictures of a run need; of several spots of the laser the first. Arrays of light are [T, Sx, Sy]."""
+
+    ps = METRES_PER_PS
+
+    def __init__(self, directory):
+        self.directory = directory
+        if not directory.is_dir():
+            raise PlotError(f"{directory}: no such folder")
+        if not (directory / "experiment.yaml").exists():
+            raise PlotError(f"{directory}: not the folder of a run, it has no experiment.yaml")
+        self.experiment = read_yaml(directory / "experiment.yaml")
+        self.name = str(self.experiment.get("name", directory.name))
+        if not is_capture(directory, self.experiment):
+            raise PlotError(f"{directory}: not the run of a capture, its scene has no key `capture`")
+        for name, why in (("final.h5", "not finished, or its gates are no bins of time"), ("target.exr", "damaged")):
+            if not (directory / name).exists():
+                raise PlotError(f"{directory}: the run has no {name}: {why}")
+        gates = self.experiment.get("gates") or {}
+        self.scene_unit = float(gates.get("scene_unit_m") or 1)
+        self.gate_unit = METRES.get(gates.get("unit", "scene"), self.scene_unit)
+        try:
+            self._read_fit(directory / "final.h5")
+        except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
+            reason = str(error).strip("'\"")
+            raise PlotError(f"{directory / 'final.h5'}: cannot be read: {reason}") from error
+        self.counts = self._read_counts(directory / "target.exr")
+        self._read_readings()
+        self._read_parameters()
+        self._read_surfaces()
+
+    def _read_fit(self, path):
+        with h5py.File(path, "r") as file:
+            light = file["H"]
+            points = file["sensor_grid_xyz"][()]
+            behind = points.ndim - 1
+            self.spots = int(np.prod(light.shape[1:-behind]))
+            first = (slice(None),) + (0,) * (light.ndim - 1 - behind)
+            self.fit = np.asarray(light[first], np.float32).reshape(len(light), points.shape[0], -1)
+            self.points = points.reshape(points.shape[0], -1, 3)
+            self.delta, self.start = float(file["delta_t"][()]), float(file["t_start"][()])
+            normals = file["sensor_grid_normals"][()].reshape(-1, 3)
+            laser = file["laser_grid_xyz"][()].reshape(-1, 3) if "laser_grid_xyz" in file else points.reshape(-1, 3)
+            extra = bool(file["t_accounts_first_and_last_bounces"][()])
+            origins = [file[f"{name}_xyz"][()] for name in ("laser", "sensor")] if extra else None
+        flat = self.points.reshape(-1, 3)
+        self.confocal = self.spots == 1 and laser.shape == flat.shape and np.allclose(laser, flat)
+        self.laser = self.points if self.confocal else np.broadcast_to(laser[0], self.points.shape)
+        # Lengths count from the wall; where times do from laser and detector, these ways are to be taken off.
+        self.extra = np.zeros(self.points.shape[:2])
+        if origins:
+            self.extra = sum(np.linalg.norm(ends - origin, axis=-1)
+                             for ends, origin in zip((self.laser, self.points), origins))
+        self.wall = Wall(self.points, normals)
+        self.lengths = self.start + self.delta * np.arange(len(self.fit) + 1)  # borders of the bins
+        self.times = self.lengths / METRES_PER_PS
+
+    def _read_counts(self, path):
+        """The target as the fit saw it: a measurement's bins may be several of its file's, and a rendering has none."""
+        bins, columns, rows = self.fit.shape
+        try:
+            images = exr.read(path)
+        except (exr.ExrError, OSError) as error:
+            raise PlotError(f"{path}: {error}") from error
+        names = {int(n[4:-2]): n for n in images if re.fullmatch(r"gate\d+\.Y", n)}
+        image = images[names[0]] if 0 in names else np.empty((0, 0))
+        if sorted(names) != list(range(bins)) or image.shape != (rows * self.spots, columns):
+            raise PlotError(f"{path}: not {bins} gates of {columns} x {rows * self.spots} readings, as final.h5 has")
+        return np.stack([images.pop(names[g])[:rows].T for g in range(bins)]).astype(np.float32)
+
+    def _read_readings(self):
+        """Which points and bins the fit used."""
+        target = self.experiment.get("target") or {}
+        self.used_points = np.ones(self.points.shape[:2], bool)
+        self.used_bins = np.ones(len(self.fit), bool)
+        if target.get("mask"):
+            path = self.directory / target["mask"]
+            try:
+                self.used_points = np.load(path) != 0
+            except (OSError, ValueError) as error:
+                raise PlotError(f"{path}: cannot be read: {error}") from error
+            if self.used_points.shape != self.points.shape[:2] or not self.used_points.any():
+                raise PlotError(f"{path}: does not fit the sensor points, or leaves none")
+        if target.get("window"):
+            first, last = numbers(target["window"]) * self.scene_unit
+            centres = (self.lengths[1:] + self.lengths[:-1]) / 2
+            self.used_bins = (centres >= first) & (centres <= last)
+
+    def _read_parameters(self):
+        """Final values by name: those that summary.yaml gives, or, of a run that is under way, the checkpoint's."""
+        self.summary, values = {}, {}
+        try:
+            if (self.directory / "summary.yaml").exists():
+                self.summary = read_yaml(self.directory / "summary.yaml")
+                values = self.summary["parameters"]
+            elif (self.directory / "checkpoint.yaml").exists():
+                entries = read_yaml(self.directory / "checkpoint.yaml")["parameters"]
+                values = {entry["name"]: entry["value"] for entry in entries}
+            self.values = {name: numbers(value) for name, value in values.items()}
+            self.specs = {spec["name"]: spec for spec in self.experiment.get("parameters") or []}
+            self.unknowns = sum(len(v) for v in self.values.values())
+            offsets = [n for n, s in self.specs.items() if s.get("type") == "time_offset" and n in self.values]
+            self.time_offset = sum(float(self.values[n][0]) for n in offsets) * self.gate_unit
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise PlotError(f"{self.directory}: the parameters cannot be read: {error}") from error
+
+    @property
+    def delay(self):
+        """By how much of path length light is counted late: the time offset, and where the response peaks."""
+        response = (self.experiment.get("gates") or {}).get("response")
+        if not isinstance(response, dict):
+            return self.time_offset
+        peak = np.argmax(numbers(response["values"]))
+        return self.time_offset + numbers(response["offsets"])[peak] * self.gate_unit
+
+    def unit_of(self, name):
+        """Of a parameter's values, for labels."""
+        kind = self.specs.get(name, {}).get("type")
+        if kind == "time_offset":
+            unit = (self.experiment.get("gates") or {}).get("unit", "scene")
+            return f" {unit}" if unit in METRES else ""
+        return "°" if kind in ("rotation", "camera_rotation") else ""
+
+    def _read_surfaces(self):
+        """Shapes that moved, of which the run wrote meshes; and those that were painted where the scene has them."""
+        paints = {str(spec.get("shape")): name for name, spec in self.specs.items()
+                  if spec.get("type") == "albedo" and spec.get("per") == "vertex" and name in self.values}
+        self.surfaces = []
+        for path in sorted((self.directory / "geometry").glob("final_*")):
+            name = path.stem.removeprefix("final_")
+            # Files are named after shapes, but for letters that file systems may not have.
+            shape = next((s for s in paints if re.sub(r"[^A-Za-z0-9_-]", "_", s) == name), name)
+            self._add_surface(path, shape, read_mesh(path), paints.pop(shape, None))
+        moved = {str(spec.get("shape")) for spec in self.specs.values() if spec.get("type") != "albedo"}
+        for shape, paint in paints.items():
+            path, transform = self._find_shape(shape)
+            if path is not None and shape not in moved:
+                self._add_surface(path, shape, read_scene_mesh(path, transform), paint)
+
+    def _find_shape(self, name):
+        """File and transform of a shape of the scene; None where there is none, or its file is of another kind."""
+        scene = self.directory / str(self.experiment.get("scene", ""))
+        if scene.is_file():
+            for entry in read_yaml(scene).get("shapes") or []:
+                path = scene.parent / str(entry.get("file", ""))
+                if str(entry.get("name")) == name and path.suffix in (".obj", ".ply"):
+                    return path, entry.get("transform") or {}
+        return None, {}
+
+    def _add_surface(self, path, name, mesh, paint):
+        points, triangles = mesh
+        albedo = self.values[paint] if paint else None
+        if albedo is not None and len(albedo) != len(points):
+            raise PlotError(f"{path}: {len(points)} vertices, but {len(albedo)} albedos in {paint}")
+        self.surfaces.append(Surface(name, self.wall.place(points * self.scene_unit), triangles, albedo))
+
+
+def is_capture(directory, experiment):
+    """Whether the experiment's scene is one of a capture, as far as its file can tell."""
+    scene = directory / pathlib.PurePath(str(experiment.get("scene", "")))
+    if not scene.is_file():
+        return (directory / "final.h5").exists()
+    try:
+        return "capture" in read_yaml(scene)
+    except PlotError:
+        return False
