@@ -17,6 +17,7 @@ void PathOrigin::note_boundary(int bounces, int triangle) {
 }
 
 void PathOrigin::add_shape(int triangle) {
+  if (is_light(triangle)) return;
   const int shape = scene_.shape_index(triangle);
   if (std::find(shapes_.begin(), shapes_.end(), shape) == shapes_.end()) shapes_.push_back(shape);
 }

@@ -22,7 +22,9 @@ constexpr double kRelativeValue = 0.05;
 constexpr double kRoundings = 4;  ///< extrapolation weighs the smallest step's by 64 / 45, and three of them add up
 
 bool moves_geometry(ParameterType type) {
-  return type == ParameterType::translation || type == ParameterType::rotation || type == ParameterType::vertices;
+  using enum ParameterType;
+  return type == translation || type == rotation || type == vertices || type == camera_translation ||
+         type == camera_rotation || type == time_offset;
 }
 
 ParameterType type_of(const Problem& problem, int component) {
@@ -44,17 +46,19 @@ double extent(const Scene& scene) {
   return length(upper - lower);
 }
 
-/// Speed of the fastest vertex, scene units per unit of the unknown.
+/// Speed of the fastest vertex or light, or of all lengths, scene units per unit of the unknown.
 double top_speed(const Problem& problem, const std::vector<double>& theta, int component) {
   const TangentBasis basis = select_columns(problem.parameters().tangent(theta), component, 1);
   const DofLayout layout(problem.scene());
-  double fastest = 0;
-  for (int v = 0; v < layout.vertices; ++v) {
+  const auto speed = [&](int dof, int count) {
     double square = 0;
-    const int first = basis.row_begin[layout.vertex(v, 0)], last = basis.row_begin[layout.vertex(v, 2) + 1];
-    for (int e = first; e < last; ++e) square += basis.entries[e].coefficient * basis.entries[e].coefficient;
-    fastest = std::max(fastest, std::sqrt(square));
-  }
+    for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + count]; ++e)
+      square += basis.entries[e].coefficient * basis.entries[e].coefficient;
+    return std::sqrt(square);
+  };
+  double fastest = speed(layout.time_offset(), 1);
+  for (int v = 0; v < layout.vertices; ++v) fastest = std::max(fastest, speed(layout.vertex(v, 0), 3));
+  for (int i = 0; i < layout.lights; ++i) fastest = std::max(fastest, speed(layout.light_position(i, 0), 3));
   return fastest;
 }
 
@@ -174,7 +178,8 @@ Experiment check_experiment(Experiment experiment, std::vector<std::string>& not
     throw InputError(fmt::format("samples: {} is too few for a standard error (allowed: at least 2)", samples));
   const bool motion = std::any_of(experiment.parameters.begin(), experiment.parameters.end(),
                                   [](const ParameterSpec& p) { return moves_geometry(p.type); });
-  const bool jumps = make_gates(experiment.gates).shape().pair_mass(PairPart::dirac) > 0;
+  const bool jumps = experiment.gates.needs_bins() ||  // which the target's file tells later
+                     make_gates(experiment.gates).shape().pair_mass(PairPart::dirac) > 0;
   const auto set = [&](int& term, const char* name, bool needed) {
     if (term == 0 && needed)
       notes.push_back(fmt::format("the experiment leaves out the {} term; checked with {} samples", name, samples));
@@ -198,7 +203,9 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
     const double distance =
         std::min(kRelativeLength * extent(problem.scene()), kRelativeWidth * problem.gates().shape().detail());
     const double speed = top_speed(problem, theta, component);
-    const double most = type == ParameterType::rotation ? kMostDegrees : std::numeric_limits<double>::max();
+    const double most = type == ParameterType::rotation || type == ParameterType::camera_rotation
+                            ? kMostDegrees
+                            : std::numeric_limits<double>::max();
     return speed > 0 ? std::min(distance / speed, most) : std::min(distance, most);
   }
   if (!experiment.gradient.step_given) step = kRelativeValue * std::abs(theta[component]);

@@ -5,6 +5,7 @@ rendered, and what is wrong with files and scenes is said in one line.
 usage: capture_test.py PROGRAM
 """
 
+import csv
 import pathlib
 import subprocess
 import sys
@@ -115,6 +116,38 @@ class CaptureTest(unittest.TestCase):
         done, run = self.fit("--set", "gates={kind: bins, unit: ps, scene_unit_m: 1, start: 3010, width: 64, count: 18}")
         self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1))
         self.assertIn("do not hold whole bins of the file", done.stderr)
+
+    def test_derivatives_through_three_bounces(self):
+        """A board behind a black screen, beside a wall: shadow edges of sensor points and spots, and between the vertices."""
+        for name, corners in (("screen", ((-0.1, -0.05, 0.25), (0.05, -0.05, 0.25), (0.05, 0.15, 0.25), (-0.1, 0.15, 0.25))),
+                              ("side", ((0.35, -0.3, 0.15), (0.35, 0.3, 0.15), (0.35, 0.3, 0.6), (0.35, -0.3, 0.6)))):
+            lines = ["v %g %g %g" % corner for corner in corners]
+            (self.folder / f"{name}.obj").write_text("\n".join(lines) + "\nf 1 2 3 4\n")
+        experiment = EXPERIMENT[:EXPERIMENT.index("parameters:")] + """\
+parameters:
+  - {name: board_x, type: translation, shape: board, direction: [1, 0, 0], initial: 0}
+  - {name: screen_x, type: translation, shape: screen, direction: [1, 0, 0], initial: 0}
+  - {name: pan, type: camera_rotation, axis: [0, 1, 0], initial: 0}
+target: {images: none.exr}
+"""
+        gates = "gates={kind: gaussian, centers: [1.0, 1.2, 1.4], sigma: 0.06}"
+        for laser in ("confocal", "{points: [[0.1, -0.2, 0]]}"):
+            scene = SCENE.replace("confocal", laser).replace(
+                "shapes:", "  black: {type: diffuse, albedo: 0, two_sided: true}\n"
+                "  white: {type: diffuse, albedo: 0.9, two_sided: true}\nshapes:\n"
+                "  - {name: screen, file: screen.obj, material: black}\n  - {name: side, file: side.obj, material: white}")
+            (self.folder / "scene.yaml").write_text(scene)
+            (self.folder / "board.yaml").write_text(experiment.replace("initial: 0", "initial: 0, target: 0").replace(
+                "target: {images: none.exr}\n", ""))
+            with self.subTest(laser):
+                done = self.run_program("check", self.folder / "board.yaml", "--samples", 16384, "--set", gates, "--set",
+                                        "max_bounces=3", "-o", self.folder / "check")
+                self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+                with open(self.folder / "check/check.csv", encoding="ascii", newline="") as file:
+                    rows = list(csv.DictReader(file))
+                # What a wrong sign of the visibility term would add to z.
+                clearest = max(2 * abs(float(r["visibility"])) / float(r["finite_difference_error"]) for r in rows)
+                self.assertGreater(clearest, 10)
 
     def test_bad_files_get_one_line(self):
         rendered = self.render()
