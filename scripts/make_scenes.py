@@ -7,7 +7,7 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corridor, cube, glass_bunny, height_field, sofa, tree
+from scenes import branches, bunny, corridor, cube, glass_bunny, height_field, letter, sofa, tree
 
 SCENES = {
     "branches": branches.write,
@@ -16,6 +16,7 @@ SCENES = {
     "cube": cube.write,
     "glass_bunny": glass_bunny.write,
     "height_field": height_field.write,
+    "letter": letter.write,
     "sofa": sofa.write,
     "tree": tree.write,
 }
