@@ -8,13 +8,12 @@ import numpy as np
 
 from . import mesh
 
-SIDE = 21  # vertices
+SIDE = 13  # vertices
 EDGE = 0.6
 INK, PAPER = 0.9, 0.05
-STROKE = 0.045  # half of a stroke's width
-RELIEF = 0.02  # how far the letter's middle stands out, towards the wall
-BLUR = 0.05  # standard deviation of what rounds the relief
-DECAY_PS, STEP_PS, LAST_PS = 200, 2, 1600
+STROKE = 0.06  # half of a stroke's width
+BULGE = 0.025  # of the bent board, towards the wall
+DECAY_PS, STEP_PS, LAST_PS = 200, 2, 1000
 
 SCENE = """\
 # Written by scripts/make_scenes.py; lengths in metres. The wall is the plane z = 0, what is hidden lies at z > 0.
@@ -33,9 +32,9 @@ def strokes():
     """The middle lines of an R, as points close to each other."""
     line = lambda a, b: np.linspace(a, b, 200)
     angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 200)
-    bow = np.stack([0.04 + 0.1 * np.cos(angles), 0.09 + 0.1 * np.sin(angles)], 1)
-    return np.concatenate([line((-0.12, -0.19), (-0.12, 0.19)), line((-0.12, 0.19), (0.04, 0.19)), bow,
-                           line((0.04, -0.01), (-0.12, -0.01)), line((0, -0.01), (0.14, -0.19))])
+    bow = np.stack([0.03 + 0.11 * np.cos(angles), 0.1 + 0.1 * np.sin(angles)], 1)
+    return np.concatenate([line((-0.14, -0.2), (-0.14, 0.2)), line((-0.14, 0.2), (0.03, 0.2)), bow,
+                           line((0.03, 0), (-0.14, 0)), line((0, 0), (0.16, -0.2))])
 
 
 def coverage(x, y, edge):
@@ -46,13 +45,8 @@ def coverage(x, y, edge):
 
 
 def relief(x, y):
-    """Offsets along z: the letter, rounded, comes closer to the wall."""
-    side = np.linspace(-0.5 * EDGE, 0.5 * EDGE, 121)
-    fine_y, fine_x = np.meshgrid(side, side, indexing="ij")
-    ink = coverage(fine_x, fine_y, 0.005)
-    weights = np.exp(-0.5 * ((x[..., None, None] - fine_x) ** 2 + (y[..., None, None] - fine_y) ** 2) / BLUR**2)
-    smooth = (weights * ink).sum((-1, -2)) * (side[1] - side[0]) ** 2 / (2 * np.pi * BLUR**2)
-    return -RELIEF * smooth / smooth.max()
+    """Offsets along z: the board is bent, and bulges towards the wall."""
+    return -BULGE * np.exp(-0.5 * (((x + 0.03) / 0.14) ** 2 + ((y - 0.04) / 0.18) ** 2))
 
 
 def write_values(path, values):
