@@ -7,7 +7,7 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corridor, cube, glass_bunny, height_field, hidden_s, sofa, tree
+from scenes import branches, bunny, corridor, cube, glass_bunny, height_field, hidden_s, letter, sofa, tree
 
 SCENES = {
     "branches": branches.write,
@@ -17,6 +17,7 @@ SCENES = {
     "glass_bunny": glass_bunny.write,
     "height_field": height_field.write,
     "hidden_s": hidden_s.write,
+    "letter": letter.write,
     "sofa": sofa.write,
     "tree": tree.write,
 }
