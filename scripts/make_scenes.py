@@ -7,11 +7,12 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corridor, cube, glass_bunny, height_field, hidden_s, letter, sofa, tree
+from scenes import branches, bunny, corner, corridor, cube, glass_bunny, height_field, hidden_s, letter, sofa, tree
 
 SCENES = {
     "branches": branches.write,
     "bunny": bunny.write,
+    "corner": corner.write,
     "corridor": corridor.write,
     "cube": cube.write,
     "glass_bunny": glass_bunny.write,
