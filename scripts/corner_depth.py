@@ -2,6 +2,7 @@
 """Depths of the corner: what the phases alone say, and what was fitted through all reflections, beside the truth.
 
 usage: corner_depth.py RUN [PNG]           errors of both over the pixels that see nothing but the corner; draws them
+       corner_depth.py --table CSV RUN...  a line of errors for each run
        corner_depth.py --start RENDER FILE the depths of the phases as offsets of the vertices, to start from
 
 RUN is a folder of `isochron run experiments/corner.yaml`, RENDER one of `isochron render experiments/corner.yaml --at target`.
@@ -9,6 +10,7 @@ A depth is the distance from the camera, which lights the scene itself. The phas
 that was reflected once: d = c / (4 pi f) atan2(I90 - I270, I0 - I180).
 """
 
+import csv
 import pathlib
 import sys
 
@@ -144,20 +146,43 @@ def evaluate(folder):
     return {name: np.where(whole, depth, np.nan) for name, depth in depths.items()}, amplitude, whole
 
 
+def errors_of(depths, whole, name):
+    """Errors of all pixels that see nothing but the corner, and how many of these have no depth."""
+    error = (depths[name] - depths["target"])[whole]
+    return error[np.isfinite(error)], int((~np.isfinite(error)).sum())
+
+
+def read_summary(folder):
+    return yaml.safe_load((folder / "summary.yaml").read_text(encoding="utf-8"))
+
+
 def report(folder, depths, whole):
     print(f"{whole.sum()} pixels see nothing but the corner, {np.nanmin(depths['target']):.2f} to "
           f"{np.nanmax(depths['target']):.2f} m away")
-    errors = {}
+    size = {}
     for name, words in (("phases", "phases alone"), ("initial", "start"), ("final", "fit")):
-        error = (depths[name] - depths["target"])[whole]
-        missed = int(np.isnan(error).sum())
-        error = error[~np.isnan(error)]
-        errors[name] = rms(error)
+        error, missed = errors_of(depths, whole, name)
+        size[name] = rms(error)
         print(f"{words:13s} rms {1000 * rms(error):7.2f} mm, mean {1000 * error.mean():+7.2f} mm, largest "
               f"{1000 * np.abs(error).max():7.2f} mm" + (f", {missed} pixels without a depth" if missed else ""))
-    summary = yaml.safe_load((folder / "summary.yaml").read_text(encoding="utf-8"))
-    print(f"the fit's rms error is 1/{errors['phases'] / errors['final']:.1f} of that of the phases alone; "
+    summary = read_summary(folder)
+    print(f"the fit's rms error is 1/{size['phases'] / size['final']:.1f} of that of the phases alone; "
           f"{summary['iterations']} iterations, {summary['seconds']:.0f} s")
+
+
+def write_table(path, folders):
+    with open(path, "w", encoding="ascii", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["seed", "iterations", "seconds", "pixels", "phases_rms_mm", "start_rms_mm", "fit_rms_mm",
+                        "fit_median_mm", "fit_largest_mm", "fit_missed"])
+        for folder in folders:
+            depths, _, whole = evaluate(folder)
+            summary, (error, missed) = read_summary(folder), errors_of(depths, whole, "final")
+            sizes = [rms(errors_of(depths, whole, name)[0]) for name in ("phases", "initial", "final")]
+            sizes += [np.median(np.abs(error)), np.abs(error).max()]
+            seed = yaml.safe_load((folder / "experiment.yaml").read_text(encoding="utf-8"))["seed"]
+            table.writerow([seed, summary["iterations"], f"{summary['seconds']:.0f}", whole.sum(),
+                            *(f"{1000 * x:.2f}" for x in sizes), missed])
 
 
 def draw(path, depths, amplitude, whole):
@@ -193,6 +218,9 @@ def draw(path, depths, amplitude, whole):
 def main(arguments):
     if len(arguments) == 3 and arguments[0] == "--start":
         write_start(pathlib.Path(arguments[1]), pathlib.Path(arguments[2]))
+        return 0
+    if len(arguments) >= 3 and arguments[0] == "--table":
+        write_table(arguments[1], [pathlib.Path(a) for a in arguments[2:]])
         return 0
     if len(arguments) not in (1, 2) or arguments[0].startswith("-"):
         print(__doc__.strip())
