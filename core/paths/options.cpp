@@ -14,11 +14,12 @@ const char* name(Term term) {
   return "";
 }
 
-SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates) {
+SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene) {
   // Gates that together cover less than this part of the path length: standard sampling throws too many paths away.
   constexpr double kNarrow = 0.02;
   if (gates.shape().is_unbounded() || options.sampling == Sampling::standard) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
+  if (scene.capture) return {0, 0};  // hidden geometry sampling serves all gates at once
   if (options.mix) return *options.mix;
   return gates.relative_coverage() < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
 }

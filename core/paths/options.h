@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "core/gates/gate.h"
+#include "core/scene/scene.h"
 
 namespace isochron {
 
@@ -61,7 +62,7 @@ struct EstimatorOptions {
 };
 
 /// What a renderer makes of `sampling` and `mix`.
-SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates);
+SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene);
 
 /// The terms of the derivative (paper Eq. 13). A sample of `interior` and `path_length` is a camera path with all its
 /// connections; one of `visibility` is one search for a boundary, by one of its four techniques (see BoundaryGuide).

@@ -136,7 +136,7 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
   VertexFlows::Pair before, after;
   Extra lost_by_pixel;
   for (int k = 1; k <= last_on_surface; ++k) {
-    const int rank = held ? k : k + 1;  // x1 that no pixel holds is a vertex like the others
+    const int rank = scene.flow_rank(k);
     after = k < last_on_surface ? scene.flows.pair(scene, x[k], x[k + 1], rank) : VertexFlows::Pair{};
     const VertexFlow flow = VertexFlows::at(before, after, rank);
     before = after;

@@ -201,7 +201,7 @@ void PreparedScene::update_emitters() {
     }
     if (emits) boxes.push_back(box);
   }
-  const bool triangles_have_none = triangles.empty();
+  const bool have_extent = !triangles.empty();
   update_lights();
   Bounds spots;
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -214,7 +214,7 @@ void PreparedScene::update_emitters() {
   }
   if (captures()) boxes.push_back(spots);
   emitters = Emitters(std::move(triangles), power, std::move(boxes));
-  emitters.have_extent = !triangles_have_none;
+  emitters.have_extent = have_extent;
   emitters.seen_by_camera = seen;
   for (ShapeRecord& shape : shapes_)
     if (shape.emission.emits() && emitters.have_extent) shape.emitter_pdf = shape.emission.power() / emitters.power();

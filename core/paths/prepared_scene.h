@@ -94,8 +94,12 @@ class PreparedScene {
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
-  /// Whether light that comes from x1 of a path takes the way back that x1 is seen along.
+  /// What counts in the length of a pixel's paths beside the way from its sensor point to the light.
+  double extra_length(int pixel) const { return captures() ? scene.capture->extra_length(pixel) : 0; }
+  /// Whether every path of one bounce takes the way back that it came.
   bool confocal() const { return captures() && scene.capture->confocal(); }
+  /// Which vertex of a camera's path x_k moves like: x1 that no pixel holds is a vertex like those after it.
+  int flow_rank(int k) const { return captures() ? k + 1 : k; }
 
   /// What multiplies the BSDF at x.
   double paint(const SurfacePoint& x) const { return shapes_[shape_index(x.triangle)].painted ? paint_at(x) : 1; }
@@ -247,11 +251,8 @@ class PreparedScene {
     const Vec3 d = y.p - x.p;
     return !caster.occluded(offset_ray_origin(x, d), offset_ray_origin(y, -d));
   }
-  bool visible_from_camera(const SurfacePoint& x) const {
-    return !caster.occluded(camera.position, offset_ray_origin(x, camera.position - x.p));
-  }
 
-  /// `x.p` moved off its surface to the side of the unit direction w.
+  /// `x.p` moved off its surface to the side of the unit direction w; where there is no surface, `x.p`.
   Vec3 offset_ray_origin(const SurfacePoint& x, const Vec3& w) const {
     return x.p + x.n * std::copysign(caster.offset(), dot(x.n, w));
   }

@@ -104,7 +104,7 @@ void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& opt
   camera_possible_ = follows_bodies_ = false;
   near_ = differentiable.bounds;
   if (!differentiable.geometry) return;
-  if (options.radius_in_pixels > 0) {
+  if (options.radius_in_pixels > 0 && !prepared.captures()) {  // whose x1 no pixel holds
     // x1 is within s of the box, and its own depth enters s.
     constexpr double kLargest = 0.5;
     const Vec3 farthest{camera.forward.x > 0 ? differentiable.bounds.high.x : differentiable.bounds.low.x,

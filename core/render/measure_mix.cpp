@@ -219,13 +219,12 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   double own_work = 0;
   double& work = trial_work ? *trial_work : own_work;
   work = 0;
-  if (options.sampling == Sampling::standard || gates.shape().is_unbounded()) return {0, 0};
-  if (options.sampling == Sampling::ellipsoidal) return {1, 1};
-  if (scene.capture) return {0, 0};  // one technique serves all gates, see Passes
+  if (options.sampling != Sampling::automatic || gates.shape().is_unbounded() || scene.capture)
+    return sampling_mix(options, gates, scene);
   const double width = gates.relative_width(), coverage = gates.relative_coverage();
   EstimatorOptions plain = options;
   plain.mix.reset();
-  const SamplingMix by_width = sampling_mix(plain, gates);
+  const SamplingMix by_width = sampling_mix(plain, gates, scene);
   SamplingMix best;
   const auto choose = [&](const Doubtful& widths, double otherwise, double samples, const TangentBasis* column,
                           const Term* term) {

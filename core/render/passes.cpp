@@ -15,24 +15,14 @@
 namespace isochron {
 namespace {
 
-constexpr int kPixelsPerBlock = 8;
-
 /// The learning pass has random numbers of its own; with fewer searches by each technique it would teach noise.
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
 constexpr long long kFewestLearningRounds = 64;
 
 std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow,
                                         SceneCache* cache) {
-  FollowOptions used = follow;
-  if (source.capture) used.radius_in_pixels = 0;  // no pixel holds x1
-  if (cache) return cache->take(source, basis, used);
-  return std::shared_ptr<ReadyScene>(new ReadyScene{PreparedScene(source, basis, used), std::nullopt});
-}
-
-/// A capture's paths find their lengths by themselves: hidden geometry sampling serves all gates at once, unless told not to.
-SamplingMix mix_of(const EstimatorOptions& options, const GateSet& gates, const Scene& source) {
-  if (source.capture && options.sampling == Sampling::automatic) return {};
-  return sampling_mix(options, gates);
+  if (cache) return cache->take(source, basis, follow);
+  return std::shared_ptr<ReadyScene>(new ReadyScene{PreparedScene(source, basis, follow), std::nullopt});
 }
 
 }  // namespace
@@ -45,7 +35,7 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
       options(estimator),
       basis(tangent),
       scene(ready->scene),
-      mix(mix_of(estimator, gates, source)),
+      mix(sampling_mix(estimator, gates, source)),
       every_gate(gates),
       cache_(cache) {
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
@@ -146,24 +136,22 @@ void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partitio
   const PointSet of_segments = points.of_image(Technique::from_edge);
   const PointSet of_light_edges = points.of_image(Technique::from_light);
   for_each_pixel(partition, [&](int pixel) {
-    if (scene.captures()) {
-      // Every segment serves the pixel that it is drawn for.
-      const double pick = worker.pick.rate(pixel);
-      points.in_pixel(Technique::from_edge, pixel, from_edge_rate * pick,
-                      [&](Rng& rng) { secondary.sample_from_edge(pixel, scale / (from_edge_rate * pick), rng); });
-      points.in_pixel(Technique::from_light, pixel, from_light_rate * pick,
-                      [&](Rng& rng) { secondary.sample_from_light(pixel, scale / (from_light_rate * pick), rng); });
-      points.in_pixel(Technique::from_camera, pixel, from_camera_rate * pick,
-                      [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / (from_camera_rate * pick), rng); });
-      return;
-    }
-    points.in_image(of_light_edges, pixel, from_light_rate,
-                    [&](Rng& rng) { secondary.sample_from_light(0, splat_scale / from_light_rate, rng); });
+    // Segments between surfaces or to a light: a capture's serve the pixel that they are drawn for, a camera's whichever sees
+    // them.
+    const auto segments = [&](Technique technique, const PointSet& of_image, double rate, auto&& sample) {
+      const double own_rate = rate * worker.pick.rate(pixel);
+      if (scene.captures())
+        points.in_pixel(technique, pixel, own_rate, [&](Rng& rng) { sample(scale / own_rate, rng); });
+      else
+        points.in_image(of_image, pixel, rate, [&](Rng& rng) { sample(splat_scale / rate, rng); });
+    };
     points.in_image(of_edges, pixel, edges_rate, [&](Rng& rng) { primary.sample(splat_scale / edges_rate, rng); });
     points.in_image(of_borders, pixel, borders_rate,
                     [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
-    points.in_image(of_segments, pixel, from_edge_rate,
-                    [&](Rng& rng) { secondary.sample_from_edge(0, splat_scale / from_edge_rate, rng); });
+    segments(Technique::from_edge, of_segments, from_edge_rate,
+             [&](double share, Rng& rng) { secondary.sample_from_edge(pixel, share, rng); });
+    segments(Technique::from_light, of_light_edges, from_light_rate,
+             [&](double share, Rng& rng) { secondary.sample_from_light(pixel, share, rng); });
     const double rate = from_camera_rate * worker.pick.rate(pixel);
     points.in_pixel(Technique::from_camera, pixel, rate,
                     [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / rate, rng); });

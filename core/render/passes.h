@@ -16,6 +16,9 @@
 
 namespace isochron {
 
+/// Pixels that a partition takes at a turn.
+inline constexpr int kPixelsPerBlock = 8;
+
 /// One of `count` partitions of the work of a pass: every partition takes its turn at the blocks of pixels.
 struct Partition {
   int index, count;

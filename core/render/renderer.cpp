@@ -1,6 +1,7 @@
 #include "core/render/renderer.h"
 
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 
 #include "core/base/partition_sum.h"
@@ -23,12 +24,15 @@ struct Renderer::Impl : Passes {
     return GatedImage(scene.camera.width, scene.camera.height, gates.size(), scene.scene.grey ? 1 : 3);
   }
 
+  /// Of a gradient. Partitions take turns at blocks of pixels.
+  static int part_of(int pixel) { return pixel / kPixelsPerBlock % kGradientParts; }
+
   /// f(pixel, background of the pixel, its degree of freedom)
   template <class F>
   void for_each_background(F&& f) const {
     const Detector& detector = scene.scene.detector;
     for (int pixel = 0; pixel < scene.pixels(); ++pixel) {
-      const int i = detector.background.size() == 1 ? 0 : scene.scene.capture->sensor_index(pixel);
+      const int i = detector.background_of(scene.scene.capture, pixel);
       f(pixel, detector.background[i], scene.layout.background(i));
     }
   }
@@ -48,11 +52,16 @@ struct Renderer::Impl : Passes {
       }
     });
   }
-  void add_background_gradient(const GatedImage& adjoint, std::vector<double>& dof_gradient) const {
-    const std::size_t values = adjoint.data.size() / static_cast<std::size_t>(adjoint.pixels());
+  void add_background_gradient(const GatedImage& adjoint, std::vector<double>& dof_gradient,
+                               std::vector<std::vector<double>>* parts) const {
+    const auto values = static_cast<std::ptrdiff_t>(adjoint.data.size()) / adjoint.pixels();
     for_each_background([&](int pixel, double, int dof) {
       if (!basis->differentiates(dof)) return;
-      for (std::size_t i = 0; i < values; ++i) dof_gradient[dof] += adjoint.data[pixel * values + i];
+      const auto begin = adjoint.data.begin() + pixel * values;
+      const double sum = std::accumulate(begin, begin + values, 0.0);
+      dof_gradient[dof] += sum;
+      for (int e = basis->row_begin[dof]; parts && e < basis->row_begin[dof + 1]; ++e)
+        (*parts)[part_of(pixel)][basis->entries[e].column] += basis->entries[e].coefficient * sum;
     });
   }
 };
@@ -142,7 +151,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
   const TangentBasis& basis = *impl_->basis;
   if (parts) parts->assign(kGradientParts, std::vector<double>(basis.columns, 0.0));
-  if (term == Term::interior) impl_->add_background_gradient(adjoint, dof_gradient);
+  if (term == Term::interior) impl_->add_background_gradient(adjoint, dof_gradient, parts);
   if (!impl_->has(term)) return;
   impl_->prepare(term);
   const GatePick pick(impl_->gates, adjoint);
@@ -160,8 +169,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
     return own;
   });
   sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
-  // Partitions take turns at the blocks of pixels: whatever their number, a multiple of kGradientParts, each part is of the
-  // same pixels.
+  // Whatever the number of partitions, a multiple of kGradientParts, each part is of the same pixels, see part_of.
   for (std::size_t i = 0; i < by_partition.size(); ++i) add_to((*parts)[i % kGradientParts], by_partition[i]);
 }
 

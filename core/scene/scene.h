@@ -49,10 +49,10 @@ struct Detector {
   std::vector<double> background{0};  ///< of every pixel, or one for each sensor point of a capture
   double time_offset = 0;             ///< light is counted later by it: as if paths were longer; scene units
 
-  double background_of(const std::optional<Capture>& capture, int pixel) const {
-    return background.size() == 1 ? background[0] : background[capture->sensor_index(pixel)];
+  /// Which of the backgrounds is the pixel's.
+  int background_of(const std::optional<Capture>& capture, int pixel) const {
+    return background.size() == 1 ? 0 : capture->sensor_index(pixel);
   }
-  bool operator==(const Detector&) const = default;
 };
 
 struct Scene {

@@ -97,7 +97,7 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   for (int i = 0; i < 2; ++i) {
     const ArcPoint& q = chosen.side[i];
     if (q.value.is_black()) continue;
-    if (!sees(q.point)) continue;
+    if (!worker_.visible(x, q.point)) continue;
     worker_.path.push(scene_, q.point);
     if (!path.retraces(y) && !worker_.visible(q.point, y)) {
       worker_.path.pop();
@@ -108,11 +108,6 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
     worker_.path.pop();
     worker_.path.pop();
   }
-}
-
-bool EllipsoidalConnections::sees(const SurfacePoint& q) {
-  if (worker_.path.size() == 1 && !scene_.captures()) return worker_.visible_from_camera(q);
-  return worker_.visible(worker_.path.back(), q);
 }
 
 void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low,
@@ -164,7 +159,7 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
   for (int i = 0; i < 2; ++i) {
     const ArcPoint& y = chosen.side[i];
     if (y.value.is_black()) continue;
-    if (!sees(y.point)) continue;
+    if (!worker_.visible(x, y.point)) continue;
     worker_.path.push(scene_, y.point);
     deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
     worker_.path.pop();

@@ -63,9 +63,6 @@ class EllipsoidalConnections {
   /// for neither the path nor the emitter has a gradient, it does so only by points on triangles that move.
   bool any_arc_contributes(int emitter_triangle) const;
 
-  /// Whether the path's last vertex sees q.
-  bool sees(const SurfacePoint& q);
-
   void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
   void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
 

@@ -205,8 +205,7 @@ bool SecondaryBoundary::differentiate(const Segment& g) {
 
 const LocalDifferential& SecondaryBoundary::with_following(const Segment& g, const Connection& c,
                                                            const SurfacePoint& next) {
-  // x1 that no pixel holds is a vertex like the others.
-  const int k = c.bounces + (scene_.captures() ? 1 : 0);
+  const int k = scene_.flow_rank(c.bounces);
   const bool has_before = c.before.triangle >= 0, has_next = next.triangle >= 0;
   const VertexFlows& flows = scene_.flows;
   const LocalDifferential& base = flow_of(c);
@@ -249,7 +248,7 @@ double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint&
 void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng) {
   const bool captures = scene_.captures();
   const SurfacePoint eye = scene_.sensor_point(of_pixel);
-  const double extra = captures ? scene_.scene.capture->extra_length(of_pixel) : 0;
+  const double extra = scene_.extra_length(of_pixel);
   Rgb throughput(1.0);
   walk_.assign(1, g.camera_end);
   WalkDensities densities;
@@ -266,7 +265,7 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double sc
       const Rgb f = bsdf_value(scene_, x, {x.n, from, w_o, dot(x.n, from), dot(x.n, w_o), dot(from, w_o)});
       // Zero for a face seen edge-on, which has no flow along the pixel's ray either.
       const double importance = scene_.importance(pixel, -w_o) * solid_angle_to_area(eye.p, x);
-      if (!f.is_black() && importance > 0 && (captures ? worker_.visible(eye, x) : worker_.visible_from_camera(x))) {
+      if (!f.is_black() && importance > 0 && worker_.visible(eye, x)) {
         WalkDensities all = densities;
         if (bounce > 1) all.towards_light *= towards(eye, x, walk_[bounce - 2]);
         connections_.push_back({pixel, bounce, throughput * f * (importance * scale),

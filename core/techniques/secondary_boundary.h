@@ -112,7 +112,7 @@ class SecondaryBoundary {
 
   /// Of `differentiate`, by what holds D.
   const LocalDifferential& flow_of(const Connection& c) const {
-    return c.bounces == 1 && !scene_.captures() ? camera_flow_ : material_flow_;
+    return scene_.flow_rank(c.bounces) == 1 ? camera_flow_ : material_flow_;
   }
 
   /// Walks on from D, away from the light, and collects a connection to the camera, or to the sensor point of the pixel, at

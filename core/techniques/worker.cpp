@@ -14,7 +14,7 @@ Worker::Worker(const PreparedScene& prepared, const GateSet& gate_set, const Est
       path(estimator.max_bounces) {}
 
 void Worker::start_at_sensor(Path& sensor_path, int pixel) const {
-  sensor_path.start(scene.sensor_point(pixel), scene.captures() ? scene.scene.capture->extra_length(pixel) : 0);
+  sensor_path.start(scene.sensor_point(pixel), scene.extra_length(pixel));
 }
 
 double Worker::start_path(int pixel, Rng& rng) {

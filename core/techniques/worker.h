@@ -42,10 +42,6 @@ struct Worker {
     ++rays;
     return scene.visible(x, y);
   }
-  bool visible_from_camera(const SurfacePoint& x) {
-    ++rays;
-    return scene.visible_from_camera(x);
-  }
   int closest_hit(const SurfacePoint& x, const Vec3& w) {
     ++rays;
     return scene.closest_hit(x, w);

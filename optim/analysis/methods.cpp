@@ -122,7 +122,7 @@ bool MethodRun::same_as(const MethodRun& other) const {
   if (kind_ != Method::Gradient::adjoint || other.kind_ != kind_) return false;
   const auto settled = [](const Problem& problem) {
     EstimatorOptions options = problem.estimator();
-    options.mix = sampling_mix(options, problem.gates());
+    options.mix = sampling_mix(options, problem.gates(), problem.scene());
     options.sampling = Sampling::automatic;
     return options;
   };

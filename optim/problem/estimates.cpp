@@ -81,7 +81,7 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
   if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
     require_replicates("primal", spec.primal);
     const Stream stream = problem.stream(Pass::finite_difference);
-    const bool independent = sampling_mix(problem.estimator(), problem.gates()).image == 0;
+    const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image == 0;
     const int replicates = replicate_count(spec.primal, pixels, independent, most_replicates);
     return {collect("total", spec.primal, replicates, independent, count, poll, [&](SampleRange range) {
       std::vector<GatedImage> images;

@@ -26,6 +26,15 @@ std::string names_of(const std::vector<Item>& items) {
   return list.empty() ? "none" : list;
 }
 
+/// The index, which is -1 where the scene has no such item: complains of the key that names it.
+template <class Item>
+int found(int index, const ParameterSpec& spec, const char* key, const std::string& name,
+          const std::vector<Item>& items) {
+  if (index < 0)
+    spec.fail(key, fmt::format("there is no {} '{}' in the scene", key, name), "allowed: " + names_of(items));
+  return index;
+}
+
 std::string trimmed(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t");
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
@@ -145,19 +154,11 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
 }
 
 int Parameters::find_shape(const ParameterSpec& spec) const {
-  const int shape = scene_.find_shape(spec.shape);
-  if (shape < 0)
-    spec.fail("shape", fmt::format("there is no shape '{}' in the scene", spec.shape),
-              "allowed: " + names_of(scene_.shapes));
-  return shape;
+  return found(scene_.find_shape(spec.shape), spec, "shape", spec.shape, scene_.shapes);
 }
 
 int Parameters::find_light(const ParameterSpec& spec) const {
-  const int light = scene_.find_light(spec.light);
-  if (light < 0)
-    spec.fail("light", fmt::format("there is no light '{}' in the scene", spec.light),
-              "allowed: " + names_of(scene_.lights));
-  return light;
+  return found(scene_.find_light(spec.light), spec, "light", spec.light, scene_.lights);
 }
 
 void Parameters::bind_light(const ParameterSpec& spec, int first) {
@@ -179,10 +180,8 @@ int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_uni
   };
   switch (spec.type) {
     case ParameterType::material: {
-      const int material = scene_.find_material(spec.material);
-      if (material < 0)
-        spec.fail("material", fmt::format("there is no material '{}' in the scene", spec.material),
-                  "allowed: " + names_of(scene_.materials));
+      const int material =
+          found(scene_.find_material(spec.material), spec, "material", spec.material, scene_.materials);
       Quantity quantity{};
       const int number = scene_.materials[material].find(spec.quantity, &quantity);
       if (number < 0)

@@ -192,9 +192,9 @@ GatedImage Problem::read_target(const std::string& file) const {
   return image;
 }
 
-GatedImage Problem::in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
-                             int samples, const std::string& name, const Poll& poll) const {
-  // So that a request to stop does not wait for thousands of samples per pixel.
+GatedImage Problem::render_in_parts(const std::vector<double>& theta, const EstimatorOptions& options,
+                                    const Stream& stream, int samples, const std::string& name,
+                                    const Poll& poll) const {
   const int parts = std::min(32, samples);
   const Scene scene = parameters_->apply(theta);
   const Renderer renderer(scene, gates_, options);
@@ -209,11 +209,6 @@ GatedImage Problem::in_parts(const std::vector<double>& theta, const EstimatorOp
   return mean.mean();
 }
 
-GatedImage Problem::render_in_parts(const std::vector<double>& theta, const Stream& stream, int samples,
-                                    const std::string& stage, const Poll& poll) const {
-  return in_parts(theta, estimator(), stream, samples, stage, poll);
-}
-
 GatedImage Problem::make_target(const Poll& poll) const {
   const TargetSpec& target = experiment_.target;
   if (!target.images.empty()) return read_target(target.images);
@@ -221,7 +216,8 @@ GatedImage Problem::make_target(const Poll& poll) const {
   const Stream stream{target.seed, 0, pass_number(Pass::target)};
   EstimatorOptions options = estimator();
   options.max_bounces = target.max_bounces;
-  GatedImage image = in_parts(parameters_->target(), options, stream, target.samples, "rendering the target", poll);
+  GatedImage image =
+      render_in_parts(parameters_->target(), options, stream, target.samples, "rendering the target", poll);
   const Stream noise{target.seed, 0, pass_number(Pass::photon_noise)};
   if (target.photons > 0) add_photon_noise(image, target.photons, noise);
   if (target.counts) draw_counts(image, noise);

@@ -91,9 +91,10 @@ class Problem {
   /// Gated images at theta. Throws InputError where it cannot be rendered.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
-  /// The same of many samples, in parts, between which `poll` is called.
-  GatedImage render_in_parts(const std::vector<double>& theta, const Stream& stream, int samples,
-                             const std::string& stage, const Poll& poll) const;
+  /// The same of many samples with options of its own, in parts, between which `poll` is called: a request to stop does not
+  /// wait for all of them.
+  GatedImage render_in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
+                             int samples, const std::string& stage, const Poll& poll) const;
 
   /// A renderer of a scene that parameters() made. Scene and basis must outlive it.
   Renderer renderer(const Scene& scene, const EstimatorOptions& options, const TangentBasis* basis = nullptr) const;
@@ -140,9 +141,6 @@ class Problem {
 
  private:
   static std::uint32_t pass_number(Pass pass) { return static_cast<std::uint32_t>(pass); }
-
-  GatedImage in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
-                      int samples, const std::string& name, const Poll& poll) const;
 
   Experiment experiment_;
   Scene scene_;

@@ -146,13 +146,12 @@ class Run {
     return result;
   }
 
-  /// In its own time: the run has ended, whatever happens to this.
   void write_expected_counts() const {
     const Experiment& experiment = problem_.experiment();
     if (!has_histograms(experiment, problem_.scene())) return;
     const GatedImage expected =
-        problem_.render_in_parts(state_.theta, problem_.stream(Pass::histograms), experiment.output.histogram_samples,
-                                 "rendering the expected counts", [] {});
+        problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
+                                 experiment.output.histogram_samples, "rendering the expected counts", [] {});
     write_histograms(path("final.h5"), experiment, problem_.scene(), expected);
   }
 

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <string>
 
@@ -112,13 +111,6 @@ Capture read_capture_of(const std::string& file) {
   return capture;
 }
 
-std::vector<WallPoint> with_normal(const std::vector<Vec3>& points, const Vec3& n) {
-  std::vector<WallPoint> result;
-  result.reserve(points.size());
-  for (const Vec3& p : points) result.push_back({p, n});
-  return result;
-}
-
 }  // namespace
 
 void describe(Keys& keys, Capture& capture) {
@@ -161,8 +153,11 @@ void describe(Keys& keys, Capture& capture) {
       value.fail("has too many pairs of sensor points and spots", fmt::format("at most {}", kMostPoints));
     capture.columns = sensor.columns;
     capture.rows = sensor.rows;
-    capture.sensor = with_normal(sensor.points, normal);
-    capture.spots = with_normal(spots, normal);
+    const auto facing_normal = [&normal](const std::vector<Vec3>& points) {
+      return wall_points(points, std::vector<Vec3>(points.size(), normal));
+    };
+    capture.sensor = facing_normal(sensor.points);
+    capture.spots = facing_normal(spots);
     if (places.contains("origin")) capture.origin = origin;
   });
 }
