@@ -264,5 +264,41 @@ TEST(CaptureReadings, GradientsAreSumsOfDerivatives) {
   }
 }
 
+/// Gain and backgrounds of single points, exactly: readings are gain x light + background. The parts of a gradient add up to it.
+TEST(CaptureReadings, GainAndBackground) {
+  Scene scene = CaptureSetup{.confocal = true, .occluded = false}.scene();
+  const Renderer plain(scene, kWide, {.max_bounces = 1});
+  scene.detector.gain = 3;
+  scene.detector.background = {0.1, 0.2, 0.3, 0.4};
+  const DofLayout layout(scene);
+  std::vector<int> dofs{layout.gain()};
+  for (int i = 0; i < 4; ++i) dofs.push_back(layout.background(i));
+  const TangentBasis basis = free_dofs(scene, dofs);
+  const Renderer renderer(scene, kWide, {.max_bounces = 1}, &basis);
+  const SampleRange range{0, 64};
+  const GatedImage light = plain.render({3, 0, 0}, range), image = renderer.render({3, 0, 0}, range);
+  const auto derivatives = renderer.derive(Term::interior, {3, 0, 0}, range);
+  GatedImage weights = light;
+  for (int pixel = 0; pixel < 4; ++pixel)
+    for (int g = 0; g < kWide.size(); ++g) {
+      EXPECT_NEAR(image.at(pixel, g, 0), 3 * light.at(pixel, g, 0) + 0.1 * (pixel + 1), 1e-14);
+      EXPECT_NEAR(derivatives[0].at(pixel, g, 0), light.at(pixel, g, 0), 1e-14);
+      for (int i = 0; i < 4; ++i) EXPECT_EQ(derivatives[1 + i].at(pixel, g, 0), i == pixel ? 1 : 0);
+      weights.at(pixel, g, 0) = 1 + pixel + 0.5 * g;
+    }
+  std::vector<double> dof_gradient(layout.size(), 0.0);
+  std::vector<std::vector<double>> parts;
+  renderer.add_gradient(Term::interior, weights, {3, 0, 0}, range, dof_gradient, &parts);
+  const std::vector<double> gradient = basis.transpose_apply(dof_gradient);
+  for (int column = 0; column < basis.columns; ++column) {
+    double sum = 0;
+    for (const auto& part : parts) sum += part[column];
+    EXPECT_NEAR(sum, gradient[column], 1e-12 * std::abs(sum));
+    if (column > 0) {
+      EXPECT_DOUBLE_EQ(gradient[column], 4.0 * column + 0.5 * 6);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace isochron::testing
