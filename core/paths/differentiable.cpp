@@ -7,7 +7,7 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
       triangle(scene.triangles.size(), 0),
       material(scene.materials.size(), 0),
       emission(scene.shapes.size(), 0),
-      paint(scene.paint.size(), 0),
+      texture(scene.texture.size(), 0),
       light(scene.lights.size(), 0) {
   const DofLayout layout(scene);
   const int first_number = layout.first_number[0];
@@ -29,7 +29,7 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
     for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
     geometry |= triangle[t] != 0;
   }
-  for (int v = 0; v < layout.painted; ++v) paint[v] = basis->differentiates(layout.paint(v));
+  for (int v = 0; v < layout.textured; ++v) texture[v] = basis->differentiates(layout.texture(v));
   for (int i = 0; i < layout.lights; ++i)
     for (int k = 0; k < 9; ++k) {
       const bool moves = basis->differentiates(layout.light_position(i, k));

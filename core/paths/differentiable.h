@@ -14,7 +14,7 @@ struct Differentiable {
   std::vector<std::uint8_t> material;  ///< any of its numbers
   std::vector<std::uint8_t> number;    ///< as DofLayout counts them, from the first material's first on
   std::vector<std::uint8_t> emission;  ///< per shape
-  std::vector<std::uint8_t> paint;     ///< per vertex, where shapes are painted
+  std::vector<std::uint8_t> texture;   ///< per vertex, where shapes are textured
   std::vector<std::uint8_t> light;     ///< any number of it
   bool gain = false, time_offset = false;
   bool any = false;

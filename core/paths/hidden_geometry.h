@@ -1,5 +1,5 @@
-// Hidden geometry sampling: paths are led straight to what is sought. A point is drawn uniformly by area on the shapes that
-// parameters change (Shape::sought), which a ray in a random direction may rarely meet.
+// Hidden geometry sampling: a point of a path is drawn uniformly by area on the shapes that parameters change (Shape::hidden), which
+// a ray in a random direction may rarely meet.
 #pragma once
 #include <vector>
 

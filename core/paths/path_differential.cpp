@@ -38,13 +38,13 @@ void add_scalar(int dof, const Rgb& log_f, LocalDifferential& out) {
     if (log_f[c] != 0) out.scalars.push_back({dof, c, log_f[c]});
 }
 
-/// Adds what the paint at x does to ln F.
-void add_paint(const PreparedScene& scene, const SurfacePoint& x, LocalDifferential& out) {
+/// Adds what the texture at x does to ln F.
+void add_texture(const PreparedScene& scene, const SurfacePoint& x, LocalDifferential& out) {
   const auto b = scene.barycentrics(x);
-  const double value = scene.paint(x);
+  const double value = scene.texture(x);
   for (int i = 0; i < 3; ++i)
-    if (const int v = scene.scene.triangles[x.triangle].vertex[i]; scene.differentiable.paint[v])
-      out.scalars.push_back({scene.layout.paint(v), -1, b[i] / value});
+    if (const int v = scene.scene.triangles[x.triangle].vertex[i]; scene.differentiable.texture[v])
+      out.scalars.push_back({scene.layout.texture(v), -1, b[i] / value});
 }
 
 /// What a vertex's material point adds up beyond what its base flow says: from neighbours that follow it, from x1 itself.
@@ -129,9 +129,9 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
     const Vec3& forward = scene.camera.forward;
     return x[1].n / height - forward * (3 / dot(forward, ray));
   };
-  // A vertex that does not move with its material crosses the paint there.
-  const auto log_paint = [&](int k) {
-    return scene.painted(x[k].triangle) && !length_only ? scene.paint_gradient(x[k]) / scene.paint(x[k]) : Vec3();
+  // A vertex that does not move with its material crosses the texture there.
+  const auto log_texture = [&](int k) {
+    return scene.textured(x[k].triangle) && !length_only ? scene.texture_gradient(x[k]) / scene.texture(x[k]) : Vec3();
   };
   VertexFlows::Pair before, after;
   Extra lost_by_pixel;
@@ -141,8 +141,8 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
     const VertexFlow flow = VertexFlows::at(before, after, rank);
     before = after;
     if (!flow.follows()) continue;
-    const Extra lost = let_follow(flow, x[k], g[k], (rank == 1 ? log_density() : Vec3()) + log_paint(k), &extra[k - 1],
-                                  &extra[k], k + 1 < count ? &extra[k + 1] : nullptr);
+    const Extra lost = let_follow(flow, x[k], g[k], (rank == 1 ? log_density() : Vec3()) + log_texture(k),
+                                  &extra[k - 1], &extra[k], k + 1 < count ? &extra[k + 1] : nullptr);
     if (rank == 1) {
       lost_by_pixel = lost;
       extra[k].area = flow.own.weight;
@@ -155,13 +155,13 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
 
   if (held) {
     // The pixel flow: along the ray, as far as the surface moves along its normal.
-    const Vec3 paint = last_on_surface >= 1 ? log_paint(1) : Vec3();
-    Vec3 through_ray = g[1].position + paint - lost_by_pixel.position;
+    const Vec3 texture = last_on_surface >= 1 ? log_texture(1) : Vec3();
+    Vec3 through_ray = g[1].position + texture - lost_by_pixel.position;
     if (lost_by_pixel.area > 0) {
       through_ray += log_density() * lost_by_pixel.area;
       g[1].normal += ray * (lost_by_pixel.area / height);
     }
-    g[1].position = x[1].n * (dot(ray, through_ray) / height) - paint;
+    g[1].position = x[1].n * (dot(ray, through_ray) / height) - texture;
     g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
   }
   for (int k = 1; k <= last_on_surface; ++k) {
@@ -222,7 +222,7 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     for (int k = 1; k + 1 < count; ++k) {
       const int m = scene.shape_of(x[k].triangle).material;
       const Bsdf& bsdf = scene.bsdf_of(x[k].triangle);
-      if (scene.painted(x[k].triangle)) add_paint(scene, x[k], out);
+      if (scene.textured(x[k].triangle)) add_texture(scene, x[k], out);
       if (!bsdf.depends_on_directions() && !scene.differentiable.material[m]) continue;
       const Scattering s(x[k - 1].p, x[k], x[k + 1].p);
       const BsdfDerivative derivative = bsdf.derivative(s);

@@ -41,7 +41,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   scene.shapes = source.shapes;
   scene.detector = source.detector;
   scene.lights = source.lights;
-  scene.paint = source.paint;
+  scene.texture = source.texture;
   std::vector<char> moved_shapes(scene.shapes.size(), 0);
   const std::vector<char> moved = move_vertices(source.positions, moved_shapes);
   const bool same_pattern = !first && same_columns(basis);
@@ -91,7 +91,7 @@ void PreparedScene::update_shapes() {
     const Material& material = scene.materials[shape.material];
     const Bsdf& bsdf = material.bsdf();
     const double index = bsdf.transparent() ? material.number(bsdf.index_number()) : 0;
-    shapes_.push_back({&bsdf, shape.material, bsdf.two_sided(), index, shape.emission, shape.painted});
+    shapes_.push_back({&bsdf, shape.material, bsdf.two_sided(), index, shape.emission, shape.textured});
     if (index == 0 || shape.triangle_count == 0) continue;
     has_medium_ = true;
     least_index_ = std::min(least_index_, index);
@@ -114,29 +114,28 @@ void PreparedScene::update_record(int t) {
   for (int k = 0; k < 3; ++k) record.moving_corners |= (differentiable.vertex[v[k]] != 0) << k;
   record.has_gradient =
       differentiable.every_path || record.moving_corners || differentiable.material[shapes_[record.shape].material];
-  if (shapes_[record.shape].painted)
-    for (const int vertex : v) record.has_gradient |= differentiable.paint[vertex] != 0;
+  if (shapes_[record.shape].textured)
+    for (const int vertex : v) record.has_gradient |= differentiable.texture[vertex] != 0;
 }
 
-Vec3 PreparedScene::paint_gradient(const SurfacePoint& x) const {
+Vec3 PreparedScene::texture_gradient(const SurfacePoint& x) const {
   const TriangleRecord& r = records_[x.triangle];
-  const double b = scene.paint[r.vertex[1]] - scene.paint[r.vertex[0]],
-               c = scene.paint[r.vertex[2]] - scene.paint[r.vertex[0]];
+  const double b = scene.texture[r.vertex[1]] - scene.texture[r.vertex[0]],
+               c = scene.texture[r.vertex[2]] - scene.texture[r.vertex[0]];
   return (cross(r.edge[1], r.normal) * b + cross(r.normal, r.edge[0]) * c) / (2 * r.area);
 }
 
 void PreparedScene::update_hidden() {
-  const auto sought = [&](int t) { return scene.shapes[records_[t].shape].sought; };
   if (revision_ == 1) {
     std::vector<int> triangles;
     std::vector<Vec3> centers;
     for (int t = 0; t < static_cast<int>(records_.size()); ++t) {
-      if (!sought(t)) continue;
+      if (!scene.shapes[records_[t].shape].hidden) continue;
       triangles.push_back(t);
       centers.push_back(records_[t].origin + (records_[t].edge[0] + records_[t].edge[1]) / 3);
     }
-    sought_.clear();
-    for (const int i : spatial_order(centers)) sought_.push_back(triangles[i]);
+    hidden_order_.clear();
+    for (const int i : spatial_order(centers)) hidden_order_.push_back(triangles[i]);
   }
   std::vector<Vec3> corners;  // of a box about the sensor points: what all of them are behind of, none sees
   if (captures()) {
@@ -152,14 +151,14 @@ void PreparedScene::update_hidden() {
   };
   std::vector<int> triangles;
   std::vector<double> areas;
-  for (const int t : sought_) {
-    records_[t].sought = records_[t].area > 0 && (!captures() || seen(t));
-    if (!records_[t].sought) continue;
+  for (const int t : hidden_order_) {
+    records_[t].hidden = records_[t].area > 0 && (!captures() || seen(t));
+    if (!records_[t].hidden) continue;
     triangles.push_back(t);
     areas.push_back(records_[t].area);
   }
   hidden = HiddenGeometry(std::move(triangles), areas);
-  hidden_is_all = sought_.size() == records_.size();
+  hidden_is_all = hidden_order_.size() == records_.size();
 }
 
 void PreparedScene::update_lights() {

@@ -90,7 +90,7 @@ class PreparedScene {
   /// of light from there, importance per area, which is the density of the wall's own reflection.
   double first_vertex_pdf(const SurfacePoint& x1, double received) const {
     const double share = hidden_share();
-    return share * (is_sought(x1.triangle) ? hidden.pdf() : 0) + (1 - share) * received;
+    return share * (is_hidden(x1.triangle) ? hidden.pdf() : 0) + (1 - share) * received;
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
@@ -102,10 +102,10 @@ class PreparedScene {
   int flow_rank(int k) const { return captures() ? k + 1 : k; }
 
   /// What multiplies the BSDF at x.
-  double paint(const SurfacePoint& x) const { return shapes_[shape_index(x.triangle)].painted ? paint_at(x) : 1; }
-  bool painted(int triangle) const { return shapes_[shape_index(triangle)].painted; }
+  double texture(const SurfacePoint& x) const { return shapes_[shape_index(x.triangle)].textured ? texture_at(x) : 1; }
+  bool textured(int triangle) const { return shapes_[shape_index(triangle)].textured; }
   /// Its gradient along the surface.
-  Vec3 paint_gradient(const SurfacePoint& x) const;
+  Vec3 texture_gradient(const SurfacePoint& x) const;
 
   /// Radiance that leaves the point of an emitter towards the unit direction w; of a light without an extent radiant
   /// intensity.
@@ -152,7 +152,7 @@ class PreparedScene {
     const std::size_t i = light_number(triangle);
     return i < differentiable.light.size() && differentiable.light[i];
   }
-  bool is_sought(int triangle) const { return records_[triangle].sought; }
+  bool is_hidden(int triangle) const { return records_[triangle].hidden; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
   void for_each_moving_corner(int triangle, F&& f) const {
@@ -282,10 +282,10 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_hidden();
-  double paint_at(const SurfacePoint& x) const {
+  double texture_at(const SurfacePoint& x) const {
     const auto b = barycentrics(x);
     const auto& v = records_[x.triangle].vertex;
-    return b[0] * scene.paint[v[0]] + b[1] * scene.paint[v[1]] + b[2] * scene.paint[v[2]];
+    return b[0] * scene.texture[v[0]] + b[1] * scene.texture[v[1]] + b[2] * scene.texture[v[2]];
   }
 
   LargeArray<TriangleRecord> records_;
@@ -295,7 +295,7 @@ class PreparedScene {
   mutable std::array<std::unique_ptr<LazyHierarchy>, 3> hierarchies_;  ///< by Part
   std::vector<ShapeRecord> shapes_;
   std::vector<char> emitting_shapes_;
-  std::vector<int> sought_;  ///< triangles in spatial order
+  std::vector<int> hidden_order_;  ///< triangles in spatial order
   bool has_medium_ = false;
   double least_index_ = 1;
 };

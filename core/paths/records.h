@@ -37,7 +37,7 @@ struct alignas(64) TriangleRecord {
   int shape = -1;
   bool emits = false;
   bool has_gradient = false;        ///< a path through the triangle can have a derivative
-  bool sought = false;              ///< hidden geometry sampling draws points on it
+  bool hidden = false;              ///< hidden geometry sampling draws points on it
   std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
   Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
   std::array<int, 3> vertex = {};
@@ -51,7 +51,7 @@ struct ShapeRecord {
   bool two_sided = false;
   double index = 0;  ///< of refraction behind its faces; 0: opaque
   AreaEmitter emission;
-  bool painted = false;
+  bool textured = false;
   double emitter_pdf = 0;  ///< per area, of the points of sample_emitter()
 };
 

@@ -37,7 +37,7 @@ int Scene::find_light(const std::string& name) const {
 DofLayout::DofLayout(const Scene& scene)
     : vertices(static_cast<int>(scene.positions.size())),
       shapes(static_cast<int>(scene.shapes.size())),
-      painted(static_cast<int>(scene.paint.size())),
+      textured(static_cast<int>(scene.texture.size())),
       lights(static_cast<int>(scene.lights.size())),
       backgrounds(static_cast<int>(scene.detector.background.size())) {
   first_number.push_back(3 * vertices);
@@ -56,8 +56,8 @@ void set_value(Scene& scene, int dof, double value) {
     const int i = (dof - layout.light_position(0, 0)) / 9, k = (dof - layout.light_position(0, 0)) % 9;
     PointLight& light = scene.lights[i];
     (k < 3 ? light.position[k] : k < 6 ? light.direction[k - 3] : light.intensity[k - 6]) = value;
-  } else if (dof >= layout.paint(0)) {
-    scene.paint[dof - layout.paint(0)] = value;
+  } else if (dof >= layout.texture(0)) {
+    scene.texture[dof - layout.texture(0)] = value;
   } else if (dof >= layout.emission(0, 0)) {
     const int k = dof - layout.emission(0, 0);
     scene.shapes[k / 3].emission.radiance[k % 3] = value;

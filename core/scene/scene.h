@@ -38,9 +38,9 @@ struct Shape {
   AreaEmitter emission;
   int first_vertex = 0, vertex_count = 0;
   int first_triangle = 0, triangle_count = 0;
-  bool deforms = false;  ///< parameters may move its vertices otherwise than as a rigid body
-  bool painted = false;  ///< what Scene::paint says multiplies its material's BSDF
-  bool sought = false;   ///< paths are led to it directly, see HiddenGeometry
+  bool deforms = false;   ///< parameters may move its vertices otherwise than as a rigid body
+  bool textured = false;  ///< what Scene::texture says multiplies its material's BSDF
+  bool hidden = false;    ///< parameters change it: points of paths are drawn on it, see HiddenGeometry
 };
 
 /// What becomes of the light that a pixel receives: a reading is gain x light + background.
@@ -64,7 +64,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Shape> shapes;
   std::vector<Vec3> positions;  ///< welded per shape: vertices of one shape at one position are one vertex
-  std::vector<double> paint;    ///< per vertex, linear over triangles; empty: no shape is painted
+  std::vector<double> texture;  ///< per vertex, linear over triangles; empty: no shape is textured
   std::vector<Triangle> triangles;
   std::vector<Edge> edges;
   bool grey = true;  ///< every albedo, reflectance and emission in the file was given as a single number
@@ -78,10 +78,10 @@ struct Scene {
 bool coordinates_fit(const Scene& scene);
 
 /// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then those of
-/// each material (Bsdf::quantities), three per shape (emission r g b), the paint of each vertex where shapes are painted, nine
+/// each material (Bsdf::quantities), three per shape (emission r g b), the texture of each vertex where shapes are textured, nine
 /// per light (position, direction, intensity), and what the detector has: gain, time offset, backgrounds.
 struct DofLayout {
-  int vertices = 0, shapes = 0, painted = 0, lights = 0, backgrounds = 1;
+  int vertices = 0, shapes = 0, textured = 0, lights = 0, backgrounds = 1;
   std::vector<int> first_number;  ///< of each material, and where emissions begin
   explicit DofLayout(const Scene& scene);
   int materials() const { return static_cast<int>(first_number.size()) - 1; }
@@ -89,8 +89,8 @@ struct DofLayout {
   int number(int m, int k) const { return first_number[m] + k; }
   int numbers(int m) const { return first_number[m + 1] - first_number[m]; }
   int emission(int s, int channel) const { return first_number.back() + 3 * s + channel; }
-  int paint(int v) const { return emission(shapes, 0) + v; }
-  int light_position(int i, int axis) const { return paint(painted) + 9 * i + axis; }
+  int texture(int v) const { return emission(shapes, 0) + v; }
+  int light_position(int i, int axis) const { return texture(textured) + 9 * i + axis; }
   int light_direction(int i, int axis) const { return light_position(i, 3 + axis); }
   int light_intensity(int i, int channel) const { return light_position(i, 6 + channel); }
   int gain() const { return light_position(lights, 0); }

@@ -97,7 +97,7 @@ struct BsdfSample {
 /// Of the surface at x, in 1/sr.
 inline Rgb bsdf_value(const PreparedScene& scene, const SurfacePoint& x, const Directions& d) {
   const Rgb f = scene.bsdf_of(x.triangle).value(d);
-  return scene.painted(x.triangle) ? f * scene.paint(x) : f;
+  return scene.textured(x.triangle) ? f * scene.texture(x) : f;
 }
 
 /// Samples the direction in which a path goes on from x, reached from the direction of the unit vector w_back. `throughput` gets
@@ -110,7 +110,7 @@ inline std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const S
   const auto next = bsdf.sample(x.n, w_back, u0, u1, u2, mode);
   if (!next) return std::nullopt;
   throughput *= next->weight;
-  if (scene.painted(x.triangle)) throughput *= scene.paint(x);
+  if (scene.textured(x.triangle)) throughput *= scene.texture(x);
   if (throughput.is_black()) return std::nullopt;
   return BsdfSample{next->direction, next->pdf};
 }

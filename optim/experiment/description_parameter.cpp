@@ -99,7 +99,7 @@ Field per(ParameterSpec& spec) {
     if ((spec.per == Per::vertex) != albedo)
       value.fail(fmt::format("a {} is not given per {}", type_name(spec), name_of(spec.per)),
                  albedo ? "all, vertex" : "all, pixel");
-    if (albedo) spec.type = ParameterType::paint;
+    if (albedo) spec.type = ParameterType::texture;
   };
   return field::checked(field::choice(spec.per), choose);
 }
@@ -112,7 +112,7 @@ void check_name(const YamlValue& value) {
 }  // namespace
 
 std::string type_name(const ParameterSpec& spec) {
-  if (spec.type == ParameterType::paint) return "albedo";
+  if (spec.type == ParameterType::texture) return "albedo";
   return spec.type == ParameterType::material ? spec.quantity : name_of(spec.type);
 }
 
@@ -122,7 +122,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     Only result{false, "", type_name(spec)};
     std::vector<std::string> names;
     for (const ParameterType type : types) {
-      names.push_back(type == paint ? "albedo (per: vertex)" : name_of(type));
+      names.push_back(type == texture ? "albedo (per: vertex)" : name_of(type));
       result.here |= type == spec.type;
     }
     result.to = enumeration(names);
@@ -132,7 +132,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   keys.remember(spec.where);
   keys.value("name", field::checked(file_name(spec.name), check_name), "names columns and files", {.required = true});
   keys.value("type", type(spec), "what changes, in which unit", {.required = true});
-  const bool albedo = (spec.type == material && spec.quantity == "albedo") || spec.type == paint;
+  const bool albedo = (spec.type == material && spec.quantity == "albedo") || spec.type == texture;
   keys.value("per", per(spec), "how many unknowns there are",
              {.only = {albedo || spec.type == background, "albedo and background", type_name(spec)},
               .unset = spec.per == Per::all});
@@ -141,7 +141,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
               .only = of({translation, rotation, intensity}),
               .unset = spec.light.empty()});
   const bool of_light = !spec.light.empty();
-  Only with_shape = of({translation, rotation, vertices, emission, paint});
+  Only with_shape = of({translation, rotation, vertices, emission, texture});
   if (of_light && with_shape.here) with_shape = {false, "parameters of shapes", "one of a light"};
   keys.value("shape", field::text(spec.shape), "whose vertices, emission or albedo changes",
              {.required = true, .only = with_shape});

@@ -14,7 +14,7 @@ enum class ParameterType {
   vertices,
   material,
   emission,
-  paint,
+  texture,
   intensity,
   gain,
   background,
@@ -41,7 +41,7 @@ struct Selection {
 struct ParameterSpec {
   std::string name;
   ParameterType type = ParameterType::translation;
-  std::string shape;     ///< translation, rotation, vertices, emission, paint
+  std::string shape;     ///< translation, rotation, vertices, emission, texture
   std::string light;     ///< translation and rotation in place of a shape, intensity
   std::string material;  ///< material
   std::string quantity;  ///< material: which of its quantities, as `type` in the file

@@ -14,10 +14,6 @@ namespace isochron {
 /// bins or sensor points do not fit.
 std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene);
 
-/// Complains of hidden shapes that lie on or behind the wall at a sensor point; empty where all is well. A shape in the wall's
-/// plane is the wall itself.
-std::string behind_wall(const Scene& scene);
-
 /// Whether readings are histograms of a capture, so that write_histograms has something to write.
 bool has_histograms(const Experiment& experiment, const Scene& scene);
 

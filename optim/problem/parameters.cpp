@@ -91,14 +91,14 @@ double default_scale(const ParameterSpec& spec) {
 void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
   for (const ParameterSpec& spec : specs) {
     const int index = scene.find_shape(spec.shape);
-    if (index >= 0) scene.shapes[index].sought = true;
+    if (index >= 0) scene.shapes[index].hidden = true;
     if (spec.type == ParameterType::background && spec.per == Per::pixel) {
       if (!scene.capture) spec.fail("per", "the scene has a camera", "captures alone have backgrounds per pixel");
       scene.detector.background.assign(scene.capture->sensor.size(), 0.0);
     }
-    if (spec.type != ParameterType::paint || index < 0) continue;
+    if (spec.type != ParameterType::texture || index < 0) continue;
     Shape& shape = scene.shapes[index];
-    if (shape.painted) spec.fail("shape", "another parameter sets the albedos of '" + shape.name + "' already");
+    if (shape.textured) spec.fail("shape", "another parameter sets the albedos of '" + shape.name + "' already");
     const Material& own = scene.materials[shape.material];
     if (own.find("albedo") < 0 || own.kind() != std::string("diffuse"))
       spec.fail("shape", fmt::format("the material of '{}' is {}", shape.name, own.kind()), "diffuse");
@@ -107,15 +107,15 @@ void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
     white.set("albedo", 1.0);
     shape.material = static_cast<int>(scene.materials.size());
     scene.materials.push_back(std::move(white));
-    shape.painted = true;
-    scene.paint.resize(scene.positions.size(), 1.0);
+    shape.textured = true;
+    scene.texture.resize(scene.positions.size(), 1.0);
   }
   // Materials that parameters change count for the shapes that are made of them.
   for (const ParameterSpec& spec : specs)
     for (Shape& shape : scene.shapes)
-      shape.sought |= spec.type == ParameterType::material && scene.materials[shape.material].name == spec.material;
-  const bool none = std::none_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.sought; });
-  for (Shape& shape : scene.shapes) shape.sought |= none;
+      shape.hidden |= spec.type == ParameterType::material && scene.materials[shape.material].name == spec.material;
+  const bool none = std::none_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.hidden; });
+  for (Shape& shape : scene.shapes) shape.hidden |= none;
 }
 
 Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit)
@@ -197,9 +197,9 @@ int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_uni
     case ParameterType::intensity:
       colour(layout.light_intensity(find_light(spec), 0));
       break;
-    case ParameterType::paint: {
+    case ParameterType::texture: {
       const Shape& shape = scene_.shapes[find_shape(spec)];
-      value.dof = layout.paint(shape.first_vertex);
+      value.dof = layout.texture(shape.first_vertex);
       value.numbers = value.count = shape.vertex_count;
       break;
     }
@@ -268,7 +268,7 @@ void Parameters::bind_values(const ParameterSpec& spec, int count) {
       within(quantity.range(largest));
       break;
     }
-    case ParameterType::paint:
+    case ParameterType::texture:
       within(fraction_range(largest));
       break;
     case ParameterType::emission:

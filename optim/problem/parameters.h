@@ -27,8 +27,8 @@
 
 namespace isochron {
 
-/// Gives the scene room for what the parameters set: backgrounds of each sensor point, paint on shapes (whose material then
-/// has an albedo of one); and marks the shapes that they change as sought (see Shape). Throws InputError where that cannot be.
+/// Gives the scene room for what the parameters set: backgrounds of each sensor point, texture on shapes (whose material then
+/// has an albedo of one); and marks the shapes that they change as hidden (see Shape). Throws InputError where that cannot be.
 void make_room(Scene& scene, const std::vector<ParameterSpec>& specs);
 
 class Parameters {

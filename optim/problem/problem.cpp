@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/scene/behind_wall.h"
 #include "core/scene/coincidence.h"
 #include "core/scene/scene_loader.h"
 #include "optim/problem/capture_data.h"
@@ -106,10 +107,27 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       if (const std::string complaint = behind_wall(parameters_->apply(*theta)); !complaint.empty())
         throw InputError(experiment_.scene + ": " + complaint);
   if (!warning) return;
+  if (const std::string name = light_that_leaves_the_camera(); !name.empty())
+    warning(fmt::format(
+        "{}: light '{}' is where the camera is: as one of them moves alone, shadows open on one side, so that "
+        "derivatives are one-sided",
+        experiment_.file, name));
   std::string coincidences = coincidence_warning(parameters_->apply(parameters_->initial()));
   if (coincidences.empty() && parameters_->target_known())
     coincidences = coincidence_warning(parameters_->apply(parameters_->target()));
   if (!coincidences.empty()) warning(experiment_.scene + ": " + coincidences);
+}
+
+std::string Problem::light_that_leaves_the_camera() const {
+  const std::vector<double>& theta = parameters_->initial();
+  const Scene scene = parameters_->apply(theta);
+  const TangentBasis basis = parameters_->tangent(theta);
+  const DofLayout layout(scene);
+  for (int i = 0; i < layout.lights; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      if (scene.lights[i].position == scene.camera.position && basis.differentiates(layout.light_position(i, axis)))
+        return scene.lights[i].name;
+  return {};
 }
 
 const EstimatorOptions& Problem::estimator(Purpose purpose) const {

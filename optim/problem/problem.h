@@ -140,6 +140,9 @@ class Problem {
                                SampleRange range) const;
 
  private:
+  /// The name of a light at the camera that parameters move away from it; empty where there is none.
+  std::string light_that_leaves_the_camera() const;
+
   static std::uint32_t pass_number(Pass pass) { return static_cast<std::uint32_t>(pass); }
 
   Experiment experiment_;

@@ -88,9 +88,10 @@ std::vector<double> dofs(const Scene& scene) {
     for (int k = 0; k < m.numbers(); ++k) all.push_back(m.number(k));
   for (const Shape& s : scene.shapes)
     for (int c = 0; c < 3; ++c) all.push_back(s.emission.radiance[c]);
-  all.insert(all.end(), scene.paint.begin(), scene.paint.end());
+  all.insert(all.end(), scene.texture.begin(), scene.texture.end());
   for (const PointLight& light : scene.lights)
-    for (const Vec3& v : {light.position, light.direction, Vec3{light.intensity.r, light.intensity.g, light.intensity.b}})
+    for (const Vec3& v :
+         {light.position, light.direction, Vec3{light.intensity.r, light.intensity.g, light.intensity.b}})
       all.insert(all.end(), {v.x, v.y, v.z});
   all.insert(all.end(), {scene.detector.gain, scene.detector.time_offset});
   all.insert(all.end(), scene.detector.background.begin(), scene.detector.background.end());
@@ -220,7 +221,7 @@ TEST(Parameters, ScalesByTypeAndAsGiven) {
               1e-9);
 }
 
-/// Paint, lights, the detector and the camera's pose.
+/// Texture, lights, the detector and the camera's pose.
 TEST(Parameters, TangentIsTheDerivativeOfApplyForDetectorLightsAndPaint) {
   Scene scene = two_shapes(true);
   scene.camera.position = {0.3, -0.2, 5};
@@ -242,7 +243,7 @@ TEST(Parameters, TangentIsTheDerivativeOfApplyForDetectorLightsAndPaint) {
   specs.back().direction = {1, -0.5, 0.2};
   specs.push_back(spec("tilt", ParameterType::camera_rotation, "", -35));
   specs.back().axis = {1, 0.2, 0};
-  specs.push_back(spec("paint", ParameterType::paint, "quad", 0.4));
+  specs.push_back(spec("paint", ParameterType::texture, "quad", 0.4));
   specs.push_back(spec("light_x", ParameterType::translation, "", 0.2));
   specs.back().light = "torch";
   specs.back().direction = {1, 0, 2};
@@ -256,7 +257,7 @@ TEST(Parameters, TangentIsTheDerivativeOfApplyForDetectorLightsAndPaint) {
   specs.back().per = Per::pixel;
   specs.push_back(spec("late", ParameterType::time_offset, "", 0.1));
   make_room(scene, specs);
-  EXPECT_TRUE(scene.shapes[0].sought && scene.shapes[1].sought && scene.shapes[1].painted);
+  EXPECT_TRUE(scene.shapes[0].hidden && scene.shapes[1].hidden && scene.shapes[1].textured);
   const Parameters parameters(scene, specs, 0.3);
   ASSERT_EQ(parameters.size(), 4 + 4 + 2 + 1 + 1 + 3 + 1);
   const std::vector<double> theta = point_near_initial(parameters, 5);

@@ -1,4 +1,4 @@
-// The differential of paths that begin at a wall or end at a light without an extent, and of painted surfaces, against automatic
+// The differential of paths that begin at a wall or end at a light without an extent, and of textured surfaces, against automatic
 // differentiation of the capture's formula (core/scene/sensors/capture.h).
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
@@ -52,9 +52,9 @@ LogAndLength by_textbook(const Case& c, const std::vector<Jet>& dofs) {
       x[k + 1] = corner[0] * b[0] + corner[1] * b[1] + corner[2] * b[2];
       result.log_f += log(length(m));
     }
-    Jet paint(0.0);
-    for (int i = 0; i < 3; ++i) paint += b[i] * dofs[layout.paint(c.scene.triangles[k].vertex[i])];
-    result.log_f += log(paint);
+    Jet texture(0.0);
+    for (int i = 0; i < 3; ++i) texture += b[i] * dofs[layout.texture(c.scene.triangles[k].vertex[i])];
+    result.log_f += log(texture);
   }
   if (c.scene.lights.empty()) {
     x[3] = constant(c.end.p);
@@ -107,7 +107,7 @@ std::vector<double> values_of(const Scene& scene) {
   std::vector<double> dofs(layout.size(), 0.5);
   for (int v = 0; v < layout.vertices; ++v) {
     for (int axis = 0; axis < 3; ++axis) dofs[layout.vertex(v, axis)] = scene.positions[v][axis];
-    dofs[layout.paint(v)] = scene.paint[v];
+    dofs[layout.texture(v)] = scene.texture[v];
   }
   for (int i = 0; i < layout.lights; ++i)
     for (int axis = 0; axis < 3; ++axis) {
@@ -125,8 +125,9 @@ Case make_case(bool wall, std::optional<PointLight::Kind> light) {
   const Material white = diffuse(Rgb(1.0), true);
   add_shape(c.scene, "near", {{{-0.3, -0.2, 1.1}, {0.4, -0.1, 1.0}, {0.05, 0.5, 1.2}}, {{0, 1, 2}}}, white);
   add_shape(c.scene, "far", {{{0.6, -0.3, 0.6}, {1.1, 0.1, 0.4}, {0.7, 0.4, 0.9}}, {{0, 1, 2}}}, white);
-  for (Shape& shape : c.scene.shapes) shape.painted = true;
-  for (std::size_t v = 0; v < c.scene.positions.size(); ++v) c.scene.paint.push_back(0.2 + 0.1 * static_cast<double>(v));
+  for (Shape& shape : c.scene.shapes) shape.textured = true;
+  for (std::size_t v = 0; v < c.scene.positions.size(); ++v)
+    c.scene.texture.push_back(0.2 + 0.1 * static_cast<double>(v));
   c.scene.detector.gain = 1.7;
   c.b[0] = {0.2, 0.5, 0.3};
   c.b[1] = {0.4, 0.25, 0.35};
@@ -183,7 +184,7 @@ void expect_right(const Case& c) {
     }
     const DofLayout layout(c.scene);
     for (int i = 0; i < layout.size(); ++i) {
-      const bool material = i >= layout.number(0, 0) && i < layout.paint(0);
+      const bool material = i >= layout.number(0, 0) && i < layout.texture(0);
       if (material) continue;  // see path_differential_test.cpp
       dofs[i].v[0] = 1;
       const LogAndLength expected = by_textbook(c, dofs);

@@ -82,7 +82,7 @@ struct CaptureSetup {
     if (occluded)
       add_shape(scene, "occluder", quad(b.occluder[0], b.occluder[1], b.occluder[2], b.occluder[3]),
                 diffuse(Rgb(0.0), true));
-    scene.shapes[0].sought = true;
+    scene.shapes[0].hidden = true;
     return scene;
   }
 };
