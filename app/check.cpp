@@ -128,7 +128,7 @@ int check(const CheckCommand& command) {
     fmt::print("{} of {} compare nothing with nothing\n", empty, comparisons);
     const GatedImage image =
         problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
-    const std::string dark = darkness_warning(problem, theta, {&image}, "the image");
+    const std::string dark = darkness_warning(problem, theta, image, "the image");
     if (!dark.empty()) warn(dark);
     if (empty == comparisons) spdlog::error("nothing was checked: every derivative is zero, as is every difference");
   }

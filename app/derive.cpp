@@ -88,7 +88,7 @@ int derive(const DeriveCommand& command) {
   if (dark) {
     const GatedImage image =
         problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
-    const std::string warning = darkness_warning(problem, theta, {&image}, "the image");
+    const std::string warning = darkness_warning(problem, theta, image, "the image");
     warn(warning.empty() ? "every derivative is zero: no parameter changes what the gates see" : warning);
   }
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/bounds.h"
 #include "optim/problem/loss.h"
 
 namespace isochron {
@@ -32,6 +33,21 @@ std::optional<std::pair<double, double>> narrowed(const Problem& problem, const 
   }
   if (last < 0) return std::nullopt;
   return std::pair{low + first * width, low + (last + 1) * width};
+}
+
+/// An image of readings at theta less their background: what light has brought, zero where there was none.
+GatedImage light_of(const Problem& problem, const std::vector<double>& theta, GatedImage image) {
+  constexpr double kRounding = 1e-12;  // of the background, which halves of an image bring in parts
+  const Scene scene = problem.parameters().apply(theta);
+  for (int p = 0; p < image.pixels(); ++p) {
+    const double background = scene.detector.background[scene.detector.background_of(scene.capture, p)];
+    for (int g = 0; g < image.gates; ++g)
+      for (int c = 0; c < image.channels; ++c) {
+        double& value = image.at(p, g, c);
+        value = std::abs(value - background) <= kRounding * background ? 0 : value - background;
+      }
+  }
+  return image;
 }
 
 bool is_black(const GatedImage& image, int gate) {
@@ -68,16 +84,21 @@ std::optional<std::pair<double, double>> path_length_range(const Problem& proble
   }
   scene.detector = {.gain = 1, .background = std::vector<double>(scene.detector.background.size()), .time_offset = 0};
   // A path of n bounces has n + 1 segments or, seen directly, one; none is longer than the scene.
-  Vec3 low = scene.camera.position, high = low;
-  for (const Vec3& p : scene.positions)
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], p[axis]);
-      high[axis] = std::max(high[axis], p[axis]);
-    }
+  Bounds box;
+  box.add(scene.camera.position);
+  for (const Vec3& p : scene.positions) box.add(p);
+  double to_instruments = 0;
+  if (scene.capture) {
+    for (const WallPoint& s : scene.capture->sensor) box.add(s.p);
+    for (const WallPoint& l : scene.capture->spots) box.add(l.p);
+    for (int pixel = 0; pixel < width * height; ++pixel)
+      to_instruments = std::max(to_instruments, scene.capture->extra_length(pixel));
+  }
   double index = 1;
   for (const Material& material : scene.materials)
     if (material.bsdf().transparent()) index = std::max(index, material.number(material.bsdf().index_number()));
-  const auto coarse = narrowed(problem, scene, 0, (kMostBounces + 2) * index * length(high - low));
+  const double longest = to_instruments + (kMostBounces + 2) * index * length(box.high - box.low);
+  const auto coarse = narrowed(problem, scene, 0, longest);
   return coarse ? narrowed(problem, scene, coarse->first, coarse->second) : coarse;
 }
 
@@ -85,12 +106,15 @@ std::vector<double> point_of_target(const Problem& problem, const std::vector<do
   return problem.parameters().target_known() ? problem.parameters().target() : theta;
 }
 
-std::string darkness_warning(const Problem& problem, const std::vector<double>& theta,
-                             const std::vector<const GatedImage*>& images, const std::string& what) {
+namespace {
+
+/// Of images of light.
+std::string warning_about(const Problem& problem, const std::vector<double>& theta,
+                          const std::vector<GatedImage>& images, const std::string& what) {
   const int gates = problem.gates().size();
   std::vector<int> dark;
   for (int g = 0; g < gates; ++g)
-    if (std::all_of(images.begin(), images.end(), [&](const GatedImage* image) { return is_black(*image, g); }))
+    if (std::all_of(images.begin(), images.end(), [&](const GatedImage& image) { return is_black(image, g); }))
       dark.push_back(g);
   if (dark.empty()) return {};
   // The first bins of a histogram are often dark.
@@ -117,13 +141,21 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
   return text;
 }
 
+}  // namespace
+
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
+                             const std::string& what) {
+  return warning_about(problem, theta, {light_of(problem, theta, image)}, what);
+}
+
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
                              const GatedImage& target) {
-  const bool black_image = mean_square(image) == 0, black_target = mean_square(target) == 0;
-  if (black_target && !black_image)
-    return darkness_warning(problem, point_of_target(problem, theta), {&target}, "the target");
-  if (black_image && !black_target) return darkness_warning(problem, theta, {&image}, "the image");
-  return darkness_warning(problem, theta, {&image, &target}, "the image and the target");
+  const std::vector<double> of_target = point_of_target(problem, theta);
+  const GatedImage light = light_of(problem, theta, image), wanted = light_of(problem, of_target, target);
+  const bool black_image = mean_square(light) == 0, black_target = mean_square(wanted) == 0;
+  if (black_target && !black_image) return warning_about(problem, of_target, {wanted}, "the target");
+  if (black_image && !black_target) return warning_about(problem, theta, {light}, "the image");
+  return warning_about(problem, theta, {light, wanted}, "the image and the target");
 }
 
 }  // namespace isochron

@@ -8,13 +8,14 @@
 
 namespace isochron {
 
-/// One line that names the gates that are black in every one of the images, where they are, and how long the scene's paths
-/// at theta are, in the experiment's unit; empty where there is none. `what`: such as "the target".
-std::string darkness_warning(const Problem& problem, const std::vector<double>& theta,
-                             const std::vector<const GatedImage*>& images, const std::string& what);
+/// One line that names the gates of an image at theta that no light reaches, where they are, and how long the scene's paths are,
+/// in the experiment's unit; empty where there is none. `what`: such as "the target". Background is no light. The first bins of a
+/// histogram are often dark: of bins it tells only where all are.
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
+                             const std::string& what);
 
-/// The same of a residual: gates that are black in both, or one of the two images where it is black as a whole. That a gate
-/// is black in one of them alone can be what an optimisation is about.
+/// The same of a residual: gates that are dark in both, or one of the two images where it is dark as a whole. That a gate
+/// is dark in one of them alone can be what an optimisation is about.
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
                              const GatedImage& target);
 
