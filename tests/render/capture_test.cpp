@@ -264,6 +264,19 @@ TEST(CaptureReadings, GradientsAreSumsOfDerivatives) {
   }
 }
 
+/// Light is counted later by the time offset: as if every path were longer.
+TEST(CaptureReadings, TimeOffset) {
+  const CaptureSetup setup{.confocal = true, .occluded = false};
+  Scene scene = setup.scene();
+  scene.detector.time_offset = 0.07;
+  const Renderer renderer(scene, kWide, {.max_bounces = 1});
+  expect_means(over_replicates(kWide.size(),
+                               [&](int r) {
+                                 return renderer.render({static_cast<std::uint64_t>(r + 1), 0, 0}, {0, 1024});
+                               }),
+               setup.readings(kWide, {.length = 0.07}), setup.quadrature.error, 0.003, "readings");
+}
+
 /// Gain and backgrounds of single points, exactly: readings are gain x light + background. The parts of a gradient add up to it.
 TEST(CaptureReadings, GainAndBackground) {
   Scene scene = CaptureSetup{.confocal = true, .occluded = false}.scene();
