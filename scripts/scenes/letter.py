@@ -8,7 +8,7 @@ import numpy as np
 
 from . import mesh
 
-SIDE = 13  # vertices
+SIDE = 11  # vertices
 EDGE = 0.6
 INK, PAPER = 0.9, 0.05
 STROKE = 0.06  # half of a stroke's width

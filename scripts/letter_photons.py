@@ -1,0 +1,96 @@
+#!/usr/bin/python3
+"""Errors of the hidden letter against the number of photons.
+
+    scripts/letter_photons.py measure CSV      twenty minutes on two cores
+    scripts/letter_photons.py plot CSV PNG
+
+Gain and background of experiments/letter.yaml are multiplied by each of some factors, and so are their initial values. The penalty
+on slopes counts in mean squares of the target: it is divided by the factor's square, so that the same is expected of the relief.
+"""
+
+import csv
+import pathlib
+import statistics
+import sys
+import tempfile
+
+import matplotlib
+import yaml
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+import letter_errors
+from reproduction.measure import ROOT, program
+
+FACTORS = (0.1, 0.3, 1, 3, 10)
+DRAWS = 4
+COLUMNS = ("factor", "draw", "counts", "depth_mm", "tilt_degrees", "relief_mm", "albedo", "seconds")
+GOALS = {"depth_mm": 1, "tilt_degrees": 0.3, "albedo": 0.95}
+
+
+def settings(experiment, factor, draw):
+    """Overrides of the experiment; a seed of the target draws its counts."""
+    yield f"target.seed={100 + draw}"
+    for i, parameter in enumerate(experiment["parameters"]):
+        if parameter["type"] in ("gain", "background"):
+            for key in ("initial", "target"):
+                yield f"parameters[{i}].{key}={factor * parameter[key]:.6g}"
+        if "smoothing" in parameter:
+            yield f"parameters[{i}].smoothing.slopes={parameter['smoothing']['slopes'] / factor**2:.6g}"
+
+
+def measure(file):
+    path = ROOT / "experiments/letter.yaml"
+    experiment = yaml.safe_load(path.read_text(encoding="utf-8"))
+    rows = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary) / "run"
+        for draw in range(1, DRAWS + 1):
+            for factor in FACTORS:
+                words = [word for setting in settings(experiment, factor, draw) for word in ("--set", setting)]
+                program("run", path, "-o", folder, "--force", *words)
+                errors = letter_errors.errors(folder)
+                rows.append((factor, draw, *(f"{errors[c]:.4g}" for c in COLUMNS[2:])))
+                print(*rows[-1], flush=True)
+                with open(file, "w", encoding="ascii", newline="") as out:
+                    csv.writer(out, lineterminator="\n").writerows([COLUMNS, *rows])
+
+
+def plot(file, picture):
+    with open(file, encoding="ascii", newline="") as lines:
+        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(lines)]
+    counts = sorted({factor: statistics.mean(r["counts"] for r in rows if r["factor"] == factor)
+                     for factor in {r["factor"] for r in rows}}.items())
+    panels = (("depth_mm", "depth error (mm)"), ("tilt_degrees", "tilt error (degrees)"), ("albedo", "correlation of albedos"))
+    figure, all_axes = plt.subplots(1, 3, figsize=(12, 3.6), layout="constrained")
+    for axes, (key, label) in zip(all_axes, panels):
+        values = [[abs(r[key]) for r in rows if r["factor"] == factor] for factor, _ in counts]
+        axes.plot([c for (_, c), v in zip(counts, values) for _ in v], [x for v in values for x in v], ".",
+                  color="0.6", label="one draw of the counts")
+        axes.plot([c for _, c in counts], [statistics.median(v) for v in values], "o-", color="C0", label="median")
+        axes.axhline(GOALS[key], color="C3", linestyle="--", linewidth=1, label="goal at the real capture's count")
+        axes.axvline(next(c for factor, c in counts if factor == 1), color="0.8", linewidth=1, zorder=0)
+        axes.set_xscale("log")
+        if key != "albedo":
+            axes.set_yscale("log")
+        axes.set_xlabel("mean counts of a sensor point, background included")
+        axes.set_ylabel(label)
+    all_axes[0].legend(fontsize=8)
+    figure.suptitle("The hidden letter: errors against photon counts")
+    figure.savefig(picture, dpi=100)
+
+
+def main(arguments):
+    if len(arguments) == 2 and arguments[0] == "measure":
+        measure(pathlib.Path(arguments[1]))
+    elif len(arguments) == 3 and arguments[0] == "plot":
+        plot(*map(pathlib.Path, arguments[1:]))
+    else:
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
