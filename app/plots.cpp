@@ -11,6 +11,8 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <string_view>
+#include <vector>
 
 #include "app/interrupt.h"
 
@@ -25,7 +27,24 @@ std::string last_line(std::string text) {
   return text.substr(text.rfind('\n') + 1);
 }
 
-bool run_script(const std::string& script, const std::string& folder) {
+/// This process's environment, with the package isochron where Python looks first.
+std::vector<std::string> environment_with_package() {
+  constexpr std::string_view kVariable = "PYTHONPATH=";
+  std::vector<std::string> variables;
+  std::string path = std::string(kVariable) + ISOCHRON_PYTHON_PACKAGES;
+  for (char** variable = environ; *variable; ++variable) {
+    if (std::string_view(*variable).starts_with(kVariable)) {
+      path += std::string(":") + (*variable + kVariable.size());
+    } else {
+      variables.emplace_back(*variable);
+    }
+  }
+  variables.push_back(path);
+  return variables;
+}
+
+/// Runs a module of the package isochron with a folder as its argument.
+bool run_module(const std::string& module, const std::string& folder) {
   // A folder named -x must not be taken for an option.
   const std::string argument = folder.front() == '-' ? "./" + folder : folder;
   int ends[2];
@@ -37,10 +56,14 @@ bool run_script(const std::string& script, const std::string& folder) {
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  std::array<const char*, 4> arguments = {"/usr/bin/python3", script.c_str(), argument.c_str(), nullptr};
+  std::array<const char*, 5> arguments = {"/usr/bin/python3", "-m", module.c_str(), argument.c_str(), nullptr};
+  const std::vector<std::string> variables = environment_with_package();
+  std::vector<const char*> environment;
+  for (const std::string& variable : variables) environment.push_back(variable.c_str());
+  environment.push_back(nullptr);
   pid_t child = 0;
-  const int error =
-      posix_spawn(&child, arguments[0], &actions, nullptr, const_cast<char* const*>(arguments.data()), environ);
+  const int error = posix_spawn(&child, arguments[0], &actions, nullptr, const_cast<char* const*>(arguments.data()),
+                                const_cast<char* const*>(environment.data()));
   posix_spawn_file_actions_destroy(&actions);
   close(ends[1]);
   std::string messages;
@@ -66,21 +89,21 @@ bool run_script(const std::string& script, const std::string& folder) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
   if (interrupted()) {
-    spdlog::warn("plots: interrupted; draw them with: {} {}", script, argument);
+    spdlog::warn("plots: interrupted; draw them with: scripts/{}.py {}", module.substr(module.find('.') + 1), argument);
     return false;
   }
-  spdlog::warn("plots: {} failed: {}", script, last_line(messages));
+  spdlog::warn("plots: {} failed: {}", module, last_line(messages));
   return false;
 }
 
 }  // namespace
 
 bool draw_plots(const std::string& folder) {
-  return run_script(ISOCHRON_SCRIPTS "/plot.py", folder);
+  return run_module("isochron.plot", folder);
 }
 
 bool draw_charts(const std::string& folder) {
-  return run_script(ISOCHRON_SCRIPTS "/plot_chart.py", folder);
+  return run_module("isochron.plot_chart", folder);
 }
 
 }  // namespace isochron

@@ -3,9 +3,9 @@
 
 namespace isochron {
 
-/// Draws the PNGs of an output folder with scripts/plot.py. On failure warns in one line and returns false.
+/// Draws the PNGs of an output folder with isochron.plot of app/python. On failure warns in one line and returns false.
 bool draw_plots(const std::string& folder);
-/// The same with scripts/plot_chart.py, for what `chart` and `stability` write.
+/// The same with isochron.plot_chart, for what `chart` and `stability` write.
 bool draw_charts(const std::string& folder);
 
 }  // namespace isochron

@@ -19,7 +19,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-import exr
+import use_package
+from isochron import exr
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = ["cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa"]

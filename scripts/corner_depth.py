@@ -18,7 +18,8 @@ import numpy as np
 import yaml
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-import exr
+import use_package
+from isochron import exr
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SPEED_OF_LIGHT = 299792458

@@ -19,7 +19,8 @@ import sys
 import numpy as np
 import yaml
 
-import exr
+import use_package
+from isochron import exr
 
 WALL_NORMAL = np.array([0.0, 0.0, 1.0])
 

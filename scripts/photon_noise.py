@@ -19,7 +19,8 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from pictures import sheets
+import use_package
+from isochron.pictures import sheets
 from reproduction.measure import ROOT, program, summary
 
 PHOTONS = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 0)

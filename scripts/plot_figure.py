@@ -16,8 +16,9 @@ import yaml
 from matplotlib import colors
 from matplotlib.cm import ScalarMappable
 
-import exr
-from pictures import sheets
+import use_package
+from isochron import exr
+from isochron.pictures import sheets
 
 EXPERIMENT1 = pathlib.Path(__file__).resolve().parent.parent / "experiments/figure1.yaml"
 GATED = "radiance per scene unit of path length"

@@ -9,8 +9,9 @@ import numpy as np
 import yaml
 from matplotlib import colors
 
-import exr
-from pictures import curves, reading, sheets
+import use_package
+from isochron import exr
+from isochron.pictures import curves, reading, sheets
 
 from .measure import ROOT, program, values
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""scripts/exr.py against files written by OpenEXR, and its writer against its reader.
+"""isochron.exr against files written by OpenEXR, and its writer against its reader.
 
 usage: exr_test.py PROGRAM     PROGRAM: the built write_exr_samples
 """
@@ -10,8 +10,8 @@ import sys
 import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
-import exr
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "app/python"))
+from isochron import exr
 import numpy as np
 
 NAMES = ["gate000.Y", "interior.gate001.Y", "path_length.gate010.with.a.long.name.Y"]

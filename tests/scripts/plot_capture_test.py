@@ -12,17 +12,17 @@ import tempfile
 import unittest
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
-sys.path.insert(0, str(SCRIPTS))
-import exr
+sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent / "app/python")]
+from isochron import exr
 import h5py
 import matplotlib.image
 import numpy as np
-import plot_capture
+from isochron import plot_capture
 from captures.writing import write_capture
-from pictures.back_projection import BackProjection
-from pictures.capture_run import METRES_PER_PS, CaptureRun
-from pictures.deviance import Fit
-from pictures.wall import Plane, Wall
+from isochron.pictures.back_projection import BackProjection
+from isochron.pictures.capture_run import METRES_PER_PS, CaptureRun
+from isochron.pictures.deviance import Fit
+from isochron.pictures.wall import Plane, Wall
 
 PS, START, BINS = 20, 2000, 120
 LENGTHS = (START + PS * (np.arange(BINS) + 0.5)) * METRES_PER_PS

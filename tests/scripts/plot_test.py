@@ -8,11 +8,11 @@ import tempfile
 import unittest
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
-sys.path.insert(0, str(SCRIPTS))
-import exr
+sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent / "app/python")]
+from isochron import exr
 import matplotlib.image
 import numpy as np
-from pictures import curves, reading, sheets
+from isochron.pictures import curves, reading, sheets
 
 HEADER = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,height\n"
 NOTES = {"isochron.gateCenters": "12 12.5 13 14", "isochron.gateUnit": "ns", "isochron.quantity": "radiance"}

@@ -5,9 +5,9 @@ import matplotlib.patheffects
 import numpy as np
 from matplotlib.tri import Triangulation
 
-from pictures.back_projection import BackProjection
-from pictures.deviance import Fit
-from pictures.wall import Plane
+from isochron.pictures.back_projection import BackProjection
+from isochron.pictures.deviance import Fit
+from isochron.pictures.wall import Plane
 
 MOST_SCALARS = 8
 VALUES = 92  # points from the left of the box of numbers: where values begin, wider than the longest name

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pictures.reading import PlotError
+from isochron.pictures.reading import PlotError
 
 PLY_VERTEX = ["property double x", "property double y", "property double z"]
 PLY_FACE = np.dtype([("count", "u1"), ("vertices", "<i4", 3)])

@@ -5,10 +5,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from pictures.capture_run import METRES_PER_PS
-from pictures.curves import edges_of
-from pictures.scene_views import draw_views, residuals
-from pictures.sheets import save, scale_of
+from isochron.pictures.capture_run import METRES_PER_PS
+from isochron.pictures.curves import edges_of
+from isochron.pictures.scene_views import draw_views, residuals
+from isochron.pictures.sheets import save, scale_of
 
 COUNTS, FIT, REST = "#7f9fbf", "#c1272d", "#4d4d4d"
 DEVIATIONS = 4.0  # end of the scale of residuals

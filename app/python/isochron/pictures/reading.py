@@ -6,7 +6,7 @@ import re
 import numpy as np
 import yaml
 
-import exr
+from isochron import exr
 
 CHANNEL = re.compile(r"(?:(?P<component>.+)\.)?gate(?P<gate>\d+)\.(?P<channel>[RGBY])")
 

@@ -4,8 +4,8 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 
-from pictures.reading import PlotError, read_log
-from pictures.sheets import plain_ticks, save, scale_of
+from isochron.pictures.reading import PlotError, read_log
+from isochron.pictures.sheets import plain_ticks, save, scale_of
 
 MOST_CURVES = 10  # parameters in the plot of errors: those that were furthest off at the start
 

@@ -7,10 +7,10 @@ import h5py
 import numpy as np
 import yaml
 
-import exr
-from pictures.mesh_files import read_mesh, read_scene_mesh
-from pictures.reading import PlotError
-from pictures.wall import Wall
+from isochron import exr
+from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
+from isochron.pictures.reading import PlotError
+from isochron.pictures.wall import Wall
 
 METRES_PER_PS = 299792458e-12
 METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time; light's way in it

@@ -1,0 +1,1 @@
+"""isochron: inverse rendering for time-of-flight cameras."""
