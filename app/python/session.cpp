@@ -15,6 +15,14 @@
 namespace py = pybind11;
 
 namespace isochron {
+namespace {
+
+void require_all_finite(const std::vector<double>& values, const std::string& what) {
+  for (const double value : values)
+    if (!std::isfinite(value)) throw InputError(fmt::format("{}: {} is not finite", what, value));
+}
+
+}  // namespace
 
 Session::Session(const std::string& file, const std::vector<std::string>& overrides) {
   std::vector<std::string> warnings;
@@ -39,6 +47,12 @@ std::vector<double> Session::point(const Array& theta) const {
   return values;
 }
 
+void Session::require_renderable(const std::vector<double>& theta) const {
+  if (!problem_->can_render(theta))
+    throw InputError(
+        fmt::format("theta: puts a vertex too far away (allowed: coordinates of at most {})", kLargestCoordinate));
+}
+
 void Session::choose(Samples samples, Seed seed, int evaluations) {
   SampleSpec spec = experiment_.samples;
   if (samples) {
@@ -54,6 +68,7 @@ py::array Session::render(const Array& array, Samples samples, Seed seed, std::u
   std::string dark;
   GatedImage found = run_work_for([&] {
     choose(samples, seed, own_evaluations_);
+    require_renderable(theta);
     require_memory(*problem_, image_memory(*problem_));
     GatedImage image = estimate_image(*problem_, theta, throw_if_stopped, iteration).image;
     require_finite(image, "the image");
@@ -66,10 +81,12 @@ py::array Session::render(const Array& array, Samples samples, Seed seed, std::u
 
 py::array Session::jvp(const Array& array, const Array& tangent, Samples samples, Seed seed, std::uint32_t iteration) {
   const std::vector<double> theta = point(array), direction = to_vector(tangent);
+  require_all_finite(direction, "tangent");
   if (direction.size() != theta.size())
     throw InputError(fmt::format("tangent: {} values are given (allowed: {})", direction.size(), theta.size()));
   return to_array(run_work_for([&] {
     choose(samples, seed, own_evaluations_);
+    require_renderable(theta);
     problem_->require_parameters();
     require_memory(*problem_, derivative_memory(*problem_, 1, 4 + kMostReplicates));
     GatedImage image = estimate_tangent(*problem_, theta, direction, throw_if_stopped, iteration)[0].images[0];
@@ -81,8 +98,10 @@ py::array Session::jvp(const Array& array, const Array& tangent, Samples samples
 py::array Session::vjp(const Array& array, const Array& adjoint, Samples samples, Seed seed, std::uint32_t iteration) {
   const std::vector<double> theta = point(array);
   const GatedImage image = to_image(adjoint, problem_->blank());
+  require_all_finite(image.data, "adjoint");
   return to_array(run_work_for([&] {
     choose(samples, seed, own_evaluations_);
+    require_renderable(theta);
     problem_->require_parameters();
     return problem_->transpose_apply(theta, image, iteration, throw_if_stopped);
   }));
@@ -110,6 +129,7 @@ py::dict Session::gradient(const Array& array, Samples samples, Seed seed) {
   const std::vector<double> theta = point(array);
   Statistics found = run_work_for([&] {
     choose(samples, seed, 1);
+    require_renderable(theta);
     problem_->require_parameters();
     gradient_repeats(*problem_);  // too few samples must show before the target is rendered
     return estimate_gradient(*problem_, theta, problem_->make_target(throw_if_stopped), throw_if_stopped).gradient;

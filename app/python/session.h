@@ -45,8 +45,10 @@ class Session {
                   bool force);
 
  private:
-  /// Throws InputError where theta has another size, leaves its bounds or cannot be rendered.
+  /// Throws InputError where theta has another size or leaves its bounds.
   std::vector<double> point(const Array& theta) const;
+  /// Throws InputError where coordinates are too large.
+  void require_renderable(const std::vector<double>& theta) const;
   /// Sets samples, seed and how many evaluations they are for.
   void choose(Samples samples, Seed seed, int evaluations);
   /// As the experiment says, for an optimisation.

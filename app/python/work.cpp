@@ -130,7 +130,7 @@ void run_work(const std::function<void(Work&)>& task) {
 
 void warn_python(const std::vector<std::string>& lines) {
   for (const std::string& line : lines)
-    if (PyErr_WarnEx(PyExc_UserWarning, line.c_str(), 1) != 0) throw py::error_already_set();
+    if (PyErr_WarnEx(PyExc_UserWarning, line.c_str(), 2) != 0) throw py::error_already_set();
 }
 
 void use_threads(int count) {

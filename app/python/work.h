@@ -32,7 +32,7 @@ auto run_work_for(F&& task) {
   return std::move(*result);
 }
 
-/// Gives each line to Python's module `warnings`.
+/// Gives each line to Python's module `warnings`, as of who called the package's function that is running.
 void warn_python(const std::vector<std::string>& lines);
 
 /// Threads that renderers use from now on; 0: all cores. Waits for tasks under way.
