@@ -128,12 +128,12 @@ def import_scene(options):
     except SceneError as error:
         report.refuse(error)
         files = None
-    for line in report.refused:
+    for line in report.by_line(report.refused):
         print(f"import_scene.py: {line}", file=sys.stderr)
     if files is None or report.refused and not options.skip:
         return 2
     write_folder(options.output, files, options.force)
-    for line in report.notes:
+    for line in report.by_line(report.notes):
         print(line)
     print(f"{options.output}: scene.yaml, experiment.yaml, {len(files) - 2} meshes")
     return 0

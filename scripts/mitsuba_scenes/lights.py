@@ -8,21 +8,18 @@ from .spectra import written
 
 def lights(scene, report, colours):
     """Lines of our file."""
-    lines, names = [], set()
+    lines = []
     for _, node in scene.objects("emitter"):
-        if node.type == "projector":
-            continue
         name = node.id or f"light_{len(lines) + 1}"
         text = report.attempt(light, node, report, colours)
         if text:
             lines.append(f"{{name: {name}, {text}}}")
-            names.add(name)
     return lines
 
 
 def light(node, report, colours):
     if node.type not in ("point", "spot"):
-        node.fail("no such emitter here (allowed: area, point, spot; projector in captures)")
+        node.fail("no such emitter here (allowed: area, point, spot; in captures a projector)")
     matrix = node.transform()
     position = node.point("position") if node.type == "point" else None
     if position is None:

@@ -1,7 +1,7 @@
 """Meshes: Mitsuba's primitives, OBJ and PLY files with their normals, and transforms of them.
 
-A mesh has `points` [N, 3], `faces`, lists of numbers of points that run counter-clockwise seen from the outside, and
-`corners`: for each face the normals [K, 3] that its file gives at its corners, or None.
+A mesh has `points` [N, 3] and `faces`, lists of numbers of points that run counter-clockwise seen from the outside. Where its
+file gives normals, they are `normals` [M, 3], and `corners` are lists of their numbers, as faces are of points.
 """
 
 from dataclasses import dataclass
@@ -22,16 +22,28 @@ class MeshError(Exception):
 class Mesh:
     points: np.ndarray
     faces: list
+    normals: np.ndarray | None = None
     corners: list | None = None
     flat: bool = True  # Mitsuba shades its facets flat, as we do
 
-    def normals(self):
-        """Of the faces, as long as they are large."""
+    def by_size(self):
+        """Faces of one size at a time: their numbers and their points' numbers, [K, size]."""
+        sizes = np.array([len(face) for face in self.faces])
+        for size in np.unique(sizes):
+            chosen = np.flatnonzero(sizes == size)
+            yield chosen, np.array([self.faces[face] for face in chosen])
+
+    def face_normals(self):
+        """Of unit length; zero where a face has no area."""
         result = np.empty((len(self.faces), 3))
-        for index, face in enumerate(self.faces):
-            p = self.points[face] - self.points[face[0]]
-            result[index] = np.cross(p[1:-1], p[2:]).sum(axis=0)
-        return result
+        for chosen, faces in self.by_size():
+            p = self.points[faces] - self.points[faces[:, :1]]
+            result[chosen] = np.cross(p[:, 1:-1], p[:, 2:]).sum(axis=1)
+        return unit(result)
+
+
+def unit(vectors):
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
 
 
 def of_arrays(mesh):
@@ -86,19 +98,19 @@ def read_obj(path):
                     normals.append([float(word) for word in words[1:4]])
                 elif words[:1] == ["f"]:
                     parts = [word.split("/") for word in words[1:]]
-                    faces.append([index(part[0], len(points)) for part in parts])
+                    faces.append([counted(part[0], len(points)) for part in parts])
                     has_normals = all(len(part) == 3 and part[2] for part in parts)
-                    corners.append([index(part[2], len(normals)) for part in parts] if has_normals else None)
+                    corners.append([counted(part[2], len(normals)) for part in parts] if has_normals else None)
             except ValueError:
                 raise MeshError(f"line {number}: '{line.strip()}' is not understood") from None
     largest = max((max(face) for face in faces), default=-1)
     if largest >= len(points) or max((max(c) for c in corners if c), default=-1) >= len(normals):
         raise MeshError("a face has a corner that is not there")
-    directions = [np.array(normals)[c] for c in corners] if faces and all(corners) else None
-    return Mesh(np.array(points, float).reshape(-1, 3), faces, directions)
+    points = np.array(points, float).reshape(-1, 3)
+    return Mesh(points, faces, np.array(normals, float), corners) if faces and all(corners) else Mesh(points, faces)
 
 
-def index(word, count):
+def counted(word, count):
     number = int(word)
     if number == 0 or number < -count:
         raise ValueError
@@ -131,14 +143,13 @@ def read_ply(path):
     vertices, faces = tables["vertex"], tables["face"]
     points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(float)
     name = "vertex_indices" if "vertex_indices" in faces else "vertex_index"
-    faces = [[int(corner) for corner in face] for face in faces[name]]
+    faces = [np.asarray(face, int).tolist() for face in faces[name]]
     if faces and not 0 <= min(map(min, faces)) <= max(map(max, faces)) < len(points):
         raise MeshError("a face has a corner that is not there")
-    corners = None
-    if "nx" in vertices:
-        normals = np.stack([vertices["n" + axis] for axis in "xyz"], axis=1).astype(float)
-        corners = [normals[face] for face in faces]
-    return Mesh(points, faces, corners)
+    if "nx" not in vertices:
+        return Mesh(points, faces)
+    normals = np.stack([vertices["n" + axis] for axis in "xyz"], axis=1).astype(float)
+    return Mesh(points, faces, normals, faces)
 
 
 class BinaryRows:
@@ -190,20 +201,21 @@ def read(path, reader):
 
 
 def shaded_by_its_normals(mesh):
-    """Mitsuba's front is where the normals at the corners point: faces turned accordingly."""
-    mesh.flat = False
+    """Mitsuba's front is where the normals at the corners point: faces turned accordingly. Without such normals it makes
+    smooth ones."""
+    normals = mesh.face_normals()
     if mesh.corners is None:
-        normals = mesh.normals()
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         mesh.flat = bool((np.abs(normals @ normals[0]) > BENT).all())
         return mesh
-    lengths = np.linalg.norm(mesh.normals(), axis=1)
+    faces, directions = list(mesh.faces), unit(mesh.normals)
     mesh.flat = True
-    for face, normal, length, corners in zip(mesh.faces, mesh.normals(), lengths, mesh.corners):
-        along = corners @ normal / np.maximum(np.linalg.norm(corners, axis=1) * length, 1e-300)
-        if along.sum() < 0:
-            face.reverse()
+    for chosen, _ in mesh.by_size():
+        corners = np.array([mesh.corners[face] for face in chosen])
+        along = np.einsum("fcx,fx->fc", directions[corners], normals[chosen])
+        for face in chosen[along.sum(axis=1) < 0]:
+            faces[face] = faces[face][::-1]
         mesh.flat &= bool((np.abs(along) > BENT).all())
+    mesh.faces = faces
     return mesh
 
 

@@ -1,6 +1,4 @@
-"""mitransient's captures around corners: a rectangle that an nlos_capture_meter looks at and a projector lights."""
-
-from dataclasses import dataclass
+"""mitransient's captures around corners: a wall that a detector looks at and a projector lights."""
 
 import numpy as np
 
@@ -10,63 +8,30 @@ from .sensors import WITHOUT_EFFECT, limited
 from .spectra import written
 
 
-@dataclass
-class Wall:
-    """A rectangle with texture coordinates from 0 to 1."""
-
-    matrix: np.ndarray
-    normal: np.ndarray
-
-    def point(self, u, v):
-        return matrices.points(self.matrix, np.stack([2 * np.asarray(u) - 1, 2 * np.asarray(v) - 1, 0 * np.asarray(u)], -1))
-
-    def hit(self, origin, direction):
-        """Where a ray meets it, or none."""
-        p, d = (np.linalg.inv(self.matrix) @ np.append(x, w) for x, w in ((origin, 1), (direction, 0)))
-        if d[2] == 0 or -p[2] / d[2] < 0:
-            return None
-        x, y = p[:2] - p[2] / d[2] * d[:2]
-        return self.point((x + 1) / 2, (y + 1) / 2) if max(abs(x), abs(y)) <= 1 + 1e-9 else None
-
-
 class Capture:
     """What our scene and experiment have of it: `lines`, `max_bounces`, `reflects` (whether the wall is part of the hidden
     scene, too) and `scale`, what our values are to be multiplied by to be mitransient's."""
 
-    def __init__(self, scene, shape, meter, matrix, film, report, colours, options):
-        self.report, self.colours, self.options, self.film, self.meter = report, colours, options, film, meter
+    def __init__(self, scene, sensor, wall, film, report, colours, options):
+        self.report, self.colours, self.options, self.film = report, colours, options, film
+        self.sensor, self.wall = sensor, wall
         self.integrator = scene.only("integrator")
-        if self.integrator is None or self.integrator.type != "transient_nlos_path":
-            (self.integrator or meter).fail("a capture's integrator is a transient_nlos_path")
-        self.sensor_origin = meter.point("sensor_origin", np.zeros(3))
-        self.wall = Wall(matrix, self.facing(shape, matrix))
-        self.albedo = self.wall_albedo(shape.node.only("bsdf"))
-        meter.ignore("account_first_and_last_bounces", "laser_origin", "laser_lookat_pixel", "laser_lookat_3d")
+        self.albedo = self.wall_albedo(wall.shape.node.only("bsdf"))
+        sensor.ignore("account_first_and_last_bounces", "laser_origin", "laser_lookat_pixel", "laser_lookat_3d")
         for name in ("original_film_width", "original_film_height"):
-            if name in meter.values:
-                meter.fail(f"{name}: say capture_type confocal in the integrator, and the film's whole size", name)
+            if name in sensor.values:
+                sensor.fail(f"{name}: say capture_type confocal in the integrator, and the film's whole size", name)
         self.kind = self.capture_type()
         self.projector = self.find_projector(scene)
         self.laser_origin, self.laser_matrix = self.laser()
         self.spots = self.find_spots()
         self.lines = self.written_lines()
         self.max_bounces = self.bounces()
-        self.reflects = self.wall_reflects()
+        self.reflects = self.wall_reflects() or sensor.type == "perspective"
         self.scale = self.find_scale()
         self.integrator.ignore(*WITHOUT_EFFECT, "nlos_laser_sampling", "discard_direct_paths")
-        for node in (self.integrator, self.projector, meter):
+        for node in (self.integrator, self.projector, sensor):
             report.refuse_rest(node)
-
-    def facing(self, shape, matrix):
-        normal = shape.mesh.normals()[0]
-        normal /= np.linalg.norm(normal)
-        height = normal @ (self.sensor_origin - matrix[:3, 3])
-        bsdf = shape.node.only("bsdf")
-        if height < -1e-9 * np.abs(matrix).max():
-            if bsdf is None or bsdf.type != "twosided":
-                shape.node.fail("turns its back to sensor_origin")
-            normal = -normal
-        return normal
 
     def wall_albedo(self, bsdf):
         if bsdf is not None and bsdf.type == "twosided":
@@ -84,44 +49,40 @@ class Capture:
             value = kinds[value - 1]
         if str(value).lower() not in kinds:
             self.integrator.fail(f"no capture_type {value}", "capture_type")
-        return "confocal" if self.meter.boolean("confocal") else value.lower()
+        return "confocal" if self.sensor.boolean("confocal") else value.lower()
 
     def find_projector(self, scene):
-        found = [node for node in [*scene.objects("emitter"), *self.meter.objects("emitter")]]
+        found = [node for node in [*scene.objects("emitter"), *self.sensor.objects("emitter")]]
         found = [node for _, node in found if node.type == "projector"]
         if len(found) != 1:
-            self.meter.fail(f"{len(found)} projectors; its laser is one")
+            self.sensor.fail(f"{len(found)} projectors; its laser is one")
         return found[0]
 
     def laser(self):
         """Where it stands, and its transform."""
         matrix = self.projector.transform()
-        origin = self.meter.point("laser_origin")
+        origin = self.sensor.point("laser_origin")
         return matrix[:3, 3] if origin is None else origin, matrix
-
-    def grid(self):
-        """Sensor points, rows one after the other."""
-        u = (np.arange(self.film.width) + 0.5) / self.film.width
-        v = (np.arange(self.film.height) + 0.5) / self.film.height
-        return self.wall.point(*np.meshgrid(u, v)).reshape(-1, 3)
 
     def find_spots(self):
         """Points that are lit; none: those that are looked at."""
         self.integrator.ignore("illumination_scan_fov", "force_equal_illumination_scanning")
-        film = self.meter.only("film")
+        film = self.sensor.only("film")
         film.ignore("exhaustive_scan", "laser_scan_width", "laser_scan_height")
         if self.kind == "confocal":
             return None
         if self.kind == "exhaustive":
             if self.integrator.boolean("force_equal_illumination_scanning", True):
-                return self.grid()
+                return self.wall.points
             return self.scanned(film.integer("laser_scan_width", 0), film.integer("laser_scan_height", 0))
         return self.aim()[np.newaxis]
 
     def aim(self):
         pixel, point = self.options.laser_pixel, self.options.laser_point
         if pixel is None and point is None:
-            pixel, point = self.meter.point("laser_lookat_pixel"), self.meter.point("laser_lookat_3d")
+            pixel, point = self.sensor.point("laser_lookat_pixel"), self.sensor.point("laser_lookat_3d")
+        if pixel is not None and self.sensor.type != "nlos_capture_meter":
+            self.sensor.fail("pixels to aim the laser at are of an nlos_capture_meter (--laser-point names a point)")
         if pixel is not None:
             # As mitransient counts: whole numbers are corners of pixels.
             return self.wall.point(pixel[0] / self.film.width, pixel[1] / self.film.height)
@@ -134,7 +95,7 @@ class Capture:
 
     def scanned(self, width, height):
         if min(width, height) < 1:
-            self.meter.fail("its film has no laser_scan_width and laser_scan_height")
+            self.sensor.fail("its film has no laser_scan_width and laser_scan_height")
         half = np.tan(np.radians(self.integrator.number("illumination_scan_fov", 20.0)) / 2)
         spots = []
         for row in range(height):
@@ -146,14 +107,10 @@ class Capture:
         return np.array(spots)
 
     def written_lines(self):
-        film, points = self.film, self.grid()
-        across = points[film.width - 1] - points[0] if film.width > 1 else self.wall.matrix[:3, 0]
-        down = points[-film.width] - points[0] if film.height > 1 else self.wall.matrix[:3, 1]
         laser = "confocal" if self.spots is None else "{points: [" + ", ".join(map(vector, self.spots)) + "]}"
-        lines = [f"  sensor: {{corner: {vector(points[0])}, across: {vector(across)}, down: {vector(down)}, "
-                 f"size: [{film.width}, {film.height}]}}", f"  normal: {vector(self.wall.normal)}", f"  laser: {laser}"]
+        lines = [*self.wall.lines, f"  normal: {vector(self.wall.normal)}", f"  laser: {laser}"]
         if self.integrator.boolean("account_first_and_last_bounces"):
-            lines.append(f"  origin: {{laser: {vector(self.laser_origin)}, sensor: {vector(self.sensor_origin)}}}")
+            lines.append(f"  origin: {{laser: {vector(self.laser_origin)}, sensor: {vector(self.wall.origin)}}}")
         return lines
 
     def bounces(self):
@@ -182,7 +139,7 @@ class Capture:
     def find_scale(self):
         irradiance = self.colours.colour(self.projector, "irradiance", 1.0, emission=True)
         self.projector.ignore("fov", "fov_axis", "focal_length")
-        to_laser = self.laser_origin - (self.grid() if self.spots is None else self.spots)
+        to_laser = self.laser_origin - (self.wall.points if self.spots is None else self.spots)
         distances = np.linalg.norm(to_laser, axis=1)
         if not distances.min() > 0:
             self.report.note(self.projector.place, f"{self.projector}: is on the wall, which then gets no light in mitransient")

@@ -1,5 +1,7 @@
 """What is said of a scene: what cannot be turned, and what becomes of it."""
 
+import re
+
 from .document import SceneError
 
 
@@ -27,3 +29,8 @@ class Report:
     def refuse_rest(self, node):
         for error in node.rest():
             self.refuse(error)
+
+    @staticmethod
+    def by_line(lines):
+        """In the order of the file."""
+        return sorted(lines, key=lambda line: [int(n) if n.isdigit() else n for n in re.split(r":(\d+): ", line, 1)])

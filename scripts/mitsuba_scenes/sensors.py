@@ -57,26 +57,31 @@ def crop_of(sensor, film):
     return share
 
 
-def camera(sensor, film, report):
-    """Our camera's lines."""
+def slope(sensor, film, report):
+    """Half the image's width at the distance 1. Fails where the camera is none of ours."""
     if sensor.type != "perspective":
         sensor.fail("no such sensor here (allowed: perspective, or an nlos_capture_meter on a rectangle)")
-    to_world, near = sensor.transform(), sensor.number("near_clip", 0.01)
+    near, axes = sensor.number("near_clip", 0.01), sensor.transform()[:3, :3]
     sensor.ignore("far_clip", "focus_distance", "shutter_open", "shutter_close")
-    axes = to_world[:3, :3]
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-5):
         sensor.fail("its to_world scales", "to_world")
     if np.linalg.det(axes) < 0:
         sensor.fail("its to_world mirrors the image", "to_world")
     if sensor.number("principal_point_offset_x", 0) or sensor.number("principal_point_offset_y", 0):
         sensor.fail("its principal point is not in the middle")
-    across = 2 * np.tan(np.radians(field_of_view(sensor, film)) / 2)
-    fov = 2 * np.degrees(np.arctan(across / 2 * crop_of(sensor, film)))
     if film.bins:
         report.note(sensor.place, f"{sensor}: paths begin at the pinhole here; mitransient itself counts from the near "
                     f"plane, {near:g} less in the middle of the image")
-    position = to_world[:3, 3]
+    result = np.tan(np.radians(field_of_view(sensor, film)) / 2) * crop_of(sensor, film)
     report.refuse_rest(sensor)
+    return result
+
+
+def camera(sensor, film, report):
+    """Our camera's lines."""
+    fov = 2 * np.degrees(np.arctan(slope(sensor, film, report)))
+    to_world = sensor.transform()
+    position, axes = to_world[:3, 3], to_world[:3, :3]
     return [f"  position: {vector(position)}", f"  look_at: {vector(position + axes[:, 2])}", f"  up: {vector(axes[:, 1])}",
             f"  fov: {fov:.10g}", f"  resolution: [{film.width}, {film.height}]"]
 
@@ -112,9 +117,9 @@ def bounces(integrator, report, most):
         integrator.fail("no such integrator here (allowed: " + ", ".join(PATHS) + ")")
     integrator.ignore(*WITHOUT_EFFECT, "hide_emitters")
     if integrator.boolean("camera_unwarp"):
-        integrator.fail("paths begin at the pinhole here, so that there is no camera_unwarp", "camera_unwarp")
+        report.attempt(integrator.fail, "paths begin at the pinhole here, so that there is no camera_unwarp", "camera_unwarp")
     if integrator.boolean("discard_direct_light"):
-        integrator.fail("no discard_direct_light", "discard_direct_light")
+        report.attempt(integrator.fail, "light that comes straight from a lamp counts here", "discard_direct_light")
     depth = integrator.integer("max_depth", 6 if integrator.type.startswith(("transient", "prb")) else -1)
     report.refuse_rest(integrator)
     if integrator.type == "direct":

@@ -10,6 +10,8 @@ from .spectra import written
 
 WITHOUT_EFFECT = ("silhouette_sampling_weight", "flip_tex_coords")
 
+MOST_NAMES = 8  # in a line
+
 
 @dataclass
 class Shape:
@@ -31,8 +33,10 @@ class Shapes:
             if node.type != "shapegroup":
                 self.report.attempt(self.add, node, np.eye(4), "")
         if self.curved:
+            names = [name for _, name in self.curved]
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
             self.report.note(self.curved[0][0], "facets are flat here where Mitsuba shades smoothly: "
-                             + ", ".join(name for _, name in self.curved))
+                             + ", ".join(names[:MOST_NAMES]) + more)
 
     def add(self, node, outer, prefix):
         if node.type == "instance":

@@ -2,7 +2,7 @@
 
 import re
 
-from . import materials, meshes, relay, sensors, shapes, spectra
+from . import materials, meshes, relay, sensors, shapes, spectra, walls
 from .document import Document
 from .lights import lights
 
@@ -20,40 +20,48 @@ def turned(path, options, report):
     sensor = chosen_sensor(scene, found, options, report)
     film = sensors.film_of(sensor, report)
     title = f"from {path.name} of Mitsuba by scripts/import_scene.py"
-    comment = None
-    if sensor.type == "nlos_capture_meter":
-        shape, matrix = next((shape, matrix) for shape, meter, matrix in found.walls if meter is sensor)
-        if not film.bins:
-            sensor.fail("the film of a capture is a transient_hdr_film")
-        capture = relay.Capture(scene, shape, sensor, matrix, film, report, colours, options)
-        view, most, scale = ["capture:", *capture.lines], capture.max_bounces, capture.scale
-        if not capture.reflects:
-            found.found.remove(shape)
-        for lit in found.found:
-            if lit.emission:
-                report.attempt(lit.node.fail, "nothing but the laser lights a capture")
-                lit.emission = ""
-        for _, node in scene.objects("emitter"):
-            if node.type != "projector":
-                report.attempt(node.fail, "nothing but the laser lights a capture")
+    if is_capture(scene, sensor):
+        view, most, comment = captured(scene, sensor, film, found, report, colours, options)
         shining = []
-        if scale:
-            comment = f"times {scale} are mitransient's values: bins' width x albedo of the wall^2 x pi x irradiance x cos / r^2"
     else:
-        integrator = scene.only("integrator")
         view = ["camera:", *sensors.camera(sensor, film, report)]
-        most = sensors.bounces(integrator, report, options.max_bounces)
+        most = sensors.bounces(scene.only("integrator"), report, options.max_bounces)
         shining = lights(scene, report, colours)
-        for _, node in scene.objects("emitter"):
-            if node.type == "projector":
-                report.attempt(node.fail, "no such emitter before a camera (allowed: area, point, spot)")
-        if film.bins:
-            comment = f"times {film.bins[1]:.10g}, the bins' width, are mitransient's values"
+        comment = f"Times {film.bins[1]:.10g}, the bins' width, these are mitransient's values." if film.bins else None
     report.refuse_rest(sensor)
     report.refuse_rest(sensor.only("film")) if sensor.only("film") else None
     report.refuse_rest(scene)
     return {**mesh_files(found.found, title), "scene.yaml": scene_text(title, view, found, shining),
             "experiment.yaml": experiment_text(path, title, film, most, comment)}
+
+
+def is_capture(scene, sensor):
+    integrator = scene.only("integrator")
+    around_corners = integrator is not None and integrator.type == "transient_nlos_path"
+    if sensor.type == "nlos_capture_meter" and not around_corners:
+        (integrator or sensor).fail("a capture's integrator is a transient_nlos_path")
+    return around_corners
+
+
+def captured(scene, sensor, film, found, report, colours, options):
+    """The capture's lines, its bounces and a comment; of what is found the wall is taken away unless it reflects in between."""
+    if not film.bins:
+        sensor.fail("the film of a capture is a transient_hdr_film")
+    if sensor.type == "nlos_capture_meter":
+        wall = walls.RectangleWall(*next(wall for wall in found.walls if wall[1] is sensor), film)
+    else:
+        wall = walls.SeenWall(found.found, sensor, film, sensors.slope(sensor, film, report), report)
+    capture = relay.Capture(scene, sensor, wall, film, report, colours, options)
+    if not capture.reflects:
+        found.found.remove(wall.shape)
+    emitters = [node for _, node in scene.objects("emitter") if node.type != "projector"]
+    for node in emitters + [shape.node for shape in found.found if shape.emission]:
+        report.attempt(node.fail, "nothing but the laser lights a capture")
+    for shape in found.found:
+        shape.emission = ""
+    factors = "the bins' width x albedo of the wall^2 x pi x irradiance x cos / r^2"
+    comment = capture.scale and f"Times {capture.scale} these are mitransient's values: {factors}."
+    return ["capture:", *capture.lines], capture.max_bounces, comment
 
 
 def chosen_sensor(scene, found, options, report):
@@ -99,7 +107,7 @@ def experiment_text(path, title, film, most, comment):
         gates = f"{{kind: bins, start: {start:.10g}, width: {width:.10g}, count: {count}}}"
     lines = [f"# Made {title}. Nothing is unknown yet: add `parameters`, see experiments/README.md."]
     if comment:
-        lines.append(f"# {comment[0].upper()}{comment[1:]}.")
+        lines.append(f"# {comment}")
     lines += [f"name: {name}", "scene: scene.yaml", f"max_bounces: {most}", f"gates: {gates}"]
     return "\n".join(lines) + "\n"
 
