@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .lights import vector
+from .writing import vector_text
+
 
 PATHS = ("path", "direct", "prb", "prb_basic", "prbvolpath", "volpath", "volpathmis", "transient_path",
          "transient_prbvolpath")
@@ -82,8 +83,8 @@ def camera(sensor, film, report):
     fov = 2 * np.degrees(np.arctan(slope(sensor, film, report)))
     to_world = sensor.transform()
     position, axes = to_world[:3, 3], to_world[:3, :3]
-    return [f"  position: {vector(position)}", f"  look_at: {vector(position + axes[:, 2])}", f"  up: {vector(axes[:, 1])}",
-            f"  fov: {fov:.10g}", f"  resolution: [{film.width}, {film.height}]"]
+    return [f"  position: {vector_text(position)}", f"  look_at: {vector_text(position + axes[:, 2])}",
+            f"  up: {vector_text(axes[:, 1])}", f"  fov: {fov:.10g}", f"  resolution: [{film.width}, {film.height}]"]
 
 
 def field_of_view(sensor, film):
@@ -115,9 +116,11 @@ def bounces(integrator, report, most):
         return most
     if integrator.type not in PATHS:
         integrator.fail("no such integrator here (allowed: " + ", ".join(PATHS) + ")")
-    integrator.ignore(*WITHOUT_EFFECT, "hide_emitters")
+    integrator.ignore(*WITHOUT_EFFECT)
+    if integrator.boolean("hide_emitters"):
+        report.attempt(integrator.fail, "the camera sees the emitters here", "hide_emitters")
     if integrator.boolean("camera_unwarp"):
-        report.attempt(integrator.fail, "paths begin at the pinhole here, so that there is no camera_unwarp", "camera_unwarp")
+        report.attempt(integrator.fail, "no camera_unwarp: paths begin at the pinhole here", "camera_unwarp")
     if integrator.boolean("discard_direct_light"):
         report.attempt(integrator.fail, "light that comes straight from a lamp counts here", "discard_direct_light")
     depth = integrator.integer("max_depth", 6 if integrator.type.startswith(("transient", "prb")) else -1)
