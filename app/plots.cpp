@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "app/interrupt.h"
+#include "core/base/ranks.h"
 
 extern char** environ;
 
@@ -99,11 +100,11 @@ bool run_module(const std::string& module, const std::string& folder) {
 }  // namespace
 
 bool draw_plots(const std::string& folder) {
-  return run_module("isochron.plot", folder);
+  return !first_rank() || run_module("isochron.plot", folder);
 }
 
 bool draw_charts(const std::string& folder) {
-  return run_module("isochron.plot_chart", folder);
+  return !first_rank() || run_module("isochron.plot_chart", folder);
 }
 
 }  // namespace isochron

@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/file.h"
+#include "core/base/ranks.h"
 
 namespace isochron {
 namespace {
@@ -116,9 +117,16 @@ QuietHdf5::~QuietHdf5() {
 
 Hdf5Reader::Hdf5Reader(const std::string& file) : file_(file) {
   std::string problem;
-  if (!is_regular_file(file, problem)) fail(problem);
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_file_locking(access, false, true);  // locks fail on read-only and on some network file systems
+  if (rank_count() == 1) {
+    if (!is_regular_file(file, problem)) fail(problem);
+    H5Pset_file_locking(access, false, true);  // locks fail on read-only and on some network file systems
+  } else {
+    auto contents = read_regular_file(file, problem);
+    if (!contents) fail(problem);
+    H5Pset_fapl_core(access, contents->size(), false);
+    H5Pset_file_image(access, contents->data(), contents->size());
+  }
   id_ = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
   if (id_ < 0) fail("cannot be read as HDF5: " + last_error());
 }
