@@ -77,7 +77,9 @@ Hdf5Shape shape_of(hid_t space) {
 
 Handle create_dataset(hid_t id, const char* name, hid_t type, const Hdf5Shape& shape) {
   const Handle space = make_space(shape);
-  const hid_t dataset = H5Dcreate2(id, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_obj_track_times(properties, false);  // equal contents make equal files
+  const hid_t dataset = H5Dcreate2(id, name, type, space, H5P_DEFAULT, properties, H5P_DEFAULT);
   if (dataset < 0) fail_to_write();
   return Handle(dataset, H5Dclose);
 }
