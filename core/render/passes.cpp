@@ -227,6 +227,7 @@ void Passes::for_each_pixel(Partition partition, F&& f) const {
 void Passes::count(const Worker& worker) const {
   rays_ += worker.rays;
   arcs_ += worker.arcs;
+  if (cache_) cache_->count_rays(worker.rays);
 }
 
 }  // namespace isochron
