@@ -15,12 +15,12 @@ def join(parts, separator=""):
     return Markup(separator.join(escape(part) for part in parts if part is not None))
 
 
-VOID = {"img", "input", "meta", "br"}
+VOID = {"img", "input", "meta", "link", "br"}
 
 
-def element(name, *children, **attributes):
-    """<name>; `class_`, `for_` and data_x become class, for and data-x. True is an attribute without a value, None none."""
-    words = [name]
+def element(tag, /, *children, **attributes):
+    """An element; `class_`, `for_` and data_x become class, for and data-x. True is an attribute without a value, None none."""
+    words = [tag]
     for key, value in attributes.items():
         key = key.rstrip("_").replace("_", "-")
         if value is True:
@@ -28,7 +28,7 @@ def element(name, *children, **attributes):
         elif value is not None and value is not False:
             words.append(f'{key}="{html.escape(str(value))}"')
     start = Markup(f"<{' '.join(words)}>")
-    return start if name in VOID else Markup(f"{start}{join(children)}</{name}>")
+    return start if tag in VOID else Markup(f"{start}{join(children)}</{tag}>")
 
 
 def table(head, rows, caption=None, class_=None):

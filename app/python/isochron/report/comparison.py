@@ -1,0 +1,5 @@
+"""Several runs on one page."""
+
+
+def comparison_page(runs):
+    raise NotImplementedError

@@ -1,0 +1,48 @@
+"""The page of one run, put together."""
+
+import importlib.resources
+
+from isochron.report.capture import capture_section, is_capture
+from isochron.report.geometry import geometry_section
+from isochron.report.images import derivatives_section, images_section
+from isochron.report.markup import Markup, element, join
+from isochron.report.results import convergence_section, ending, headline, parameters_section
+from isochron.report.settings import asked_section, cost_section
+
+
+def resource(name):
+    return Markup((importlib.resources.files("isochron.report") / name).read_text(encoding="utf-8"))
+
+
+TITLES = {"asked": "What was asked", "ended": "How it ended", "parameters": "Parameters", "convergence": "Convergence",
+          "capture": "The capture", "images": "Images", "geometry": "Geometry", "derivatives": "Derivatives",
+          "cost": "Cost and versions", "results": "Results", "differences": "Settings that differ", "curves": "Curves"}
+
+
+def document(title, header, sections):
+    """The whole file; `sections` is key to markup, and empty ones are left out."""
+    sections = {key: markup for key, markup in sections.items() if markup}
+    links = [element("li", element("a", TITLES[key], href=f"#{key}")) for key in sections]
+    head = element("head", element("meta", charset="utf-8"),
+                   element("meta", name="viewport", content="width=device-width, initial-scale=1"),
+                   element("meta", name="color-scheme", content="light dark"),
+                   # Nothing is loaded from anywhere.
+                   element("meta", http_equiv="Content-Security-Policy",
+                           content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"),
+                   element("title", title), element("link", rel="icon", href="data:,"), element("style", resource("page.css")))
+    body = element("body", element("a", "To the content", href="#content", class_="skip"), header,
+                   element("nav", element("ul", *links), aria_label="Sections"),
+                   element("main", *sections.values(), id="content"), element("script", resource("page.js")))
+    return Markup("<!DOCTYPE html>\n" + element("html", head, body, lang="en") + "\n")
+
+
+def run_page(run):
+    header = element("header", element("h1", run.name), element("p", f"isochron, run in {run.directory}", class_="quiet"))
+    images = Markup("") if is_capture(run) and "target" in run.images else images_section(run)
+    sections = {"parameters": parameters_section(run), "convergence": convergence_section(run), "capture": capture_section(run),
+                "images": images, "geometry": geometry_section(run), "derivatives": derivatives_section(run),
+                "asked": asked_section(run), "cost": cost_section(run)}
+    # Last, as it lists what could not be read.
+    ended = element("section", element("h2", "How it ended", id="ended-title"), ending(run), headline(run), id="ended",
+                    aria_labelledby="ended-title")
+    return document(f"{run.name}: {run.state}", header, {"ended": ended, **sections})
