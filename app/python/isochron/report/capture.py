@@ -3,10 +3,10 @@ who stands at the wall sees it, and how well the fit explains the counts."""
 
 import numpy as np
 
-from isochron.pictures.reading import PlotError, read_yaml
+from isochron.pictures.reading import PlotError
 from isochron.pictures.scales import scale_of
 from isochron.report.charts import Chart, Series, grid
-from isochron.report.images import Viewer
+from isochron.report.images import Viewer, row_of, slice_of
 from isochron.report.markup import Markup, element, number, section, table
 from isochron.report.png import Scale, figure_uri
 
@@ -14,16 +14,8 @@ DEVIATIONS = 4.0  # end of the scale of residuals
 MOST_SLICES = 25
 
 
-def is_capture(run):
-    path = run.directory / str(run.experiment.get("scene", ""))
-    try:
-        return path.is_file() and "capture" in read_yaml(path)
-    except PlotError:
-        return False
-
-
 def capture_section(run):
-    if not is_capture(run) or run.shape is None or len(run.shape) != 3:
+    if not run.is_capture or run.shape is None or len(run.shape) != 3:
         return Markup("")
     parts = [slices(run)]
     if (run.directory / "final.h5").exists():
@@ -41,31 +33,23 @@ def slices(run):
     if not frames or target is None or run.gates is None:
         return None
     frames = [frames[i] for i in sorted({int(round(i)) for i in np.linspace(0, len(frames) - 1, min(len(frames), MOST_SLICES))})]
-    rows, columns = run.shape[1:3]
-    column = columns == 1
-    middle = 0 if column else rows // 2
-
-    def slice_of(stack):
-        # Later is further down, as time runs in the tables.
-        return stack[:, :, 0] if column else stack[:, middle, :]
-
+    where = row_of(run.shape)[1]
     counts = slice_of(target)
     scale = Scale("inferno", 0.0, scale_of(counts, slice_of(frames[-1][2])))
     poisson = str(run.map("loss").get("kind")) == "poisson"
     rest = [residual(counts, slice_of(image), poisson) for _, _, image in frames]
     bound = DEVIATIONS if poisson else scale_of(rest[0], rest[-1])
     signed = Scale("RdBu_r", -bound, bound)
-    where = "the only column" if column else f"row {middle}, the middle one of {rows}" if rows > 1 else "the only row"
     centres = run.gates.positions
     viewer = Viewer("slice", f"Slice over time: {where}", [label for label, _, _ in frames])
     style = f"aspect-ratio:{4 / 5:.3f}"
     viewer.add("image", [scale.uri(slice_of(image)) for _, _, image in frames], style)
     viewer.add("target" if run.map("target").get("capture") is None else "counts", scale.uri(counts), style)
     viewer.add("residual", [signed.uri(r) for r in rest], style)
-    words = (f"To the right: {'rows' if column else 'columns'} of sensor points, {counts.shape[1]}. Downwards: {run.gates.axis}, "
+    words = (f"To the right: sensor points, {counts.shape[1]}. Downwards: {run.gates.axis}, "
              f"{number(centres[0], 5)} to {number(centres[-1], 5)}. "
              + ("Residual: (counts − image) / √image, in standard deviations." if poisson else "Residual: target − image."))
-    return element("div", viewer.html(), scale.bar("counts per bin" if poisson else run.gates.quantity),
+    return element("div", viewer.html(), scale.bar(run.quantity),
                    signed.bar("residual, blue where the image is too bright"), element("p", words, class_="note"))
 
 
@@ -116,7 +100,7 @@ def views(capture, chosen):
     from isochron.pictures.scene_views import draw_views
 
     with matplotlib.rc_context(STYLE):
-        figure = plt.figure(figsize=(16, 5), layout="constrained")
+        figure = plt.figure(figsize=(13, 4.6), layout="constrained")
         draw_views(figure, capture, chosen)
         uri = figure_uri(figure)
         plt.close(figure)

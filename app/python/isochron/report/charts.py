@@ -8,7 +8,7 @@ import numpy as np
 from isochron.report.markup import Markup, element, escape, join, number, table
 
 WIDTH, HEIGHT = 560, 300
-LEFT, RIGHT, TOP, BOTTOM = 66, 14, 12, 56
+LEFT, RIGHT, TOP, BOTTOM = 66, 26, 12, 56
 MOST_POINTS, MOST_ROWS = 400, 12
 
 
@@ -47,6 +47,7 @@ class Chart:
     def __init__(self, key, title, series, x_label, y_label, log=False, times=None, note=None, steps=False, height=HEIGHT):
         self.key, self.title, self.x_label, self.y_label = key, title, x_label, y_label
         self.times, self.note, self.steps, self.height = times, note, steps, height
+        self.bottom = height - (BOTTOM if times is not None else BOTTOM - 14)
         self.series = [s for s in series if np.isfinite(s.y).any()]
         positive = np.concatenate([s.y[np.isfinite(s.y) & (s.y > 0)] for s in self.series] or [np.empty(0)])
         self.log = log and positive.size > 0 and positive.max() > 3 * positive.min()
@@ -81,16 +82,18 @@ class Chart:
         if self.log:
             value = np.log10(np.where(value > 0, value, np.nan))
         unit = (value - self.y0) / (self.y1 - self.y0)
-        return TOP + (1 - np.clip(unit, -0.5, 1.5)) * (self.height - TOP - BOTTOM)
+        return TOP + (1 - np.clip(unit, -0.5, 1.5)) * (self.bottom - TOP)
 
     def _axes(self):
-        right, bottom = WIDTH - RIGHT, self.height - BOTTOM
+        right, bottom = WIDTH - RIGHT, self.bottom
         parts = []
         for tick in (log_ticks(10**self.y0, 10**self.y1) if self.log else nice_ticks(self.y0, self.y1)):
             y = float(self._y(np.float64(tick)))
             parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}"/>'
                          f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{number(0 if abs(tick) < 1e-300 else tick)}</text>')
         for tick in nice_ticks(self.x0, self.x1, 6):
+            if self.times is not None and abs(tick - round(tick)) > 1e-9:
+                continue  # no half iterations
             x = self._x(tick)
             parts.append(f'<line class="axis" x1="{x:.1f}" x2="{x:.1f}" y1="{bottom}" y2="{bottom + 4}"/>'
                          f'<text x="{x:.1f}" y="{bottom + 17}" text-anchor="middle">{number(tick, 6)}</text>')
@@ -175,7 +178,7 @@ class Chart:
         clip = f"clip-{self.key}"
         lines = "".join(self._line(s, i) for i, s in enumerate(self.series))
         rows = [thinned(len(s.x)) for s in self.series]
-        data = json.dumps({"left": LEFT, "right": RIGHT, "x0": self.x0, "x1": self.x1, "label": self.x_label,
+        data = json.dumps({"left": LEFT, "right": RIGHT, "x0": self.x0, "x1": self.x1, "bottom": self.bottom, "label": self.x_label,
                            "series": [{"name": s.name, "x": [round(float(v), 6) for v in s.x[r]],
                                        "y": [None if not np.isfinite(v) else float(f"{v:.5g}") for v in s.y[r]]}
                                       for s, r in zip(self.series, rows)]})
@@ -183,7 +186,7 @@ class Chart:
                      f'class="chart" data-chart="{escape(data)}"><title id="{self.key}-t">{escape(self.title)}</title>'
                      f'<desc id="{self.key}-d">{escape(self.description())}</desc>'
                      f'<clipPath id="{clip}"><rect x="{LEFT - 5}" y="{TOP - 5}" width="{WIDTH - LEFT - RIGHT + 10}" '
-                     f'height="{self.height - TOP - BOTTOM + 10}"/></clipPath>{"".join(self._axes())}'
+                     f'height="{self.bottom - TOP + 10}"/></clipPath>{"".join(self._axes())}'
                      f'<g clip-path="url(#{clip})">{lines}</g></svg>')
         note = element("p", self.note, class_="note") if self.note else None
         readout = element("p", class_="readout", aria_hidden="true")

@@ -7,15 +7,15 @@ import re
 import numpy as np
 
 from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
-from isochron.pictures.reading import PlotError, read_yaml
-from isochron.report.markup import Markup, element, join, section
+from isochron.pictures.reading import PlotError
+from isochron.report.markup import Markup, element, section
 
 MOST_TRIANGLES = 2500  # of a mesh; larger ones are shown coarser
 MOST_LINES = 1500  # of a shape's outline
-SHARP = np.cos(np.radians(30))
+SHARP, FOLDED = np.cos(np.radians((30, 0.2)))  # angles of edges that are drawn, of what stands still and of what moves
 
 
-def outline(points, triangles):
+def outline(points, triangles, sharp=SHARP):
     """Edges of one face, and those where faces meet at an angle: pairs of vertices."""
     normals = np.cross(points[triangles[:, 1]] - points[triangles[:, 0]], points[triangles[:, 2]] - points[triangles[:, 0]])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
@@ -26,8 +26,8 @@ def outline(points, triangles):
     starts = np.flatnonzero(np.r_[True, np.any(edges[1:] != edges[:-1], axis=1)])
     counts = np.diff(np.r_[starts, len(edges)])
     second = faces[np.minimum(starts + 1, len(faces) - 1)]
-    sharp = (counts != 2) | (np.einsum("ij,ij->i", normals[faces[starts]], normals[second]) < SHARP)
-    lines = edges[starts[sharp]]
+    drawn = (counts != 2) | (np.einsum("ij,ij->i", normals[faces[starts]], normals[second]) < sharp)
+    lines = edges[starts[drawn]]
     if len(lines) > MOST_LINES:
         lengths = np.linalg.norm(points[lines[:, 0]] - points[lines[:, 1]], axis=1)
         lines = lines[np.argsort(-lengths)[:MOST_LINES]]
@@ -91,8 +91,7 @@ class Geometry:
                 self.meshes.append({"shape": shape, "moment": name, "points": p, "triangles": triangles})
 
     def _read_scene(self):
-        path = self.run.directory / str(self.run.experiment.get("scene", ""))
-        scene = (self.run.read(read_yaml, str(self.run.experiment.get("scene", ""))) if path.is_file() else None) or {}
+        path, scene = self.run.scene_path, self.run.scene
         try:
             self._add_view(scene)
             for entry in scene.get("shapes") or []:
@@ -148,39 +147,38 @@ class Geometry:
         back = self.eye - middle if self.eye is not None else np.array([0.4, 0.3, 1.0])
         back = back / (np.linalg.norm(back) or 1)
         meshes = [{"shape": m["shape"], "moment": m["moment"], "points": packed(m["points"], "<f4"),
-                   "triangles": packed(m["triangles"], "<u4")} for m in self.meshes]
+                   "triangles": packed(m["triangles"], "<u4"),
+                   "edges": packed(outline(m["points"], m["triangles"], FOLDED), "<u4")} for m in self.meshes]
         lines = [{"points": packed(p, "<f4"), "pairs": packed(pairs, "<u4")} for p, pairs in self.lines]
-        return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, 4 * near),
+        return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, 2.6 * near),
                 "up": self.up.tolist(), "back": back.tolist(), "marks": [[name, list(map(float, at))] for name, at in self.marks]}
 
 
-WORDS = {"initial": "initial", "current": "current", "target": "target"}
+MOMENTS = ("initial", "current", "target")
 
 
 def geometry_section(run):
     geometry = Geometry(run)
     if not geometry.meshes:
         return Markup("")
-    moments = [m for m in WORDS if any(mesh["moment"] == m for mesh in geometry.meshes)]
-    current = "final" if run.ended else "current"
-    boxes = [element("label", element("input", type="checkbox", checked=True, value=m, class_="moment"), " ",
-                     element("span", class_=f"key {m}", aria_hidden="true"), " ", current if m == "current" else m)
-             for m in moments]
+    names = {m: "final" if m == "current" and run.ended else m for m in MOMENTS if any(mesh["moment"] == m for mesh in geometry.meshes)}
+    box = element("label", element("input", type="checkbox", checked=True, id="edges"), " ",
+                  element("span", class_="key m-target", aria_hidden="true"), " the target's edges in every view")
     shapes = ", ".join(geometry.moved)
-    words = (f"The scene from its camera's side. {shapes}: {', '.join(current if m == 'current' else m for m in moments)}; "
+    words = (f"The scene from its camera's side. {shapes}: {', '.join(names.values())}, side by side; "
              "other shapes as outlines.")
-    canvas = element("canvas", words, id="view", width="960", height="560", tabindex="0", role="img", aria_label=words,
+    canvas = element("canvas", words, id="view", width="1200", height="440", tabindex="0", role="img", aria_label=words,
                      aria_describedby="view-keys")
     keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: as at first.", class_="note", id="view-keys")
     notes = [f"{', '.join(geometry.coarse)}: drawn coarser than {'it is' if len(geometry.coarse) == 1 else 'they are'}"] if geometry.coarse else []
     notes += geometry.notes
-    data = json.dumps(geometry.data()).replace("<", "\\u003c")
-    return section("geometry", "Geometry", element("p", join(boxes, " "), class_="controls"), canvas,
-                   keys, element("p", "; ".join(notes) + ".", class_="note") if notes else None, distances(geometry),
+    data = json.dumps({**geometry.data(), "names": names}).replace("<", "\\u003c")
+    return section("geometry", "Geometry", element("p", box, class_="controls") if "target" in names and len(names) > 1 else None, canvas,
+                   keys, element("p", "; ".join(notes) + ".", class_="note") if notes else None, distances(geometry, names),
                    Markup(f'<script type="application/json" id="view-data">{data}</script>'))
 
 
-def distances(geometry):
+def distances(geometry, names):
     """What the view shows, in words: how far vertices are from the target's."""
     items = []
     for shape in geometry.moved:
@@ -192,7 +190,7 @@ def distances(geometry):
         for name in ("initial", "current"):
             if name in moments and len(moments[name][0]) == len(target):
                 away = np.linalg.norm(moments[name][0] - target, axis=1)
-                words.append(f"{name} {np.sqrt(np.mean(away**2)):.3g} (at most {away.max():.3g})")
+                words.append(f"{names[name]} {np.sqrt(np.mean(away**2)):.3g} (at most {away.max():.3g})")
         if words:
             items.append(element("li", f"{shape}: vertices' RMS distance from the target's: {', '.join(words)}, in scene units"))
     return element("ul", *items, class_="note") if items else None

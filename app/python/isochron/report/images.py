@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from isochron.pictures.reading import read_stack, read_yaml
+from isochron.pictures.reading import Gates, read_stack, read_yaml
 from isochron.pictures.scales import pick_gates, scale_of
 from isochron.pictures.sheets import COMPONENTS
 from isochron.report.markup import Markup, element, join, number, section
@@ -14,6 +14,19 @@ MOST_BYTES = 6e6  # of all pictures before they are compressed
 MOST_GATES, MOST_FRAMES = 24, 25
 MOST_PIXELS = 256  # along the longer side
 FEW_GATES = 6  # of derivatives
+
+
+def row_of(shape):
+    """How a row of a capture's points is taken from its gates (see slice_of), and which one that is."""
+    rows, columns = shape[1:3]
+    if columns == 1:
+        return (slice(None), slice(None), 0), "the only column"
+    return (slice(None), rows // 2), f"row {rows // 2}, the middle one of {rows}" if rows > 1 else "the only row"
+
+
+def slice_of(stack):
+    """Gates downwards, a row of points to the right."""
+    return stack[row_of(stack.shape)[0]]
 
 
 class Plan:
@@ -109,7 +122,7 @@ def images_section(run):
         difference = Scale("RdBu_r", -bound, bound)
     style = f"aspect-ratio:{run.shape[2]}/{run.shape[1]}"
     viewers = [viewer_of(run, plan, gate, scale, difference, style) for gate in plan.gates]
-    notes = [scale.bar(f"image and target: {run.gates.quantity}")]
+    notes = [scale.bar(f"image and target: {run.quantity}")]
     if difference is not None:
         notes.append(difference.bar("difference: image − target, blue where the image is too dark"))
     words = "Magenta: values that are not finite. " if any(not np.isfinite(f[2]).all() for f in plan.frames) else ""
@@ -179,22 +192,25 @@ def derivative_of(run, name, stacks):
     if not drawn:
         return element("article", element("h3", name), element("p", "Zero everywhere."), class_="card")
     first = next(iter(drawn.values()))
-    gates = pick_gates(FEW_GATES, *drawn.values())
-    factor = max(1, -(-max(first.shape[1:3]) // 128))
-    bound = scale_of(*(s[gates] for s in drawn.values()))
+    if run.is_capture:
+        views = {c: [(row_of(s.shape)[1], slice_of(s))] for c, s in drawn.items()}
+        style, words = "aspect-ratio:0.8", "To the right: sensor points; downwards: time. "
+    else:
+        gates = pick_gates(FEW_GATES, *drawn.values())
+        factor = max(1, -(-max(first.shape[1:3]) // 128))
+        labels = run.gates if run.gates is not None and run.gates.count == len(first) else Gates(len(first))
+        views = {c: [(labels.label(g), shrunk(s[g], factor) if factor > 1 else s[g]) for g in gates] for c, s in drawn.items()}
+        style, words = f"aspect-ratio:{first.shape[2]}/{first.shape[1]}", ""
+    bound = scale_of(*(values for row in views.values() for _, values in row))
     scale = Scale("RdBu_r", -bound, bound)
-    style = f"aspect-ratio:{first.shape[2]}/{first.shape[1]}"
     rows = []
-    for component, stack in drawn.items():
+    for component, row in views.items():
         pictures = []
-        for g in gates:
-            label = run.gates.label(g) if run.gates is not None and run.gates.count == len(stack) else str(g)
-            values = shrunk(stack[g], factor) if factor > 1 else stack[g]
+        for label, values in row:
             pictures.append(element("figure", element("img", src=scale.uri(values), style=style,
-                                                      alt=f"derivative by {name}, {component.replace('_', ' ')}, gate {label}"),
+                                                      alt=f"derivative by {name}, {component.replace('_', ' ')}, {label}"),
                                     element("figcaption", label)))
         rows.append(element("div", element("p", component.replace("_", " "), class_="term"), *pictures, class_="row"))
-    words = f"Zero everywhere: {', '.join(z.replace('_', ' ') for z in zero)}." if zero else ""
-    what = "" if run.gates is None else f"d({run.gates.quantity}) / d({name})"
-    return element("article", element("h3", f"By {name}"), *rows, scale.bar(what),
+    words += f"Zero everywhere: {', '.join(z.replace('_', ' ') for z in zero)}." if zero else ""
+    return element("article", element("h3", f"By {name}"), *rows, scale.bar(f"d({run.quantity}) / d({name})"),
                    element("p", words, class_="note") if words else None, class_="card wide")

@@ -37,7 +37,7 @@ for (const chart of document.querySelectorAll("svg[data-chart]")) {
   const cursor = document.createElementNS("http://www.w3.org/2000/svg", "line");
   cursor.setAttribute("class", "cursor");
   cursor.setAttribute("y1", 12);
-  cursor.setAttribute("y2", box.height - 56);
+  cursor.setAttribute("y2", data.bottom);
   cursor.style.display = "none";
   chart.append(cursor);
   const nearest = (xs, x) => xs.reduce((best, v, i) => (Math.abs(v - x) < Math.abs(xs[best] - x) ? i : best), 0);
@@ -67,6 +67,7 @@ if (canvas) {
   for (const mesh of scene.meshes) {
     mesh.points = new Float32Array(bytes(mesh.points));
     mesh.triangles = new Uint32Array(bytes(mesh.triangles));
+    mesh.edges = new Uint32Array(bytes(mesh.edges));
   }
   for (const line of scene.lines) {
     line.points = new Float32Array(bytes(line.points));
@@ -84,76 +85,92 @@ if (canvas) {
   let state = {...first};
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const channels = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
+  const moments = Object.keys(scene.names);
   const draw = () => {
+    const ratio = devicePixelRatio || 1;
+    canvas.width = Math.round((canvas.clientWidth || 1200) * ratio);
+    canvas.height = Math.round(Math.max(0.37 * canvas.width, 240 * ratio));
     const pen = canvas.getContext("2d");
-    const {width, height} = canvas;
-    pen.clearRect(0, 0, width, height);
+    moments.forEach((moment, i) => panel(pen, moment, Math.round(i * canvas.width / moments.length), ratio));
+  };
+  const panel = (pen, moment, left, ratio) => {
+    const [width, height] = [canvas.width / moments.length, canvas.height];
     const [c, s, ch, sh] = [Math.cos(state.turn), Math.sin(state.turn), Math.cos(state.height), Math.sin(state.height)];
     const back = up.map((v, i) => ch * (c * ahead[i] + s * aside[i]) + sh * v);
     const right = unit(cross(up, back));
     const above = cross(back, right);
-    const distance = 3.2 * scene.radius / state.zoom;
-    const focal = 1.5 * height;
+    const distance = 3.6 * scene.radius / state.zoom;
+    const focal = 1.7 * Math.min(width, height);
     const project = (points, i) => {
       const p = [0, 1, 2].map((k) => points[3 * i + k] - scene.middle[k]);
       const depth = distance - dot(p, back);
       const scale = depth > 0.02 * distance ? focal / depth : NaN;
       return [width / 2 + scale * dot(p, right), height / 2 - scale * dot(p, above), depth];
     };
-    pen.lineWidth = 1.2;
-    pen.strokeStyle = style("--quiet");
-    pen.globalAlpha = 0.75;
-    pen.beginPath();
-    for (const line of scene.lines)
-      for (let i = 0; i < line.pairs.length; i += 2) {
-        const [a, b] = [project(line.points, line.pairs[i]), project(line.points, line.pairs[i + 1])];
+    const stroke = (points, pairs, colour, alpha) => {
+      pen.strokeStyle = colour;
+      pen.globalAlpha = alpha;
+      pen.beginPath();
+      for (let i = 0; i < pairs.length; i += 2) {
+        const [a, b] = [project(points, pairs[i]), project(points, pairs[i + 1])];
         if (isNaN(a[0]) || isNaN(b[0])) continue;
         pen.moveTo(a[0], a[1]);
         pen.lineTo(b[0], b[1]);
       }
-    pen.stroke();
-    const shown = new Set([...document.querySelectorAll("input.moment:checked")].map((box) => box.value));
+      pen.stroke();
+    };
+    pen.save();
+    pen.translate(left, 0);
+    pen.beginPath();
+    pen.rect(0, 0, width, height);
+    pen.clip();
+    pen.lineWidth = ratio;
+    for (const line of scene.lines) stroke(line.points, line.pairs, style("--quiet"), 0.7);
     const faces = [];
-    for (const mesh of scene.meshes) {
-      if (!shown.has(mesh.moment)) continue;
-      const rgb = channels(style(`--${mesh.moment}`));
+    const rgb = channels(style(`--${moment}`));
+    for (const mesh of scene.meshes.filter((m) => m.moment === moment)) {
       const at = Array.from({length: mesh.points.length / 3}, (_, i) => project(mesh.points, i));
+      const p = (k) => [mesh.points[3 * k], mesh.points[3 * k + 1], mesh.points[3 * k + 2]];
+      const minus = (u, v) => u.map((x, k) => x - v[k]);
       for (let i = 0; i < mesh.triangles.length; i += 3) {
         const [a, b, d] = [0, 1, 2].map((k) => mesh.triangles[i + k]);
-        const p = (k) => [mesh.points[3 * k], mesh.points[3 * k + 1], mesh.points[3 * k + 2]];
-        const minus = (u, v) => u.map((x, k) => x - v[k]);
         const normal = unit(cross(minus(p(b), p(a)), minus(p(d), p(a))));
-        const light = 0.55 + 0.45 * Math.abs(dot(normal, unit(back.map((v, k) => v + 0.4 * above[k] + 0.3 * right[k]))));
+        const light = 0.35 + 0.65 * Math.abs(dot(normal, unit(back.map((v, k) => v + 0.7 * above[k] + 0.5 * right[k]))));
         const corners = [at[a], at[b], at[d]];
         if (corners.some((corner) => isNaN(corner[0]))) continue;
-        faces.push({corners, depth: corners[0][2] + corners[1][2] + corners[2][2], solid: mesh.moment === "current",
-                    colour: `rgb(${rgb.map((v) => Math.round(v * light)).join(",")})`,
-                    edges: mesh.triangles.length < 1500});
+        faces.push({corners, depth: corners[0][2] + corners[1][2] + corners[2][2],
+                    colour: `rgb(${rgb.map((v) => Math.round(v * light)).join(",")})`});
       }
     }
     faces.sort((a, b) => b.depth - a.depth);
-    pen.lineWidth = 0.8;
+    pen.globalAlpha = 1;
+    pen.lineWidth = 0.6 * ratio;
     for (const face of faces) {
       pen.beginPath();
       face.corners.forEach((corner, i) => (i ? pen.lineTo(corner[0], corner[1]) : pen.moveTo(corner[0], corner[1])));
       pen.closePath();
       pen.fillStyle = pen.strokeStyle = face.colour;
-      pen.globalAlpha = face.solid ? 0.85 : 0.3;
       pen.fill();
-      pen.globalAlpha = face.edges ? 0.9 : face.solid ? 0.85 : 0.1;
       pen.stroke();
     }
+    pen.lineWidth = 1.2 * ratio;
+    const edges = document.getElementById("edges");
+    for (const mesh of scene.meshes.filter((m) => m.moment === "target"))
+      if (moment !== "target" && edges && edges.checked) stroke(mesh.points, mesh.edges, style("--target"), 0.9);
     pen.globalAlpha = 1;
-    pen.font = "15px system-ui, sans-serif";
+    pen.fillStyle = style("--text");
+    pen.font = `${13 * ratio}px system-ui, sans-serif`;
     for (const [name, point] of scene.marks) {
       const [x, y] = project(point, 0);
       if (isNaN(x) || x < 0 || y < 0 || x > width || y > height) continue;
-      pen.fillStyle = style("--text");
       pen.beginPath();
-      pen.arc(x, y, 4, 0, 7);
+      pen.arc(x, y, 3 * ratio, 0, 7);
       pen.fill();
-      pen.fillText(name, x + 8, y + 5);
+      pen.fillText(name, x + 7 * ratio, y + 4 * ratio);
     }
+    pen.font = `600 ${15 * ratio}px system-ui, sans-serif`;
+    pen.fillText(scene.names[moment], 12 * ratio, 24 * ratio);
+    pen.restore();
   };
   const turn = (across, upwards) => {
     state.turn += across;
@@ -182,7 +199,8 @@ if (canvas) {
     held = event;
   });
   for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { held = null; });
-  document.querySelectorAll("input.moment").forEach((box) => box.addEventListener("change", draw));
+  document.getElementById("edges")?.addEventListener("change", draw);
+  addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   draw();
 }

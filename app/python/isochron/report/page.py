@@ -2,12 +2,12 @@
 
 import importlib.resources
 
-from isochron.report.capture import capture_section, is_capture
+from isochron.report.capture import capture_section
 from isochron.report.geometry import geometry_section
 from isochron.report.images import derivatives_section, images_section
 from isochron.report.markup import Markup, element, join
 from isochron.report.results import convergence_section, ending, headline, parameters_section
-from isochron.report.settings import asked_section, cost_section
+from isochron.report.settings import asked_section, cost_section, in_short
 
 
 def resource(name):
@@ -37,8 +37,9 @@ def document(title, header, sections):
 
 
 def run_page(run):
-    header = element("header", element("h1", run.name), element("p", f"isochron, run in {run.directory}", class_="quiet"))
-    images = Markup("") if is_capture(run) and "target" in run.images else images_section(run)
+    header = element("header", element("h1", run.name), element("p", f"isochron, run in {run.directory}", class_="quiet"),
+                     element("p", in_short(run)))
+    images = Markup("") if run.is_capture and "target" in run.images else images_section(run)
     sections = {"parameters": parameters_section(run), "convergence": convergence_section(run), "capture": capture_section(run),
                 "images": images, "geometry": geometry_section(run), "derivatives": derivatives_section(run),
                 "asked": asked_section(run), "cost": cost_section(run)}

@@ -67,7 +67,7 @@ def data_uri(image):
     return Markup("data:image/png;base64," + base64.b64encode(data.getvalue()).decode())
 
 
-def figure_uri(figure, dpi=80):
+def figure_uri(figure, dpi=100):
     """A Matplotlib figure."""
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=dpi)

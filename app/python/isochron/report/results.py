@@ -14,10 +14,10 @@ MEANING = {
     "gauss_newton_matrix": "± in the table: standard error by the loss's Gauss–Newton matrix at the end (for counts: by photon noise), "
                            "all parameters unknown together.",
     "gauss_newton_diagonal": "± in the table: a lower bound of the standard error (for counts: by photon noise), as if all other "
-                             "parameters were known, from the diagonal of the loss's Gauss–Newton matrix.",
+                             "parameters were known, from the diagonal of the loss's Gauss–Newton matrix. What acts alike, as a relief and a tilt, can "
+                             "be off by far more.",
     "scatter": "± in the table: scatter of the parameter over the last quarter of the iterations (5 to 100 rows), that is by how much the "
                "optimiser's noise moves it; how far it is from the truth it does not say.",
-    None: "± is not known: there are no rows enough to take a scatter from, and the solver gives no standard errors.",
 }
 
 
@@ -85,6 +85,10 @@ def parameters_section(run):
     head = ["parameter", "what", "unit", "initial", found, "target", "off by", "±"]
     kinds = sorted({u.kind for u in uncertainties.values()}, key=str)
     notes = [element("p", MEANING[kind], class_="note") for kind in kinds if kind in MEANING]
+    unknown = [name for name, u in uncertainties.items() if u.values is None]
+    if unknown:
+        notes.append(element("p", f"± of {', '.join(unknown)} is not known: this solver gives none, and log.csv has no scatter of "
+                             "its numbers (too few rows, or their norm alone).", class_="note"))
     if any(p.count > MOST_ROWS and p.found is not None for p in run.parameters):
         notes.append(spread(run))
     charts = [parameter_chart(run, p, uncertainties[p.name], i) for i, p in enumerate(run.parameters[:MOST_CHARTS])]
@@ -161,10 +165,9 @@ def convergence_section(run):
                             times=log.get("seconds"), note="Strip: ± its standard error. An estimate without bias, which can come out "
                             "negative; a logarithmic axis has gaps there."))
     if "image_rmse" in log:
-        quantity = run.gates.quantity if run.gates is not None else "pixel value"
         values = np.where(log["image_rmse"] > 0, log["image_rmse"], np.nan)
         charts.append(Chart("image", "Images against the target", [Series("", x, values)], "iteration", "RMSE", log=True,
-                            times=log.get("seconds"), note=f"In {quantity}; gaps where images agree within the noise."))
+                            times=log.get("seconds"), note=f"In {run.quantity}; gaps where images agree within the noise."))
     errors = log.get("param_rmse")
     if errors is not None and np.isfinite(errors).any():
         charts.append(Chart("param", "All parameters against their targets", [Series("", x, errors)], "iteration",

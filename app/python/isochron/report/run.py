@@ -9,7 +9,8 @@ import numpy as np
 from isochron import exr
 from isochron.pictures.reading import Folder, PlotError, read_log, read_stack, read_yaml
 
-ENDED = {"converged": "converged", "iterations_reached": "all iterations done", "diverged": "diverged"}
+ENDED = {"converged": "converged after {} iterations", "iterations_reached": "all {} iterations done",
+         "diverged": "diverged after {} iterations"}
 
 
 class NoRun(Exception):
@@ -68,6 +69,7 @@ class Run:
         self.summary = self.read(read_yaml, "summary.yaml") or {}
         self.log = self.read(read_log, "log.csv") or {}
         self.folder = self.read(lambda path: Folder(self.directory), "experiment.yaml")
+        self.scene = (self.read(read_yaml, str(self.experiment.get("scene", ""))) if self.scene_path.is_file() else None) or {}
         self._find_state()
         self._read_parameters()
         self._read_images()
@@ -109,7 +111,7 @@ class Run:
             self.state, self.state_words = "going", f"still going: iteration {self.done} of {self.iterations}"
         elif status in ENDED:
             self.state = "diverged" if status == "diverged" else "finished"
-            self.state_words = f"{ENDED[status]} after {self.done} iterations"
+            self.state_words = ENDED[status].format(self.done)
         elif status == "interrupted":
             self.state, self.state_words = "interrupted", f"interrupted after {self.done} of {self.iterations} iterations"
         else:
@@ -149,6 +151,21 @@ class Run:
             name = next(iter(self.images))
             self.gates = self.read(lambda path: self.folder.gates(path, len(first)), f"{name}.exr")
         self.shape = None if first is None else first.shape
+
+    @property
+    def quantity(self):
+        """What a pixel's value is."""
+        if str(self.map("loss").get("kind")) == "poisson":
+            return "counts"
+        return self.gates.quantity if self.gates is not None else "pixel value"
+
+    @property
+    def is_capture(self):
+        return "capture" in self.scene
+
+    @property
+    def scene_path(self):
+        return self.directory / str(self.experiment.get("scene", ""))
 
     def frames(self):
         """(label, iteration, image) from the first to the latest; of frames that are gone meanwhile, none."""

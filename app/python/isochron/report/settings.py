@@ -18,8 +18,27 @@ def short(value, most=70):
         if len(value) > 6:
             return f"{len(value)} numbers" if all(isinstance(v, (int, float)) for v in value) else f"{len(value)} entries"
         return "[" + ", ".join(short(v, 30) for v in value) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
     text = f"{value:g}" if isinstance(value, float) else str(value)
     return text if len(text) <= most else text[:most] + "…"
+
+
+def in_short(run):
+    """The experiment in one line."""
+    words = []
+    unknowns = sum(p.count for p in run.parameters)
+    if run.parameters:
+        names = ", ".join(p.name for p in run.parameters[:8]) + (", …" if len(run.parameters) > 8 else "")
+        words.append(f"{unknowns} unknown{'s' if unknowns != 1 else ''} ({names})")
+    if run.shape is not None:
+        height, width = run.shape[1:3]
+        kind = str(run.map("gates").get("kind", ""))
+        words.append(f"{width} x {height} {'sensor points' if run.is_capture else 'pixels'}, {run.shape[0]} gates{f' ({kind})' if kind else ''}")
+    method, loss = run.map("optimizer").get("method"), run.map("loss").get("kind")
+    if method:
+        words.append(f"{str(method).replace('_', ' ')}{f', {loss} loss' if loss else ''}")
+    return "; ".join(words)
 
 
 def asked_section(run):
