@@ -18,6 +18,7 @@
 #include "app/final_derivatives.h"
 #include "app/interrupt.h"
 #include "core/base/progress.h"
+#include "core/base/ranks.h"
 
 extern char** environ;
 
@@ -113,15 +114,16 @@ bool draw(const std::string& module, const std::string& folder) {
 }  // namespace
 
 bool draw_plots(const std::string& folder) {
-  return draw("isochron.plot", folder);
+  return !first_rank() || draw("isochron.plot", folder);
 }
 
 bool draw_charts(const std::string& folder) {
-  return draw("isochron.plot_chart", folder);
+  return !first_rank() || draw("isochron.plot_chart", folder);
 }
 
 bool write_report(const std::string& folder) {
   try_final_derivatives(folder);
+  if (!first_rank()) return true;
   const ModuleResult result = run_module("isochron.report", {as_path(folder)});
   if (result.status == 0) return true;
   if (interrupted())
@@ -141,6 +143,7 @@ void try_final_derivatives(const std::string& folder) {
 }
 
 int run_report(std::vector<std::string> arguments) {
+  if (!first_rank()) return 0;
   for (std::string& argument : arguments)
     if (argument != "--output") argument = as_path(argument);
   const ModuleResult result = run_module("isochron.report", arguments);

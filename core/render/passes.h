@@ -1,11 +1,13 @@
 // Passes over the samples: how the techniques share the samples of images and of each term of the derivative. What they
 // find goes to a sink.
 #pragma once
+#include <algorithm>
 #include <atomic>
 #include <mutex>
 #include <optional>
 
 #include "core/base/random.h"
+#include "core/base/ranks.h"
 #include "core/films/sinks.h"
 #include "core/paths/options.h"
 #include "core/render/scene_cache.h"
@@ -64,10 +66,18 @@ class Passes {
   const SamplingMix mix;      ///< what the options resolve to
   const GatePick every_gate;  ///< all gates and pixels alike
 
-  /// Rays traced so far.
-  long long rays() const { return rays_; }
-  /// Work done so far, in rays.
-  double work() const { return isochron::work(rays_, arcs_); }
+  /// Rays traced so far, by all ranks, which meet here.
+  long long rays() const { return sum_over_ranks(rays_.load()); }
+  /// Work done so far, in rays, by all ranks, which meet here.
+  double work() const { return isochron::work(rays(), sum_over_ranks(arcs_.load())); }
+
+  /// Runs f(pixel) for the pixels of one partition, in a fixed order.
+  template <class F>
+  static void for_each_pixel(Partition partition, int pixels, F&& f) {
+    const int stride = partition.count * kPixelsPerBlock;
+    for (int block = partition.index * kPixelsPerBlock; block < pixels; block += stride)
+      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) f(pixel);
+  }
 
  private:
   /// Whether the interior term takes the continuous part of dW in pairs.
@@ -80,10 +90,6 @@ class Passes {
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
 
   void learn() const;
-
-  /// Runs f(pixel) for the pixels of one partition, in a fixed order.
-  template <class F>
-  void for_each_pixel(Partition partition, F&& f) const;
 
   /// Adds the rays and arcs of a worker that has done its work.
   void count(const Worker& worker) const;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/ranks.h"
+
 namespace isochron {
 namespace {
 
@@ -44,8 +46,12 @@ bool Frames::wants(int iteration) const {
 }
 
 void Frames::write(int iteration, const GatedImage& image) const {
-  fs::create_directories(folder_);
+  on_first_rank([&] { fs::create_directories(folder_); });
   write_exr(fmt::format("{}/{:06}.exr", folder_, iteration), image, notes_);
+  on_first_rank([&] { remove_unwanted(iteration); });
+}
+
+void Frames::remove_unwanted(int iteration) const {
   std::vector<fs::path> unwanted;
   for (const auto& entry : fs::directory_iterator(folder_))
     if (const auto other = iteration_of(entry.path()); other && (*other % stride(iteration) != 0 || *other > iteration))

@@ -21,6 +21,7 @@ class Frames {
 
  private:
   int stride(int iteration) const;
+  void remove_unwanted(int iteration) const;
 
   std::string folder_;
   int most_;

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "core/base/file.h"
+#include "core/base/ranks.h"
 #include "core/scene/mesh_writer.h"
 
 namespace isochron {
@@ -41,7 +42,7 @@ GeometryFiles::GeometryFiles(const std::string& folder, const OutputSpec& output
     for (int i = 2; taken(); ++i) name = fmt::format("{}_{}", stem, i);
     files_.push_back({shape, name});
   }
-  if (!files_.empty()) std::filesystem::create_directories(folder_);
+  if (!files_.empty()) on_first_rank([&] { std::filesystem::create_directories(folder_); });
 }
 
 void GeometryFiles::write(const std::string& moment, const std::vector<double>& theta) const {
@@ -58,7 +59,9 @@ void GeometryFiles::write(const std::string& moment, const std::vector<double>& 
 }
 
 void GeometryFiles::remove(const std::string& moment) const {
-  for (const File& file : files_) std::filesystem::remove(path(moment, file));
+  on_first_rank([&] {
+    for (const File& file : files_) std::filesystem::remove(path(moment, file));
+  });
 }
 
 std::string GeometryFiles::path(const std::string& moment, const File& file) const {

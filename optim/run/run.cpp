@@ -5,10 +5,12 @@
 
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <limits>
+#include <optional>
 
 #include "core/base/error.h"
+#include "core/base/file.h"
+#include "core/base/ranks.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/capture_data.h"
@@ -100,7 +102,7 @@ class Run {
 
   void load_target() {
     const std::string file = path("target.exr");
-    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
+    if (!file_exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
     target_ = problem_.read_target(file);
   }
 
@@ -227,21 +229,27 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_jacobian_fits(problem);
     require_memory(problem, run_memory(problem));
   }
-  const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
-  const FolderLock lock = prepare_run_folder(options.folder, options.force, options.warning);
-  Experiment copied = experiment;
-  write_inputs(options.folder, inputs, copied);
-  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  std::optional<FolderLock> lock;
+  on_first_rank([&] {
+    const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
+    lock.emplace(prepare_run_folder(options.folder, options.force, options.warning));
+    Experiment copied = experiment;
+    write_inputs(options.folder, inputs, copied);
+    write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  });
   // As a resumed run does, so that both see the same to the last bit.
   return go_on(options, {});
 }
 
 RunStatus resume_run(const RunOptions& options) {
-  if (!std::filesystem::exists(options.folder + "/experiment.yaml"))
-    throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
-  make_output_folder(options.folder);
-  const FolderLock lock(options.folder, options.warning);
-  check_inputs(options.folder, options.warning);
+  std::optional<FolderLock> lock;
+  on_first_rank([&] {
+    if (!file_exists(options.folder + "/experiment.yaml"))
+      throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
+    make_output_folder(options.folder);
+    lock.emplace(options.folder, options.warning);
+    check_inputs(options.folder, options.warning);
+  });
   return go_on(options, options.warning);
 }
 
