@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "app/interrupt.h"
+#include "core/base/ranks.h"
 #include "core/base/yaml_reader.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
@@ -70,6 +71,7 @@ double write_images(const Problem& problem, const std::vector<double>& theta, co
 }  // namespace
 
 void write_final_derivatives(const std::string& run) {
+  if (rank_count() > 1) return;  // how many samples fit is up to a clock, and ranks have one each
   const std::string summary = run + "/summary.yaml", folder = run + "/report/derivatives";
   const auto text = read_file(summary);
   if (!text || text->starts_with("status: interrupted")) return;

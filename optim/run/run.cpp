@@ -84,9 +84,11 @@ class Run {
       save_checkpoint(options_.folder, state_, parameters_);
       result.status = RunStatus::interrupted;
     }
-    write_file_atomically(path("summary.yaml"),
-                          summary_yaml(result, state_, last_, parameters_,
-                                       {first, seconds_since(start), problem_.rays(), peak_memory()}, errors_));
+    // Ranks that were told to stop do not wait for each other.
+    const long long rays = result.status == RunStatus::interrupted ? problem_.rays() : sum_over_ranks(problem_.rays());
+    write_file_atomically(
+        path("summary.yaml"),
+        summary_yaml(result, state_, last_, parameters_, {first, seconds_since(start), rays, peak_memory()}, errors_));
     if (options_.report)
       options_.report((had_ended && state_.iteration == first ? nothing_left(result, options_.folder) : "") +
                       run_report(result, state_, last_, parameters_));

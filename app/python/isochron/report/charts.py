@@ -125,7 +125,8 @@ class Chart:
             if self.steps and pen:
                 words.append(f"H{a:.1f}V{b:.1f}")
             else:
-                words.append(f"{'L' if pen else 'M'}{a:.1f} {b:.1f}")
+                # A point between two gaps is a line without a length, whose ends are round.
+                words.append(f"L{a:.1f} {b:.1f}" if pen else f"M{a:.1f} {b:.1f}h0")
             pen = True
         parts.append(f'<path class="line {colour}" d="{"".join(words)}"/>')
         if np.isfinite(y).sum() <= 30 and not self.steps:

@@ -2,6 +2,7 @@
 
 import importlib.resources
 
+from isochron.pictures.reading import PlotError
 from isochron.report.capture import capture_section
 from isochron.report.geometry import geometry_section
 from isochron.report.images import derivatives_section, images_section
@@ -36,13 +37,23 @@ def document(title, header, sections):
     return Markup("<!DOCTYPE html>\n" + element("html", head, body, lang="en") + "\n")
 
 
+def attempt(run, build):
+    """A section; nothing but a note where the run's files hold what it cannot deal with, so that the others still come."""
+    try:
+        return build(run)
+    except (PlotError, ArithmeticError, AttributeError, IndexError, KeyError, OSError, TypeError, ValueError) as error:
+        run.note(f"{build.__name__.replace('_section', '')}: left out: {type(error).__name__}: {error}")
+        return ""
+
+
 def run_page(run):
     header = element("header", element("h1", run.name), element("p", f"isochron, run in {run.directory}", class_="quiet"),
                      element("p", in_short(run)))
-    images = Markup("") if run.is_capture and "target" in run.images else images_section(run)
-    sections = {"parameters": parameters_section(run), "convergence": convergence_section(run), "capture": capture_section(run),
-                "images": images, "geometry": geometry_section(run), "derivatives": derivatives_section(run),
-                "asked": asked_section(run), "cost": cost_section(run)}
+    builders = [parameters_section, convergence_section, capture_section, images_section, geometry_section, derivatives_section,
+                asked_section, cost_section]
+    if run.is_capture and "target" in run.images:
+        builders.remove(images_section)  # of hundreds of bins; slices show them
+    sections = {build.__name__.removesuffix("_section"): attempt(run, build) for build in builders}
     # Last, as it lists what could not be read.
     ended = element("section", element("h2", "How it ended", id="ended-title"), ending(run), headline(run), id="ended",
                     aria_labelledby="ended-title")

@@ -56,6 +56,11 @@ def as_numbers(values):
         return None
 
 
+def whole(value):
+    """A number of iterations; 0 where it is none."""
+    return value if isinstance(value, int) and not isinstance(value, bool) and value > 0 else 0
+
+
 class Run:
     def __init__(self, directory):
         self.directory, self.notes = pathlib.Path(directory), []
@@ -101,10 +106,10 @@ class Run:
     def _find_state(self):
         status = str(self.summary.get("status", ""))
         rows = self.log.get("iteration", np.empty(0))
-        self.iterations = int(self.map("optimizer").get("iterations") or 0)
-        self.done = int(rows[-1]) if len(rows) else 0
-        if self.summary.get("iterations") is not None and status:
-            self.done = max(int(self.summary["iterations"]), 0 if status in ENDED else self.done)
+        self.iterations = whole(self.map("optimizer").get("iterations"))
+        self.done = int(rows[-1]) if len(rows) and np.isfinite(rows[-1]) else 0
+        if status in ENDED:  # the log may have a row more, of the final parameters
+            self.done = whole(self.summary.get("iterations"))
         self.going = is_locked(self.directory / ".lock")
         self.ended = status in ENDED and not self.going
         if self.going:
