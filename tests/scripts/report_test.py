@@ -188,7 +188,7 @@ class ReportTest(unittest.TestCase):
     def test_capture(self):
         write_capture_run(self.folder)
         page = self.page()
-        for words in ("lower bound of the standard error", "Slice over time: row 2", "Histograms", "Deviance", "± 0.0005"):
+        for words in ("lower bound of the standard error", "Slice over time: row 2", "Histograms", "drawn from it", "± 0.0005"):
             self.assertIn(words, page.words)
         self.assertEqual(self.viewers()[0]["steps"], ["iteration 0", "iteration 1", "final, after iteration 2"])
         self.assertIn("seen from the wall", page.words)

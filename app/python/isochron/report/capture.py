@@ -7,7 +7,7 @@ from isochron.pictures.reading import PlotError
 from isochron.pictures.scales import scale_of
 from isochron.report.charts import Chart, Series, grid
 from isochron.report.images import Viewer, row_of, slice_of
-from isochron.report.markup import Markup, element, number, section, table
+from isochron.report.markup import Markup, element, join, number, section, table
 from isochron.report.png import Scale, figure_uri
 
 DEVIATIONS = 4.0  # end of the scale of residuals
@@ -64,7 +64,6 @@ def residual(counts, image, poisson):
 def fitted(run):
     # Imported here, as h5py and SciPy take longer to load than most pages to be written.
     from isochron.pictures.capture_run import CaptureRun
-    from isochron.pictures.deviance import Fit
 
     capture = CaptureRun(run.directory)
     charts = []
@@ -81,12 +80,8 @@ def fitted(run):
             off = np.where(fit > 0, (counts - fit) / np.sqrt(fit), np.nan)
         charts.append(Chart(f"r{place}", f"Point {place}: residual", [Series("", times[some], off[some])], "time (ps)",
                             "(N − μ) / √μ", steps=True, height=220))
-    fit = Fit(capture)
-    rows = [["fit", number(fit.fitted, 5)], ["Poisson numbers drawn from it", number(fit.drawn, 5)], ["ratio", number(fit.ratio, 5)]]
     yield element("h3", "Histograms of points of the wall")
     yield grid(charts)
-    yield element("h3", "How well the fit explains the counts")
-    yield table(["deviance per degree of freedom", "value"], rows, "Deviance", "numbers")
     yield views(capture, chosen)
 
 
@@ -100,9 +95,23 @@ def views(capture, chosen):
     from isochron.pictures.scene_views import draw_views
 
     with matplotlib.rc_context(STYLE):
-        figure = plt.figure(figsize=(13, 4.6), layout="constrained")
-        draw_views(figure, capture, chosen)
+        figure = plt.figure(figsize=(12, 4), layout="constrained")
+        lines = draw_views(figure, capture, chosen, with_box=False)
         uri = figure_uri(figure)
         plt.close(figure)
     alt = "What was found, seen from the wall: albedo and depth where they are unknowns, and the filtered back-projection of the counts"
-    return element("figure", element("img", src=uri, alt=alt, class_="paper"), element("figcaption", alt + "."), class_="card wide")
+    picture = element("figure", element("img", src=uri, alt=alt, class_="paper"), element("figcaption", alt + "."), class_="card wide")
+    return join([element("h3", "What was found"), picture, element("div", *boxes(lines), class_="boxes")])
+
+
+def boxes(lines):
+    """A table for each heading and what stands below it; a line without a name goes on with the one above."""
+    parts = []
+    for name, value in lines:
+        if value is None:
+            parts.append((name, []))
+        elif name.strip() or not parts[-1][1]:
+            parts[-1][1].append([name.strip(), value])
+        else:
+            parts[-1][1][-1][1] += f", {value}"
+    return [table([heading, "value"], rows) for heading, rows in parts]

@@ -150,7 +150,7 @@ class Geometry:
                    "triangles": packed(m["triangles"], "<u4"),
                    "edges": packed(outline(m["points"], m["triangles"], FOLDED), "<u4")} for m in self.meshes]
         lines = [{"points": packed(p, "<f4"), "pairs": packed(pairs, "<u4")} for p, pairs in self.lines]
-        return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, 2.6 * near),
+        return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, 3.6 * near),
                 "up": self.up.tolist(), "back": back.tolist(), "marks": [[name, list(map(float, at))] for name, at in self.marks]}
 
 
