@@ -112,16 +112,31 @@ class Geometry:
             grid = sensor.get("sensor")
             if isinstance(grid, dict) and "corner" in grid:
                 corner, across, down = (np.array(grid[k], float) for k in ("corner", "across", "down"))
-                corners = np.array([corner, corner + across, corner + across + down, corner + down])
-                self.lines.append((corners, np.array([[0, 1], [1, 2], [2, 3], [3, 0]])))
-                self.up = -down / np.linalg.norm(down)
-                self.look = corners.mean(axis=0)
-                # From behind the wall and aside, so that what is hidden lies ahead.
-                self.eye = self.look - np.array(sensor.get("normal", np.cross(across, -down)), float) * np.linalg.norm(across)
-                self.marks.append(("sensor points", corners[0]))
+                normal = np.array(sensor["normal"], float)
+                self._add_wall(np.array([corner, corner + across, corner + across + down, corner + down]), normal)
+            elif "file" in sensor:
+                self.run.read(self._read_wall, "final.h5")
         for light in scene.get("lights") or []:
             if isinstance(light, dict) and isinstance(light.get("position"), list):
                 self.marks.append((str(light.get("name", "light")), np.array(light["position"], float)))
+
+    def _add_wall(self, corners, normal):
+        self.lines.append((corners, np.array([[0, 1], [1, 2], [2, 3], [3, 0]])))
+        down = corners[3] - corners[0]
+        self.up, self.look = -down / (np.linalg.norm(down) or 1), corners.mean(axis=0)
+        # From behind the wall and aside, so that what is hidden lies ahead.
+        self.eye = self.look - normal * np.linalg.norm(corners[1] - corners[0])
+        self.marks.append(("sensor points", corners[0]))
+
+    def _read_wall(self, path):
+        """Of a measurement: a grid of points, columns first, in metres as scenes of such files are."""
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            points, normals = file["sensor_grid_xyz"][()], file["sensor_grid_normals"][()]
+        if points.ndim == 3:
+            corners = np.array([points[0, 0], points[-1, 0], points[-1, -1], points[0, -1]])
+            self._add_wall(corners, normals.reshape(-1, 3).mean(axis=0))
 
     def _add_outline(self, name, path, transform):
         if path.suffix not in (".obj", ".ply"):
