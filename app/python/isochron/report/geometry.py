@@ -1,14 +1,13 @@
 """The shapes that moved, initial, current and target, within the outlines of the scene: data of a view that can be turned."""
 
 import base64
-import json
 import re
 
 import numpy as np
 
 from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
 from isochron.pictures.reading import PlotError
-from isochron.report.markup import Markup, element, section
+from isochron.report.markup import Markup, data_for_scripts, element, section
 
 MOST_TRIANGLES = 2500  # of a mesh; larger ones are shown coarser
 MOST_LINES = 1500  # of a shape's outline
@@ -187,10 +186,9 @@ def geometry_section(run):
     keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: as at first.", class_="note", id="view-keys")
     notes = [f"{', '.join(geometry.coarse)}: drawn coarser than {'it is' if len(geometry.coarse) == 1 else 'they are'}"] if geometry.coarse else []
     notes += geometry.notes
-    data = json.dumps({**geometry.data(), "names": names}).replace("<", "\\u003c")
     return section("geometry", "Geometry", element("p", box, class_="controls") if "target" in names and len(names) > 1 else None, canvas,
                    keys, element("p", "; ".join(notes) + ".", class_="note") if notes else None, distances(geometry, names),
-                   Markup(f'<script type="application/json" id="view-data">{data}</script>'))
+                   data_for_scripts({**geometry.data(), "names": names}, id="view-data"))
 
 
 def distances(geometry, names):

@@ -1,13 +1,11 @@
 """Images over the iterations: for each gate a slider over image, target and difference; derivative images term by term."""
 
-import json
-
 import numpy as np
 
 from isochron.pictures.reading import Gates, read_stack, read_yaml
 from isochron.pictures.scales import pick_gates, scale_of
 from isochron.pictures.sheets import COMPONENTS
-from isochron.report.markup import Markup, element, join, number, section
+from isochron.report.markup import Markup, data_for_scripts, element, join, number, section
 from isochron.report.png import ColourScale, Scale, shrunk
 
 MOST_BYTES = 6e6  # of all pictures before they are compressed
@@ -98,11 +96,10 @@ class Viewer:
                                  aria_valuetext=self.steps[-1], aria_label=f"{self.title}: iteration"), class_="slider")
         # What a screen reader hears is the slider's text.
         output = element("p", f"{self.steps[-1]}{self.words[-1]}", class_="step", aria_hidden="true")
-        data = json.dumps({"steps": self.steps, "words": self.words, "pictures": self.data})
+        data = {"steps": self.steps, "words": self.words, "pictures": self.data}
         return element("article", element("h3", self.title), element("div", *self.figures, class_="pictures"), output,
                        slider if last > 0 else None,
-                       Markup(f'<script type="application/json">{data.replace("<", chr(92) + "u003c")}</script>'),
-                       class_="card viewer")
+                       data_for_scripts(data), class_="card viewer")
 
 
 def images_section(run):

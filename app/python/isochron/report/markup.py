@@ -1,6 +1,7 @@
 """HTML from Python: text is escaped unless it is markup already, so that no name in a file can become part of the page."""
 
 import html
+import json
 
 
 class Markup(str):
@@ -29,6 +30,11 @@ def element(tag, /, *children, **attributes):
             words.append(f'{key}="{html.escape(str(value))}"')
     start = Markup(f"<{' '.join(words)}>")
     return start if tag in VOID else Markup(f"{start}{join(children)}</{tag}>")
+
+
+def data_for_scripts(data, **attributes):
+    """JSON that the page's script reads; nothing in it can end the element."""
+    return element("script", Markup(json.dumps(data).replace("<", "\\u003c")), type="application/json", **attributes)
 
 
 def table(head, rows, caption=None, class_=None):
