@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Reports of small runs in headless Chromium: nothing on its console, nothing loaded, pictures there, sliders and keys that work.
+"""Reports of small runs in headless Chromium: nothing on its console, nothing loaded, pictures, sliders and keys that work.
 
 usage: report_browser_test.py PROGRAM FOLDER     screenshots are left in FOLDER
 """
@@ -33,15 +33,16 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 DRIVER = shutil.which("chromedriver")
 EXPERIMENTS = {
     "cube": ["optimizer.iterations=5"],
-    "letter": ["optimizer.iterations=1", "optimizer.inner_iterations=2", "target.samples=256", "output.histogram_samples=256",
-               "samples={primal: 16, interior: 16, visibility: 0, path_length: 0}"],
+    "letter": ["optimizer.iterations=1", "optimizer.inner_iterations=2", "target.samples=256",
+               "output.histogram_samples=256", "samples={primal: 16, interior: 16, visibility: 0, path_length: 0}"],
 }
 
 
 def open_browser():
     options = Options()
-    for argument in ("--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking", "--no-first-run",
-                     "--disable-component-update", "--force-color-profile=srgb", "--window-size=1280,1000"):
+    for argument in ("--headless=new", "--disable-gpu", "--disable-dev-shm-usage", "--disable-background-networking",
+                     "--no-first-run", "--disable-component-update", "--force-color-profile=srgb",
+                     "--window-size=1280,1000"):
         options.add_argument(argument)
     if os.geteuid() == 0:
         options.add_argument("--no-sandbox")  # which Chromium asks of root
@@ -71,7 +72,8 @@ class BrowserTest(unittest.TestCase):
             subprocess.run([PROGRAM, "run", ROOT / f"experiments/{name}.yaml", "-o", out, "--quiet", *changes], check=True,
                            stdout=subprocess.DEVNULL)
         cls.runs["comparison"] = pathlib.Path(folder.name) / "comparison.html"
-        subprocess.run([PROGRAM, "report", *(cls.runs[n].parent for n in EXPERIMENTS), "-o", cls.runs["comparison"], "--quiet"], check=True)
+        folders = [cls.runs[name].parent for name in EXPERIMENTS]
+        subprocess.run([PROGRAM, "report", *folders, "-o", cls.runs["comparison"], "--quiet"], check=True)
         cls.browser = open_browser()
         cls.addClassCleanup(cls.browser.quit)
 
@@ -86,8 +88,8 @@ class BrowserTest(unittest.TestCase):
 
     def open(self, name, scheme="light", media="", width=1280):
         # Without motion, so that what is clicked has arrived.
-        self.command("Emulation.setEmulatedMedia", media=media, features=[{"name": "prefers-color-scheme", "value": scheme},
-                                                                          {"name": "prefers-reduced-motion", "value": "reduce"}])
+        self.command("Emulation.setEmulatedMedia", media=media, features=[
+            {"name": "prefers-color-scheme", "value": scheme}, {"name": "prefers-reduced-motion", "value": "reduce"}])
         self.command("Emulation.setDeviceMetricsOverride", width=width, height=1000, deviceScaleFactor=1, mobile=False)
         self.browser.get(self.runs[name].as_uri())
 
@@ -106,7 +108,8 @@ class BrowserTest(unittest.TestCase):
 
     def assert_pictures_are_there(self):
         time.sleep(0.1)
-        self.assertEqual(self.script("return [...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.alt)"), [])
+        missing = self.script("return [...document.images].filter(i => !i.complete || !i.naturalWidth).map(i => i.alt)")
+        self.assertEqual(missing, [])
 
     def test_pictures_load_and_nothing_else(self):
         for name, least in (("cube", 12 + 4), ("letter", 3 + 1 + 4), ("comparison", 3)):
@@ -120,7 +123,11 @@ class BrowserTest(unittest.TestCase):
 
     def test_sliders_change_pictures(self):
         self.open("cube")
-        sliders, images = self.find("#images input[type=range]"), lambda: [i.get_attribute("src") for i in self.find("#images img")]
+        sliders = self.find("#images input[type=range]")
+
+        def images():
+            return [i.get_attribute("src") for i in self.find("#images img")]
+
         self.assertEqual(len(sliders), 4)
         last = images()
         sliders[3].send_keys(Keys.HOME)

@@ -65,8 +65,8 @@ class ReportTest(unittest.TestCase):
         write_run(self.folder)
         page = self.page()
         self.assertEqual([words for level, words in page.headings if level == 2],
-                         ["How it ended", "Parameters", "Convergence", "Images over the iterations", "Geometry", "What was asked",
-                          "Cost and versions"])
+                         ["How it ended", "Parameters", "Convergence", "Images over the iterations", "Geometry",
+                          "What was asked", "Cost and versions"])
         for words in ("All 20 iterations done", "translation of box", "albedo of white", "25 MB", "1e+06",
                       "scatter of the parameter", "as it was written", "gaussian"):
             self.assertIn(words, page.words)
@@ -81,7 +81,8 @@ class ReportTest(unittest.TestCase):
         self.assertEqual(len(page.all("svg")), 6)  # height, colour, loss, images, parameters, gradient
         self.assertEqual(len([p for p in page.all("line") if p.get("class", "").startswith("target")]), 4)
         view = json.loads(re.search(r'id="view-data">(.*?)</script>', self.text)[1])
-        self.assertEqual([(m["shape"], m["moment"]) for m in view["meshes"]], [("box", m) for m in ("initial", "current", "target")])
+        self.assertEqual([(m["shape"], m["moment"]) for m in view["meshes"]],
+                         [("box", m) for m in ("initial", "current", "target")])
         self.assertEqual(view["names"]["current"], "final")
         self.assertEqual([name for name, _ in view["marks"]], ["camera", "flash"])
         self.assertIn("initial 0.3 (at most 0.3), final 0.01", page.words)
@@ -90,7 +91,8 @@ class ReportTest(unittest.TestCase):
         write_run(self.folder, channels="RGB")
         derivatives = self.folder / "report/derivatives"
         derivatives.mkdir(parents=True)
-        parts = [images(v, component=f"{c}.") for c, v in (("total", 0.5), ("interior", 0.7), ("visibility", -0.2), ("path_length", 0))]
+        values = {"total": 0.5, "interior": 0.7, "visibility": -0.2, "path_length": 0}
+        parts = [images(value, component=f"{name}.") for name, value in values.items()]
         exr.write(derivatives / "height.exr", {k: v for part in parts for k, v in part.items()})
         (derivatives / "derivatives.yaml").write_text("summary: \"0\"\nsamples: 12\n")
         page = self.page()
@@ -144,12 +146,14 @@ class ReportTest(unittest.TestCase):
 
     def test_odd_values(self):
         write_run(self.folder)
-        for before, after in (("optimizer: {", "optimizer: 3 #"), ("samples: {primal", "samples: [1] #"), ("gates: {", "gates: 7 #"),
+        for before, after in (("optimizer: {", "optimizer: 3 #"), ("samples: {primal", "samples: [1] #"),
+                              ("gates: {", "gates: 7 #"),
                               ("loss: {", "loss: [] #"), ("target: {", "target: yes #"), ("initial: 0.3", "initial: {a: 1}"),
                               ("name: colour", "name: [1, 2]")):
             self.edit("experiment.yaml", before, after)
             self.page()
-        for before, after in (("iterations: 20", "iterations: many"), ("last_call: {", "last_call: 1 #"), ("height: 0.01", "height: high"),
+        for before, after in (("iterations: 20", "iterations: many"), ("last_call: {", "last_call: 1 #"),
+                              ("height: 0.01", "height: high"),
                               ("loss_final: 0.01", "loss_final: [1]"), ("parameters:", "standard_errors: 3\nparameters:")):
             self.edit("summary.yaml", before, after)
             self.page()
@@ -188,17 +192,19 @@ class ReportTest(unittest.TestCase):
     def test_capture(self):
         write_capture_run(self.folder)
         page = self.page()
-        for words in ("lower bound of the standard error", "Slice over time: row 2", "Histograms", "drawn from it", "± 0.0005"):
+        for words in ("lower bound of the standard error", "Slice over time: row 2", "Histograms", "drawn from it",
+                      "± 0.0005"):
             self.assertIn(words, page.words)
         self.assertEqual(self.viewers()[0]["steps"], ["iteration 0", "iteration 1", "final, after iteration 2"])
-        self.assertIn("seen from the wall", page.words)
+        self.assertIn("Seen from the wall", page.words)
         (self.folder / "final.h5").unlink()  # not finished
         self.assertNotIn("Histograms", self.page().words)
 
     def test_several_runs(self):
         write_run(self.folder)
         write_run(self.top / "other", name="box")
-        (self.top / "other/experiment.yaml").write_text((self.top / "other/experiment.yaml").read_text().replace("0.03", "0.06"))
+        other = self.top / "other/experiment.yaml"
+        other.write_text(other.read_text().replace("0.03", "0.06"))
         write_log(self.top / "other", 12)
         write_run(self.top / "colours", name="colours", channels="RGB")
         page = self.page(self.folder, self.top / "other", self.top / "colours", output=self.top / "c.html")
@@ -244,7 +250,8 @@ class ReportTest(unittest.TestCase):
         self.assertGreater(len(few), 500)
         np.testing.assert_allclose(moments[1] - moments[0], np.tile([0, 0, 1], (len(moments[0]), 1)), atol=1e-9)
         box = np.array([[a, b, c] for a in (0, 1) for b in (0, 1) for c in (0, 1)], float)
-        faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
+        faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6),
+                 (0, 6, 4), (1, 5, 7), (1, 7, 3)]
         self.assertEqual(len(outline(box, np.array(faces))), 12)
 
     def test_is_quick(self):

@@ -39,7 +39,8 @@ def main(arguments):
     parser.add_argument("-o", "--output", type=pathlib.Path)
     options = parser.parse_args(arguments)
     single = len(options.folders) == 1
-    output = options.output or (pathlib.Path(options.folders[0]) / "report.html" if single else pathlib.Path("comparison.html"))
+    usual = pathlib.Path(options.folders[0]) / "report.html" if single else pathlib.Path("comparison.html")
+    output = options.output or usual
     try:
         runs = [Run(folder) for folder in options.folders]
         write(output, run_page(runs[0]) if single else comparison_page(runs))

@@ -1,5 +1,5 @@
-"""What is particular to runs of captures: histograms of points of the wall, slices through all points over time, what was found as
-who stands at the wall sees it, and how well the fit explains the counts."""
+"""What is particular to runs of captures: histograms of points of the wall, slices through all points over time, what was
+found as who stands at the wall sees it, and how well the fit explains the counts."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from isochron.pictures.reading import PlotError
 from isochron.pictures.scales import scale_of
 from isochron.report.charts import Chart, Series, grid
 from isochron.report.images import Viewer, row_of, slice_of
-from isochron.report.markup import Markup, element, join, number, section, table
+from isochron.report.markup import Markup, element, join, number, section, some_of, table
 from isochron.report.png import Scale, figure_uri
 
 DEVIATIONS = 4.0  # end of the scale of residuals
@@ -32,7 +32,7 @@ def slices(run):
     target = run.images.get("target")
     if not frames or target is None or run.gates is None:
         return None
-    frames = [frames[i] for i in sorted({int(round(i)) for i in np.linspace(0, len(frames) - 1, min(len(frames), MOST_SLICES))})]
+    frames = some_of(frames, MOST_SLICES)
     where = row_of(run.shape)[1]
     counts = slice_of(target)
     scale = Scale("inferno", 0.0, scale_of(counts, slice_of(frames[-1][2])))
@@ -46,9 +46,9 @@ def slices(run):
     viewer.add("image", [scale.uri(slice_of(image)) for _, _, image in frames], style)
     viewer.add("target" if run.map("target").get("capture") is None else "counts", scale.uri(counts), style)
     viewer.add("residual", [signed.uri(r) for r in rest], style)
+    of_residual = "(counts − image) / √image, in standard deviations" if poisson else "target − image"
     words = (f"To the right: sensor points, {counts.shape[1]}. Downwards: {run.gates.axis}, "
-             f"{number(centres[0], 5)} to {number(centres[-1], 5)}. "
-             + ("Residual: (counts − image) / √image, in standard deviations." if poisson else "Residual: target − image."))
+             f"{number(centres[0], 5)} to {number(centres[-1], 5)}. Residual: {of_residual}.")
     return element("div", viewer.html(), scale.bar(run.quantity),
                    signed.bar("residual, blue where the image is too bright"), element("p", words, class_="note"))
 
@@ -99,8 +99,9 @@ def views(capture, chosen):
         lines = draw_views(figure, capture, chosen, with_box=False)
         uri = figure_uri(figure)
         plt.close(figure)
-    alt = "What was found, seen from the wall: albedo and depth where they are unknowns, and the filtered back-projection of the counts"
-    picture = element("figure", element("img", src=uri, alt=alt, class_="paper"), element("figcaption", alt + "."), class_="card wide")
+    alt = "Seen from the wall: albedo and depth where they are unknowns, and the filtered back-projection of the counts"
+    picture = element("figure", element("img", src=uri, alt=alt, class_="paper"), element("figcaption", alt + "."),
+                      class_="card wide")
     return join([element("h3", "What was found"), picture, element("div", *boxes(lines), class_="boxes")])
 
 

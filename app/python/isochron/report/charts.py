@@ -13,7 +13,8 @@ MOST_POINTS, MOST_ROWS = 400, 12
 
 
 class Series:
-    """y over x. `band`: half the height of a strip around it. `target`: a dashed line. `error`: half of the bar at its end."""
+    """y over x. `band`: half the height of a strip around it. `target`: a dashed line. `final`: where it ends, with a bar of
+    ± `error`."""
 
     def __init__(self, name, x, y, band=None, target=None, error=None, final=None):
         self.name, self.x, self.y = name, np.asarray(x, float), np.asarray(y, float)
@@ -88,9 +89,9 @@ class Chart:
         right, bottom = WIDTH - RIGHT, self.bottom
         parts = []
         for tick in (log_ticks(10**self.y0, 10**self.y1) if self.log else nice_ticks(self.y0, self.y1)):
-            y = float(self._y(np.float64(tick)))
+            y, words = float(self._y(np.float64(tick))), number(0 if abs(tick) < 1e-300 else tick)
             parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}"/>'
-                         f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{number(0 if abs(tick) < 1e-300 else tick)}</text>')
+                         f'<text x="{LEFT - 6}" y="{y + 4:.1f}" text-anchor="end">{words}</text>')
         for tick in nice_ticks(self.x0, self.x1, 6):
             if self.times is not None and abs(tick - round(tick)) > 1e-9:
                 continue  # no half iterations
@@ -102,9 +103,9 @@ class Chart:
                 parts.append(f'<text class="quiet" x="{x:.1f}" y="{bottom + 31}" text-anchor="middle">'
                              f'{number(self.times[row], 3)} s</text>')
         parts.append(f'<line class="axis" x1="{LEFT}" x2="{right}" y1="{bottom}" y2="{bottom}"/>')
-        middle = (TOP + bottom) / 2
-        parts.append(f'<text x="{(LEFT + right) / 2:.0f}" y="{self.height - 8}" text-anchor="middle">{escape(self.x_label)}</text>')
-        parts.append(f'<text transform="translate(13,{middle:.0f}) rotate(-90)" text-anchor="middle">{escape(self.y_label)}</text>')
+        for place, words in ((f'x="{(LEFT + right) / 2:.0f}" y="{self.height - 8}"', self.x_label),
+                             (f'transform="translate(13,{(TOP + bottom) / 2:.0f}) rotate(-90)"', self.y_label)):
+            parts.append(f'<text {place} text-anchor="middle">{escape(words)}</text>')
         return parts
 
     def _line(self, s, index):
@@ -130,12 +131,14 @@ class Chart:
             pen = True
         parts.append(f'<path class="line {colour}" d="{"".join(words)}"/>')
         if np.isfinite(y).sum() <= 30 and not self.steps:
-            parts += [f'<circle class="dot {colour}" cx="{a:.1f}" cy="{b:.1f}" r="2.5"/>' for a, b in zip(x, y) if np.isfinite(b)]
+            parts += [f'<circle class="dot {colour}" cx="{a:.1f}" cy="{b:.1f}" r="2.5"/>' for a, b in zip(x, y)
+                      if np.isfinite(b)]
         if s.final is not None and np.isfinite(s.final) and not (self.log and s.final <= 0):
             a, b = x[-1], float(self._y(np.float64(s.final)))
             if s.error is not None and np.isfinite(s.error) and not self.log:
                 low, high = (float(self._y(np.float64(s.final + sign * s.error))) for sign in (-1, 1))
-                parts.append(f'<path class="error {colour}" d="M{a:.1f} {low:.1f}V{high:.1f}M{a - 4:.1f} {low:.1f}h8M{a - 4:.1f} {high:.1f}h8"/>')
+                ends = "".join(f"M{a - 4:.1f} {end:.1f}h8" for end in (low, high))
+                parts.append(f'<path class="error {colour}" d="M{a:.1f} {low:.1f}V{high:.1f}{ends}"/>')
             parts.append(f'<circle class="final {colour}" cx="{a:.1f}" cy="{b:.1f}" r="4"/>')
         return "".join(parts)
 
@@ -179,10 +182,11 @@ class Chart:
         clip = f"clip-{self.key}"
         lines = "".join(self._line(s, i) for i, s in enumerate(self.series))
         rows = [thinned(len(s.x)) for s in self.series]
-        data = json.dumps({"left": LEFT, "right": RIGHT, "x0": self.x0, "x1": self.x1, "bottom": self.bottom, "label": self.x_label,
-                           "series": [{"name": s.name, "x": [round(float(v), 6) for v in s.x[r]],
-                                       "y": [None if not np.isfinite(v) else float(f"{v:.5g}") for v in s.y[r]]}
-                                      for s, r in zip(self.series, rows)]})
+        data = json.dumps({"left": LEFT, "right": RIGHT, "x0": self.x0, "x1": self.x1, "bottom": self.bottom,
+                           "label": self.x_label, "series": [
+                               {"name": s.name, "x": [round(float(v), 6) for v in s.x[r]],
+                                "y": [float(f"{v:.5g}") if np.isfinite(v) else None for v in s.y[r]]}
+                               for s, r in zip(self.series, rows)]})
         svg = Markup(f'<svg viewBox="0 0 {WIDTH} {self.height}" role="img" aria-labelledby="{self.key}-t {self.key}-d" '
                      f'class="chart" data-chart="{escape(data)}"><title id="{self.key}-t">{escape(self.title)}</title>'
                      f'<desc id="{self.key}-d">{escape(self.description())}</desc>'

@@ -56,7 +56,8 @@ def last_of(run, column):
 def results(runs, labels):
     rows = [["state", *(run.state_words for run in runs)], ["iterations", *(run.done for run in runs)],
             ["time in iterations", *(seconds(last_of(run, "seconds")) for run in runs)]]
-    for column, name in (("loss", "loss"), ("image_rmse", "image RMSE"), ("param_rmse", "error of parameters (units of scale)")):
+    for column, name in (("loss", "loss"), ("image_rmse", "image RMSE"),
+                         ("param_rmse", "error of parameters (units of scale)")):
         rows.append([name, *(number(last_of(run, column)) for run in runs)])
     for key, name, unit in (("rays", "rays of the last call", 1.0), ("peak_memory_bytes", "most memory (MB)", 1e6)):
         last = [run.summary.get("last_call") for run in runs]
@@ -66,7 +67,8 @@ def results(runs, labels):
     cells = [parameter_cells(run) for run in runs]
     for name in dict.fromkeys(name for c in cells for name in c):
         rows.append([name, *(c.get(name, "–") for c in cells)])
-    return section("results", "Results", table(["", *labels], rows, "How the runs ended", "asked"), *(notes(run) for run in runs))
+    return section("results", "Results", table(["", *labels], rows, "How the runs ended", "asked"),
+                   *(notes(run) for run in runs))
 
 
 def parameter_cells(run):
@@ -113,32 +115,29 @@ def images(runs, labels):
     stacks = [image for _, _, image in alike] + ([target] if target is not None else [])
     columns = [("target", target)] if target is not None else []
     columns += [(label, image) for label, _, image in alike]
-    scale = ColourScale(scale_of(*stacks)) if target is not None and target.ndim == 4 else Scale("inferno", 0.0, scale_of(*stacks))
+    high = scale_of(*stacks)
+    scale = ColourScale(high) if stacks[0].ndim == 4 else Scale("inferno", 0.0, high)
     if first.is_capture:
         gates, style = [(row_of(first.shape)[1], slice_of)], "aspect-ratio:0.8"
     else:
         factor = max(1, -(-max(first.shape[1:3]) // 256))
-        gates = [(first.gates.label(g) if first.gates is not None else str(g), lambda stack, g=g: small(stack[g], factor))
+        gates = [(first.gates.label(g) if first.gates is not None else str(g), lambda stack, g=g: shrunk(stack[g], factor))
                  for g in pick_gates(MOST_GATES, *stacks)]
         style = f"aspect-ratio:{first.shape[2]}/{first.shape[1]}"
+    style_of_row = f"grid-template-columns:repeat({max(3, len(columns))},minmax(0,1fr))"
     rows = []
     for label, view in gates:
         cells = []
         for name, image in columns:
-            rest = "" if target is None or image is target else f", RMS difference {number(root_mean_square(grey(view(image) - view(target))), 3)}"
+            rest = ""
+            if target is not None and image is not target:
+                rest = f", RMS difference {number(root_mean_square(grey(view(image) - view(target))), 3)}"
             cells.append(element("figure", element("img", src=scale.uri(view(image)), alt=f"{name}, {label}", style=style),
                                  element("figcaption", f"{name}{rest}")))
         rows.append(element("article", element("h3", f"Gate at {label}" if not first.is_capture else label),
-                            element("div", *cells, class_="side", style=f"grid-template-columns:repeat({max(3, len(columns))},minmax(0,1fr))"),
-                            class_="card wide"))
-    note = f"Of another shape, not shown: {', '.join(others)}." if others else ""
-    return section("images", "Images side by side", scale.bar(first.quantity), *rows, element("p", note, class_="note") if note else None)
-
-
-def small(image, factor):
-    if factor == 1:
-        return image
-    return np.moveaxis(shrunk(np.moveaxis(image, -1, 0), factor), 0, -1) if image.ndim == 3 else shrunk(image, factor)
+                            element("div", *cells, class_="side", style=style_of_row), class_="card wide"))
+    note = element("p", f"Of another shape, not shown: {', '.join(others)}.", class_="note") if others else None
+    return section("images", "Images side by side", scale.bar(first.quantity), *rows, note)
 
 
 def comparison_page(runs):

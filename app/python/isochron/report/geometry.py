@@ -1,4 +1,4 @@
-"""The shapes that moved, initial, current and target, within the outlines of the scene: data of a view that can be turned."""
+"""The shapes that moved, initial, current and target, within the outlines of the scene: the data of a view that turns."""
 
 import base64
 import re
@@ -46,7 +46,7 @@ def coarser(moments, triangles):
         few = few[(few != np.roll(few, 1, axis=1)).all(axis=1)]
         if len(few) <= MOST_TRIANGLES:
             counts = np.bincount(inverse)
-            merged = [np.stack([np.bincount(inverse, p[:, k]) for k in range(3)], axis=1) / counts[:, np.newaxis] for p in moments]
+            merged = [np.stack([np.bincount(inverse, p[:, k]) / counts for k in range(3)], axis=1) for p in moments]
             return merged, few
         cells = cells * 4 // 5
     return moments, triangles
@@ -165,7 +165,7 @@ class Geometry:
                    "edges": packed(outline(m["points"], m["triangles"], FOLDED), "<u4")} for m in self.meshes]
         lines = [{"points": packed(p, "<f4"), "pairs": packed(pairs, "<u4")} for p, pairs in self.lines]
         return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, 3.6 * near),
-                "up": self.up.tolist(), "back": back.tolist(), "marks": [[name, list(map(float, at))] for name, at in self.marks]}
+                "up": self.up.tolist(), "back": back.tolist(), "marks": [[name, at.tolist()] for name, at in self.marks]}
 
 
 MOMENTS = ("initial", "current", "target")
@@ -175,7 +175,8 @@ def geometry_section(run):
     geometry = Geometry(run)
     if not geometry.meshes:
         return Markup("")
-    names = {m: "final" if m == "current" and run.ended else m for m in MOMENTS if any(mesh["moment"] == m for mesh in geometry.meshes)}
+    present = {mesh["moment"] for mesh in geometry.meshes}
+    names = {m: "final" if m == "current" and run.ended else m for m in MOMENTS if m in present}
     box = element("label", element("input", type="checkbox", checked=True, id="edges"), " ",
                   element("span", class_="key m-target", aria_hidden="true"), " the target's edges in every view")
     shapes = ", ".join(geometry.moved)
@@ -183,11 +184,13 @@ def geometry_section(run):
              "other shapes as outlines.")
     canvas = element("canvas", words, id="view", width="1200", height="440", tabindex="0", role="img", aria_label=words,
                      aria_describedby="view-keys")
-    keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: as at first.", class_="note", id="view-keys")
-    notes = [f"{', '.join(geometry.coarse)}: drawn coarser than {'it is' if len(geometry.coarse) == 1 else 'they are'}"] if geometry.coarse else []
+    keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: as at first.", class_="note",
+                   id="view-keys")
+    notes = [f"{name}: drawn coarser than it is" for name in geometry.coarse]
     notes += geometry.notes
-    return section("geometry", "Geometry", element("p", box, class_="controls") if "target" in names and len(names) > 1 else None, canvas,
-                   keys, element("p", "; ".join(notes) + ".", class_="note") if notes else None, distances(geometry, names),
+    controls = element("p", box, class_="controls") if "target" in names and len(names) > 1 else None
+    return section("geometry", "Geometry", controls, canvas, keys,
+                   element("p", "; ".join(notes) + ".", class_="note") if notes else None, distances(geometry, names),
                    data_for_scripts({**geometry.data(), "names": names}, id="view-data"))
 
 
@@ -205,5 +208,6 @@ def distances(geometry, names):
                 away = np.linalg.norm(moments[name][0] - target, axis=1)
                 words.append(f"{names[name]} {np.sqrt(np.mean(away**2)):.3g} (at most {away.max():.3g})")
         if words:
-            items.append(element("li", f"{shape}: vertices' RMS distance from the target's: {', '.join(words)}, in scene units"))
+            distance = ", ".join(words)
+            items.append(element("li", f"{shape}: vertices' RMS distance from the target's: {distance}, in scene units"))
     return element("ul", *items, class_="note") if items else None

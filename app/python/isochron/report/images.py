@@ -5,7 +5,7 @@ import numpy as np
 from isochron.pictures.reading import Gates, read_stack, read_yaml
 from isochron.pictures.scales import pick_gates, scale_of
 from isochron.pictures.sheets import COMPONENTS
-from isochron.report.markup import Markup, data_for_scripts, element, join, number, section
+from isochron.report.markup import Markup, data_for_scripts, element, number, section, some_of
 from isochron.report.png import ColourScale, Scale, shrunk
 
 MOST_BYTES = 6e6  # of all pictures before they are compressed
@@ -44,17 +44,13 @@ class Plan:
                 gates = max(2, gates * 2 // 3)
             else:
                 count = max(3, count * 2 // 3)
-        self.frames = [frames[i] for i in sorted({int(round(i)) for i in np.linspace(0, len(frames) - 1, count)})]
+        self.frames = some_of(frames, count)
         stacks = [run.images[n] for n in ("target", "initial", "final") if n in run.images]
         self.gates = pick_gates(gates, *stacks)
         self.left_out = run.shape[0] - len(self.gates)
 
     def view(self, image):
         """One gate's image at the size in which it is shown."""
-        if self.factor == 1:
-            return image
-        if image.ndim == 3:
-            return np.moveaxis(shrunk(np.moveaxis(image, -1, 0), self.factor), 0, -1)
         return shrunk(image, self.factor)
 
 
@@ -129,10 +125,12 @@ def images_section(run):
         words += f"Pixels are means over {plan.factor} x {plan.factor}. "
     if len(plan.frames) == 1:
         words += "The run kept no images over its iterations. "
-    together = element("p", element("label", element("input", type="checkbox", checked=True, id="together"),
-                                    " move all gates together"), class_="controls") if len(viewers) > 1 and len(frames) > 1 else None
-    return section("images", "Images over the iterations", *notes, element("p", words, class_="note") if words else None, together,
-                   element("div", *viewers, class_="viewers"))
+    if words:
+        notes.append(element("p", words, class_="note"))
+    if len(viewers) > 1 and len(frames) > 1:
+        box = element("input", type="checkbox", checked=True, id="together")
+        notes.append(element("p", element("label", box, " move all gates together"), class_="controls"))
+    return section("images", "Images over the iterations", *notes, element("div", *viewers, class_="viewers"))
 
 
 def grey_stack(stack):
@@ -176,7 +174,8 @@ def derivatives_section(run):
     if not blocks:
         return Markup("")
     left_out = f" The first 8 of {len(paths)}." if len(paths) > 8 else ""
-    note = f"Derivatives of the images, {words}. Each is the sum of the terms below it; red: more light as the parameter grows.{left_out}"
+    note = (f"Derivatives of the images, {words}. Each is the sum of the terms below it; red: more light as the parameter "
+            f"grows.{left_out}")
     return section("derivatives", "Derivative images, term by term", element("p", note, class_="note"), *blocks)
 
 
@@ -196,7 +195,7 @@ def derivative_of(run, name, stacks):
         gates = pick_gates(FEW_GATES, *drawn.values())
         factor = max(1, -(-max(first.shape[1:3]) // 128))
         labels = run.gates if run.gates is not None and run.gates.count == len(first) else Gates(len(first))
-        views = {c: [(labels.label(g), shrunk(s[g], factor) if factor > 1 else s[g]) for g in gates] for c, s in drawn.items()}
+        views = {c: [(labels.label(g), shrunk(s[g], factor)) for g in gates] for c, s in drawn.items()}
         style, words = f"aspect-ratio:{first.shape[2]}/{first.shape[1]}", ""
     bound = scale_of(*(values for row in views.values() for _, values in row))
     scale = Scale("RdBu_r", -bound, bound)

@@ -20,7 +20,7 @@ VOID = {"img", "input", "meta", "link", "br"}
 
 
 def element(tag, /, *children, **attributes):
-    """An element; `class_`, `for_` and data_x become class, for and data-x. True is an attribute without a value, None none."""
+    """An element; `class_`, `for_` and data_x become class, for and data-x. True: an attribute alone; None: none."""
     words = [tag]
     for key, value in attributes.items():
         key = key.rstrip("_").replace("_", "-")
@@ -57,6 +57,12 @@ def section(key, title, *children):
     if not children:
         return Markup("")
     return element("section", element("h2", title, id=f"{key}-title"), *children, id=key, aria_labelledby=f"{key}-title")
+
+
+def some_of(items, most):
+    """At most so many, evenly spread from the first to the last."""
+    count = len(items)
+    return items if count <= most else [items[i * (count - 1) // max(1, most - 1)] for i in range(most)]
 
 
 def number(value, digits=4):

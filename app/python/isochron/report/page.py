@@ -6,7 +6,7 @@ from isochron.pictures.reading import PlotError
 from isochron.report.capture import capture_section
 from isochron.report.geometry import geometry_section
 from isochron.report.images import derivatives_section, images_section
-from isochron.report.markup import Markup, element, join
+from isochron.report.markup import Markup, element
 from isochron.report.results import convergence_section, ending, headline, parameters_section
 from isochron.report.settings import asked_section, cost_section, in_short
 
@@ -20,6 +20,10 @@ TITLES = {"asked": "What was asked", "ended": "How it ended", "parameters": "Par
           "cost": "Cost and versions", "results": "Results", "differences": "Settings that differ", "curves": "Curves"}
 
 
+# Nothing is loaded from anywhere.
+POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+
+
 def document(title, header, sections):
     """The whole file; `sections` is key to markup, and empty ones are left out."""
     sections = {key: markup for key, markup in sections.items() if markup}
@@ -27,10 +31,8 @@ def document(title, header, sections):
     head = element("head", element("meta", charset="utf-8"),
                    element("meta", name="viewport", content="width=device-width, initial-scale=1"),
                    element("meta", name="color-scheme", content="light dark"),
-                   # Nothing is loaded from anywhere.
-                   element("meta", http_equiv="Content-Security-Policy",
-                           content="default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"),
-                   element("title", title), element("link", rel="icon", href="data:,"), element("style", resource("page.css")))
+                   element("meta", http_equiv="Content-Security-Policy", content=POLICY), element("title", title),
+                   element("link", rel="icon", href="data:,"), element("style", resource("page.css")))
     body = element("body", element("a", "To the content", href="#content", class_="skip"), header,
                    element("nav", element("ul", *links), aria_label="Sections"),
                    element("main", *sections.values(), id="content"), element("script", resource("page.js")))
@@ -49,8 +51,8 @@ def attempt(run, build):
 def run_page(run):
     header = element("header", element("h1", run.name), element("p", f"isochron, run in {run.directory}", class_="quiet"),
                      element("p", in_short(run)))
-    builders = [parameters_section, convergence_section, capture_section, images_section, geometry_section, derivatives_section,
-                asked_section, cost_section]
+    builders = [parameters_section, convergence_section, capture_section, images_section, geometry_section,
+                derivatives_section, asked_section, cost_section]
     if run.is_capture and "target" in run.images:
         builders.remove(images_section)  # of hundreds of bins; slices show them
     sections = {build.__name__.removesuffix("_section"): attempt(run, build) for build in builders}

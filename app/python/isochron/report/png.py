@@ -76,8 +76,10 @@ def figure_uri(figure, dpi=100):
     return data_uri(image)
 
 
-def shrunk(values, factor):
-    """Means over blocks of pixels of [..., height, width] (colour: [..., height, width, 3] with `axis` -3)."""
-    height, width = (n // factor * factor for n in values.shape[-2:])
-    blocks = values[..., :height, :width].reshape(*values.shape[:-2], height // factor, factor, width // factor, factor)
-    return blocks.mean(axis=(-3, -1))
+def shrunk(image, factor):
+    """Means over blocks of pixels of one image, grey or of three colours."""
+    if factor == 1:
+        return image
+    height, width = (n // factor for n in image.shape[:2])
+    blocks = image[:height * factor, :width * factor].reshape(height, factor, width, factor, *image.shape[2:])
+    return blocks.mean(axis=(1, 3))

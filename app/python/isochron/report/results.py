@@ -3,7 +3,7 @@
 import numpy as np
 
 from isochron.report.charts import Chart, Series, grid
-from isochron.report.markup import element, escape, join, number, section, seconds, table
+from isochron.report.markup import element, join, number, section, seconds, table
 
 MOST_ROWS = 4  # components of a parameter that are listed one by one
 MOST_WORST = 3
@@ -11,13 +11,16 @@ MOST_CHARTS, MOST_LINES = 12, 8
 TAIL = (5, 100)  # rows over which the scatter is taken: a quarter of all, within these bounds
 
 MEANING = {
-    "gauss_newton_matrix": "± in the table: standard error by the loss's Gauss–Newton matrix at the end (for counts: by photon noise), "
-                           "all parameters unknown together.",
-    "gauss_newton_diagonal": "± in the table: a lower bound of the standard error (for counts: by photon noise), as if all other "
-                             "parameters were known, from the diagonal of the loss's Gauss–Newton matrix. What acts alike, as a relief and a tilt, can "
-                             "be off by far more.",
-    "scatter": "± in the table: scatter of the parameter over the last quarter of the iterations (5 to 100 rows), that is by how much the "
-               "optimiser's noise moves it; how far it is from the truth it does not say.",
+    "gauss_newton_matrix":
+        "± in the table: standard error by the loss's Gauss–Newton matrix at the end (for counts: by photon noise), all "
+        "parameters unknown together.",
+    "gauss_newton_diagonal":
+        "± in the table: a lower bound of the standard error (for counts: by photon noise), as if all other parameters were "
+        "known, from the diagonal of the loss's Gauss–Newton matrix. What acts alike, as a relief and a tilt, can be off by "
+        "far more.",
+    "scatter":
+        "± in the table: scatter of the parameter over the last quarter of the iterations (5 to 100 rows), that is by how "
+        "much the optimiser's noise moves it; how far it is from the truth it does not say.",
 }
 
 
@@ -87,8 +90,8 @@ def parameters_section(run):
     notes = [element("p", MEANING[kind], class_="note") for kind in kinds if kind in MEANING]
     unknown = [name for name, u in uncertainties.items() if u.values is None]
     if unknown:
-        notes.append(element("p", f"± of {', '.join(unknown)} is not known: this solver gives none, and log.csv has no scatter of "
-                             "its numbers (too few rows, or their norm alone).", class_="note"))
+        notes.append(element("p", f"± of {', '.join(unknown)} is not known: this solver gives none, and log.csv has no "
+                             "scatter of its numbers (too few rows, or their norm alone).", class_="note"))
     if any(p.count > MOST_ROWS and p.found is not None for p in run.parameters):
         notes.append(spread(run))
     charts = [parameter_chart(run, p, uncertainties[p.name], i) for i, p in enumerate(run.parameters[:MOST_CHARTS])]
@@ -162,8 +165,8 @@ def convergence_section(run):
     charts, noise = [], log.get("loss_noise")
     if "loss" in log:
         charts.append(Chart("loss", "Loss", [Series("", x, log["loss"], band=noise)], "iteration", "loss", log=True,
-                            times=log.get("seconds"), note="Strip: ± its standard error. An estimate without bias, which can come out "
-                            "negative; a logarithmic axis has gaps there."))
+                            times=log.get("seconds"), note="Strip: ± its standard error. An estimate without bias, which "
+                            "can come out negative; a logarithmic axis has gaps there."))
     if "image_rmse" in log:
         values = np.where(log["image_rmse"] > 0, log["image_rmse"], np.nan)
         charts.append(Chart("image", "Images against the target", [Series("", x, values)], "iteration", "RMSE", log=True,
@@ -184,7 +187,8 @@ def headline(run):
     log, tiles = run.log, []
 
     def tile(name, text, small=""):
-        tiles.append(element("div", element("dt", name), element("dd", text, element("span", small, class_="quiet") if small else None)))
+        small = element("span", small, class_="quiet") if small else None
+        tiles.append(element("div", element("dt", name), element("dd", text, small)))
 
     def change(column, summary):
         values = log.get(column)
@@ -224,12 +228,12 @@ def ending(run):
     share = run.summary.get("noise_share")
     if run.ended and isinstance(share, float):
         words.append(f"Noise makes {100 * share:.0f} % of the loss's variance over the last rows.")
-    return join([element("p", element("span", run.state, class_=f"badge {run.state}"), " ", " ".join(words), class_="ending"),
-                 notes(run)])
+    badge = element("span", run.state, class_=f"badge {run.state}")
+    return join([element("p", badge, " ", " ".join(words), class_="ending"), notes(run)])
 
 
 def notes(run):
     if not run.notes:
         return ""
-    return element("div", element("p", "What could not be read:"), element("ul", *(element("li", escape(n)) for n in run.notes)),
-                   class_="warning", role="note")
+    lines = (element("li", note) for note in run.notes)
+    return element("div", element("p", "What could not be read:"), element("ul", *lines), class_="warning", role="note")

@@ -1,4 +1,4 @@
-"""A run's folder as it is at this moment: finished, going on, broken off or damaged. What cannot be read is said in `notes`."""
+"""A run's folder as it is at this moment: finished, going on, broken off or damaged. `notes` say what cannot be read."""
 
 import csv
 import pathlib
@@ -74,7 +74,7 @@ class Run:
         self.summary = self.read(read_yaml, "summary.yaml") or {}
         self.log = self.read(read_log, "log.csv") or {}
         self.folder = self.read(lambda path: Folder(self.directory), "experiment.yaml")
-        self.scene = (self.read(read_yaml, str(self.experiment.get("scene", ""))) if self.scene_path.is_file() else None) or {}
+        self.scene = (self.read(read_yaml, self.experiment["scene"]) if self.scene_path.is_file() else None) or {}
         self._find_state()
         self._read_parameters()
         self._read_images()
@@ -121,8 +121,8 @@ class Run:
             self.state, self.state_words = "interrupted", f"interrupted after {self.done} of {self.iterations} iterations"
         else:
             self.state = "unfinished"
-            self.state_words = (f"not ended: {self.done} of {self.iterations} iterations so far, and no process here works on it; "
-                                f"it was killed, or runs on another machine{self._age()}")
+            self.state_words = (f"not ended: {self.done} of {self.iterations} iterations so far, and no process here works "
+                                f"on it; it was killed, or runs on another machine{self._age()}")
 
     def _age(self):
         try:

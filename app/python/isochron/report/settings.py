@@ -7,6 +7,8 @@ import numpy as np
 
 from isochron.report.markup import Markup, element, number, section, seconds, table
 
+SETTINGS = ("scene", "resolution", "max_bounces", "gates", "target", "samples", "estimator", "gradient", "loss", "optimizer",
+            "seed")
 MOST_TEXT = 60000  # characters of a file that are shown
 
 
@@ -34,7 +36,8 @@ def in_short(run):
     if run.shape is not None:
         height, width = run.shape[1:3]
         kind = str(run.map("gates").get("kind", ""))
-        words.append(f"{width} x {height} {'sensor points' if run.is_capture else 'pixels'}, {run.shape[0]} gates{f' ({kind})' if kind else ''}")
+        words.append(f"{width} x {height} {'sensor points' if run.is_capture else 'pixels'}, {run.shape[0]} gates"
+                     f"{f' ({kind})' if kind else ''}")
     method, loss = run.map("optimizer").get("method"), run.map("loss").get("kind")
     if method:
         words.append(f"{str(method).replace('_', ' ')}{f', {loss} loss' if loss else ''}")
@@ -43,8 +46,7 @@ def in_short(run):
 
 def asked_section(run):
     e = run.experiment
-    rows = [(key, short(e[key], 200)) for key in ("scene", "resolution", "max_bounces", "gates", "target", "samples", "estimator",
-                                                  "gradient", "loss", "optimizer", "seed") if e.get(key) not in (None, {}, [])]
+    rows = [(key, short(e[key], 200)) for key in SETTINGS if e.get(key) not in (None, {}, [])]
     for p in run.parameters:
         rest = {k: v for k, v in p.spec.items() if k not in ("name", "type")}
         rows.append((f"parameter {p.name}", f"{p.kind}: {short(rest)}"))
