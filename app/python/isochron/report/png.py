@@ -72,8 +72,7 @@ def figure_uri(figure, dpi=100):
     data = io.BytesIO()
     figure.savefig(data, format="png", dpi=dpi)
     data.seek(0)
-    image = Image.open(data).convert("RGB").quantize(200)
-    return data_uri(image)
+    return data_uri(Image.open(data).convert("RGB"))
 
 
 def shrunk(image, factor):
