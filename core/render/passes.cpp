@@ -101,7 +101,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   EllipsoidalConnections connections(worker, lengths), camera_lengths(worker, single_lengths),
       camera_pairs(worker, pairs);
   StandardPaths standard(worker, lengths.pairs);
-  const SamplePoints points(pass.stream, pass.range, options.numbers);
+  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
   const PointSet of_lengths = points.of_image(Technique::camera_lengths);
   const PointSet of_pairs = points.of_image(Technique::camera_pairs);
   for_each_pixel(partition, scene.camera.pixels(), [&](int pixel) {
@@ -130,7 +130,7 @@ void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partitio
                from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
                from_light_rate = guide_->rate(BoundaryGuide::from_light),
                from_camera_rate = guide_->rate(BoundaryGuide::from_camera);
-  const SamplePoints points(pass.stream, pass.range, options.numbers);
+  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
   const PointSet of_edges = points.of_image(Technique::primary_edge);
   const PointSet of_borders = points.of_image(Technique::pixel_border);
   const PointSet of_segments = points.of_image(Technique::from_edge);

@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <mutex>
 #include <optional>
 
@@ -13,6 +14,7 @@
 #include "core/render/scene_cache.h"
 #include "core/techniques/boundary_guide.h"
 #include "core/techniques/gate_pick.h"
+#include "core/techniques/sample_points.h"
 #include "core/techniques/target_lengths.h"
 #include "core/techniques/worker.h"
 
@@ -21,9 +23,18 @@ namespace isochron {
 /// Pixels that a partition takes at a turn.
 inline constexpr int kPixelsPerBlock = 8;
 
-/// One of `count` partitions of the work of a pass: every partition takes its turn at the blocks of pixels.
+/// One of `count` partitions of the work of a pass, a power of two. They take turns at the blocks of pixels; where there are
+/// fewer blocks than partitions, several share a block, each with a part of its pixels' samples.
 struct Partition {
   int index, count;
+
+  static int blocks(int pixels) { return (pixels + kPixelsPerBlock - 1) / kPixelsPerBlock; }
+  /// Parts of the image that the partitions have: powers of two, at most one of them for each.
+  int pixel_parts(int pixels) const {
+    return std::min(count, static_cast<int>(std::bit_ceil(static_cast<unsigned>(blocks(pixels)))));
+  }
+  int pixel_part(int pixels) const { return index % pixel_parts(pixels); }
+  SamplePart samples(int pixels) const { return {index / pixel_parts(pixels), count / pixel_parts(pixels)}; }
 };
 
 /// A pass over samples [range) of every pixel.
@@ -74,8 +85,8 @@ class Passes {
   /// Runs f(pixel) for the pixels of one partition, in a fixed order.
   template <class F>
   static void for_each_pixel(Partition partition, int pixels, F&& f) {
-    const int stride = partition.count * kPixelsPerBlock;
-    for (int block = partition.index * kPixelsPerBlock; block < pixels; block += stride)
+    const int stride = partition.pixel_parts(pixels) * kPixelsPerBlock;
+    for (int block = partition.pixel_part(pixels) * kPixelsPerBlock; block < pixels; block += stride)
       for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) f(pixel);
   }
 

@@ -24,15 +24,19 @@ struct Renderer::Impl : Passes {
     return GatedImage(scene.camera.width, scene.camera.height, gates.size(), scene.scene.grey ? 1 : 3);
   }
 
-  /// run(partition) of every partition, whose samples add to pixels of their own alone, and so need no sums.
+  /// Whether there are enough of them for partitions that have their pixels for themselves.
+  bool has_many_pixels() const { return Partition::blocks(scene.pixels()) >= kFewestPartitions; }
+
+  /// run(partition) of every partition, whose samples add to pixels of its own alone, and so need no sums.
   template <class Run>
   void run_in_pixels(std::span<GatedImage> images, Run&& run) const {
-    const RankPart own = part_of_rank(rank(), kMostPartitions);
-    parallel(own.end - own.begin, [&](int i) { run(Partition{own.begin + i, kMostPartitions}); });
-    std::vector<int> partitions(kMostPartitions);
+    const int count = Partition{0, kMostPartitions}.pixel_parts(scene.pixels());
+    const RankPart own = part_of_rank(rank(), count);
+    parallel(own.end - own.begin, [&](int i) { run(Partition{own.begin + i, count}); });
+    std::vector<int> partitions(count);
     std::iota(partitions.begin(), partitions.end(), 0);
     const auto exchange = [&](int partition, auto&& values_of_pixel) {
-      for_each_pixel({partition, kMostPartitions}, scene.pixels(), [&](int pixel) {
+      for_each_pixel({partition, count}, scene.pixels(), [&](int pixel) {
         for (GatedImage& image : images) {
           const std::size_t values = image.data.size() / static_cast<std::size_t>(image.pixels());
           values_of_pixel(&image.data[pixel * values], values);
@@ -42,10 +46,10 @@ struct Renderer::Impl : Passes {
     complete(
         partitions,
         [&](Packer& packer, int partition) {
-          exchange(partition, [&](const double* values, std::size_t count) { packer.put(values, count); });
+          exchange(partition, [&](const double* values, std::size_t n) { packer.put(values, n); });
         },
         [&](Unpacker& unpacker, int partition) {
-          exchange(partition, [&](double* values, std::size_t count) { unpacker.get(values, count); });
+          exchange(partition, [&](double* values, std::size_t n) { unpacker.get(values, n); });
         });
   }
 
@@ -129,7 +133,7 @@ void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange
     PrimalSink sink(impl_->gates, film);
     impl_->run_images({stream, range}, partition, sink);
   };
-  if (pixels_are_independent()) {
+  if (pixels_are_independent() && impl_->has_many_pixels()) {
     impl_->run_in_pixels({&image, 1}, [&](Partition partition) { run(image, partition); });
     return;
   }
@@ -153,7 +157,7 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
     TangentSink sink(impl_->gates, impl_->scene.layout, *impl_->basis, films);
     impl_->run_term(term, {stream, range}, partition, impl_->every_gate, sink);
   };
-  if (pixels_are_independent(term)) {
+  if (pixels_are_independent(term) && impl_->has_many_pixels()) {
     const std::vector<Film> films(images.begin(), images.end());
     impl_->run_in_pixels(images, [&](Partition partition) { run(films, partition); });
     return images;
@@ -197,8 +201,10 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
       by_partition, [](Packer& packer, const std::vector<double>& part) { packer.put(part); },
       [](Unpacker& unpacker, std::vector<double>& part) { unpacker.get(part); });
   sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
-  // Whatever the number of partitions, a multiple of kGradientParts, each part is of the same pixels, see part_of.
-  for (std::size_t i = 0; i < by_partition.size(); ++i) add_to((*parts)[i % kGradientParts], by_partition[i]);
+  // Whatever the number of partitions, each part is of the same pixels, see part_of.
+  const int pixels = impl_->scene.pixels();
+  for (int i = 0; i < static_cast<int>(by_partition.size()); ++i)
+    add_to((*parts)[Partition{i, partitions}.pixel_part(pixels) % kGradientParts], by_partition[i]);
 }
 
 ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange range) const {
