@@ -106,6 +106,7 @@ class ReportTest(unittest.TestCase):
             fcntl.flock(lock, fcntl.LOCK_EX)
             page = self.page()
         self.assertIn("Still going: iteration 8 of 20", page.words)
+        self.assertEqual(page.headings[1], (2, "Where it stands"))
         self.assertIn("now", [data for tag, data in page.texts if tag == "th"])
         self.assertIn("0.05", page.words)  # the checkpoint's
         self.assertEqual(self.viewers()[0]["steps"][-1], "iteration 8")

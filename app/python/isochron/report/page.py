@@ -6,7 +6,7 @@ from isochron.pictures.reading import PlotError
 from isochron.report.capture import capture_section
 from isochron.report.geometry import geometry_section
 from isochron.report.images import derivatives_section, images_section
-from isochron.report.markup import Markup, element
+from isochron.report.markup import Markup, element, section
 from isochron.report.results import convergence_section, ending, headline, parameters_section
 from isochron.report.settings import asked_section, cost_section, in_short
 
@@ -15,8 +15,8 @@ def resource(name):
     return Markup((importlib.resources.files("isochron.report") / name).read_text(encoding="utf-8"))
 
 
-TITLES = {"asked": "What was asked", "ended": "How it ended", "parameters": "Parameters", "convergence": "Convergence",
-          "capture": "The capture", "images": "Images", "geometry": "Geometry", "derivatives": "Derivatives",
+TITLES = {"asked": "What was asked", "ended": "How it ended", "stands": "Where it stands",
+          "parameters": "Parameters", "convergence": "Convergence", "capture": "The capture", "images": "Images", "geometry": "Geometry", "derivatives": "Derivatives",
           "cost": "Cost and versions", "results": "Results", "differences": "Settings that differ", "curves": "Curves"}
 
 
@@ -57,6 +57,6 @@ def run_page(run):
         builders.remove(images_section)  # of hundreds of bins; slices show them
     sections = {build.__name__.removesuffix("_section"): attempt(run, build) for build in builders}
     # Last, as it lists what could not be read.
-    ended = element("section", element("h2", "How it ended", id="ended-title"), ending(run), headline(run), id="ended",
-                    aria_labelledby="ended-title")
-    return document(f"{run.name}: {run.state}", header, {"ended": ended, **sections})
+    key = "ended" if run.ended or run.state == "interrupted" else "stands"
+    return document(f"{run.name}: {run.state}", header,
+                    {key: section(key, TITLES[key], ending(run), headline(run)), **sections})

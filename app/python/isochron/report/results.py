@@ -20,7 +20,7 @@ MEANING = {
         "far more.",
     "scatter":
         "± in the table: scatter of the parameter over the last quarter of the iterations (5 to 100 rows), that is by how "
-        "much the optimiser's noise moves it; how far it is from the truth it does not say.",
+        "much the optimiser's noise, and what drift there is, moves it; how far it is from the truth it does not say.",
 }
 
 
