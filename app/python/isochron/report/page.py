@@ -15,9 +15,10 @@ def resource(name):
     return Markup((importlib.resources.files("isochron.report") / name).read_text(encoding="utf-8"))
 
 
-TITLES = {"asked": "What was asked", "ended": "How it ended", "stands": "Where it stands",
-          "parameters": "Parameters", "convergence": "Convergence", "capture": "The capture", "images": "Images", "geometry": "Geometry", "derivatives": "Derivatives",
-          "cost": "Cost and versions", "results": "Results", "differences": "Settings that differ", "curves": "Curves"}
+TITLES = {"asked": "What was asked", "ended": "How it ended", "stands": "Where it stands", "parameters": "Parameters",
+          "convergence": "Convergence", "capture": "The capture", "images": "Images", "geometry": "Geometry",
+          "derivatives": "Derivatives", "cost": "Cost and versions", "results": "Results",
+          "differences": "Settings that differ", "curves": "Curves"}
 
 
 # Nothing is loaded from anywhere.
