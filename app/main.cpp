@@ -64,6 +64,7 @@ int run_program(int argc, char** argv) {
   isochron::Action action;
   isochron::add_run(app, action);
   isochron::add_resume(app, action);
+  isochron::add_report(app, action);
   isochron::add_render(app, action);
   isochron::add_derive(app, action);
   isochron::add_gradient(app, action);

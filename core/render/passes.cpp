@@ -228,6 +228,7 @@ void Passes::learn() const {
 void Passes::count(const Worker& worker) const {
   rays_ += worker.rays;
   arcs_ += worker.arcs;
+  if (cache_) cache_->count_rays(worker.rays);
 }
 
 }  // namespace isochron

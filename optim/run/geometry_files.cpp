@@ -54,9 +54,18 @@ void GeometryFiles::write(const std::string& moment, const std::vector<double>& 
   for (const File& file : files_) {
     const Shape& shape = scene.shapes[file.shape];
     if (!all_known(scene, shape)) continue;
-    write_file_atomically(fmt::format("{}/{}_{}.{}", folder_, moment, file.name, format.name),
-                          format.write(scene, shape));
+    write_file_atomically(path(moment, file), format.write(scene, shape));
   }
+}
+
+void GeometryFiles::remove(const std::string& moment) const {
+  on_first_rank([&] {
+    for (const File& file : files_) std::filesystem::remove(path(moment, file));
+  });
+}
+
+std::string GeometryFiles::path(const std::string& moment, const File& file) const {
+  return fmt::format("{}/{}_{}.{}", folder_, moment, file.name, output_.geometry);
 }
 
 void GeometryFiles::write_iteration(int iteration, const std::vector<double>& theta) const {
