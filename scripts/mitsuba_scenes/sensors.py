@@ -62,17 +62,14 @@ def slope(sensor, film, report):
     """Half the image's width at the distance 1. Fails where the camera is none of ours."""
     if sensor.type != "perspective":
         sensor.fail("no such sensor here (allowed: perspective, or an nlos_capture_meter on a rectangle)")
-    near, axes = sensor.number("near_clip", 0.01), sensor.transform()[:3, :3]
-    sensor.ignore("far_clip", "focus_distance", "shutter_open", "shutter_close")
+    axes = sensor.transform()[:3, :3]
+    sensor.ignore("near_clip", "far_clip", "focus_distance", "shutter_open", "shutter_close")
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-5):
         sensor.fail("its to_world scales", "to_world")
     if np.linalg.det(axes) < 0:
         sensor.fail("its to_world mirrors the image", "to_world")
     if sensor.number("principal_point_offset_x", 0) or sensor.number("principal_point_offset_y", 0):
         sensor.fail("its principal point is not in the middle")
-    if film.bins:
-        report.note(sensor.place, f"{sensor}: paths begin at the pinhole here; mitransient itself counts from the near "
-                    f"plane, {near:g} less in the middle of the image")
     result = np.tan(np.radians(field_of_view(sensor, film)) / 2) * crop_of(sensor, film)
     report.refuse_rest(sensor)
     return result
@@ -80,6 +77,10 @@ def slope(sensor, film, report):
 
 def camera(sensor, film, report):
     """Our camera's lines."""
+    if film.bins:
+        near = sensor.number("near_clip", 0.01)
+        report.note(sensor.place, f"{sensor}: paths begin at the pinhole here; mitransient itself counts from the near "
+                    f"plane, {near:g} less in the middle of the image")
     fov = 2 * np.degrees(np.arctan(slope(sensor, film, report)))
     to_world = sensor.transform()
     position, axes = to_world[:3, 3], to_world[:3, :3]
