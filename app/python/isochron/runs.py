@@ -6,28 +6,10 @@ import pathlib
 from typing import Any
 
 import numpy as np
-import yaml
 
 from isochron.errors import InputError
 from isochron.image import Coordinates, Image
-from isochron.pictures.reading import Folder, PlotError, read_log, read_stack
-
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in Python alone, a number per sensor point takes seconds
-
-
-def read_yaml(path: pathlib.Path) -> dict[str, Any]:
-    try:
-        data = yaml.load(path.read_text(encoding="utf-8"), LOADER)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise PlotError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict):
-        raise PlotError(f"{path}: no keys")
-    return data
-
-
-def numbers(values: Any) -> np.ndarray:
-    """A value or a list of them; YAML takes 1e-05 for text."""
-    return np.array([float(v) for v in (values if isinstance(values, list) else [values])])
+from isochron.pictures.reading import Folder, PlotError, numbers, read_log, read_stack, read_yaml
 
 
 def read_values(directory: pathlib.Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:

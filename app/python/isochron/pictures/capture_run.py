@@ -9,9 +9,9 @@ from isochron import exr
 from isochron.captures import read_capture
 from isochron.errors import InputError
 from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
-from isochron.pictures.reading import PlotError
+from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
-from isochron.runs import numbers, read_values, read_yaml
+from isochron.runs import read_values
 
 METRES_PER_PS = 299792458e-12
 METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time; light's way in it
