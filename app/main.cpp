@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "app/commands.h"
+#include "app/man_pages.h"
 #include "app/progress.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
@@ -71,6 +72,8 @@ int main(int argc, char** argv) {
   isochron::add_inspect(app, action);
   isochron::add_chart(app, action);
   isochron::add_stability(app, action);
+  isochron::add_plot(app, action);
+  isochron::add_man_pages_option(app);
   try {
     app.parse(argc, argv);
     return flushed(action());

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "app/interrupt.h"
+#include "app/package_folder.h"
 
 extern char** environ;
 
@@ -31,7 +32,7 @@ std::string last_line(std::string text) {
 std::vector<std::string> environment_with_package() {
   constexpr std::string_view kVariable = "PYTHONPATH=";
   std::vector<std::string> variables;
-  std::string path = std::string(kVariable) + ISOCHRON_PYTHON_PACKAGES;
+  std::string path = std::string(kVariable) + package_folder();
   for (char** variable = environ; *variable; ++variable) {
     if (std::string_view(*variable).starts_with(kVariable)) {
       path += std::string(":") + (*variable + kVariable.size());
@@ -89,7 +90,7 @@ bool run_module(const std::string& module, const std::string& folder) {
   }
   if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
   if (interrupted()) {
-    spdlog::warn("plots: interrupted; draw them with: scripts/{}.py {}", module.substr(module.find('.') + 1), argument);
+    spdlog::warn("plots: interrupted; draw them with: isochron plot {}", argument);
     return false;
   }
   spdlog::warn("plots: {} failed: {}", module, last_line(messages));
