@@ -85,7 +85,8 @@ std::string top(const std::string& name, const std::string& version, const std::
 
 std::string options_of(const CLI::App& app) {
   std::string arguments, options;
-  for (const CLI::Option* option : app.get_options(shown)) (option->get_positional() ? arguments : options) += item(*option);
+  for (const CLI::Option* option : app.get_options(shown))
+    (option->get_positional() ? arguments : options) += item(*option);
   return (arguments.empty() ? "" : ".SH ARGUMENTS\n" + arguments) + ".SH OPTIONS\n" + options;
 }
 
@@ -101,14 +102,16 @@ std::string command_page(const CLI::App& command, const std::string& version) {
          ".SH SEE ALSO\n.BR isochron (1)\n";
 }
 
-std::string program_page(const CLI::App& app, const std::vector<const CLI::App*>& commands, const std::string& version) {
+std::string program_page(const CLI::App& app, const std::vector<const CLI::App*>& commands,
+                         const std::string& version) {
   std::string list;
   for (const CLI::App* command : commands)
-    list += ".TP\n" + bold("isochron " + command->get_name()) + "\n" + plain(command->get_description()) + "; see\n.BR " +
-            plain("isochron-" + command->get_name()) + " (1)\n";
+    list += ".TP\n" + bold("isochron " + command->get_name()) + "\n" + plain(command->get_description()) +
+            "; see\n.BR " + plain("isochron-" + command->get_name()) + " (1)\n";
   return top("isochron", version, app.get_description()) + ".SH SYNOPSIS\n" + bold("isochron") + " " +
          italic("COMMAND") + " [" + italic("OPTIONS") + "]\n.SH COMMANDS\n" + list + options_of(app) +
-         ".SH EXIT STATUS\n0 when the work was done, 1 when it failed, 2 when the input cannot be used.\n" + footer(app);
+         ".SH EXIT STATUS\n0 when the work was done, 1 when it failed, 2 when the input cannot be used.\n" +
+         footer(app);
 }
 
 void write_man_pages(const CLI::App& app, const std::string& folder) {

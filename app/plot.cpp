@@ -1,10 +1,9 @@
-#include "app/plots.h"
-
 #include <filesystem>
 #include <memory>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
+#include "app/plots.h"
 
 namespace isochron {
 namespace {

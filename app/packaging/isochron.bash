@@ -28,13 +28,20 @@ _isochron() {
   fi
   [[ -n $takes ]] || takes="$(awk '/^[^ ]/ {list = /^Positionals:/} list && /^  [a-z]/ {print $2; exit}' <<<"$help")"
   case "$takes" in
-    DIR) compopt -o filenames 2>/dev/null; COMPREPLY=($(compgen -d -- "$word")) ;;
     POINT) COMPREPLY=($(compgen -W "initial target" -- "$word")) ;;
     *:{*}*) takes="${takes#*\{}"; COMPREPLY=($(compgen -W "${takes%%\}*}" -- "$word")) ;;
-    *.*)
-      compopt -o filenames 2>/dev/null
-      COMPREPLY=($(compgen -f -X "!*.${takes##*.}" -- "$word") $(compgen -d -- "$word"))
-      ;;
+    DIR) _isochron_files ;;
+    *.*) _isochron_files "*.${takes##*.}" ;;
   esac
 }
+
+# Folders that the word begins, and files that match a pattern.
+_isochron_files() {
+  compopt -o filenames
+  mapfile -t COMPREPLY < <(
+    compgen -d -- "$word"
+    (($# == 0)) || compgen -f -X "!$1" -- "$word"
+  )
+}
+
 complete -F _isochron isochron
