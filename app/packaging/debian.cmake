@@ -20,6 +20,7 @@ set(CPACK_ISOCHRON_NATIVE ${ISOCHRON_NATIVE})
 set(CPACK_ISOCHRON_PREFIX ${CMAKE_INSTALL_PREFIX})
 
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "inverse rendering for time-of-flight cameras
 Renders time-gated images with all orders of reflection, differentiates them with respect to anything in the scene,
