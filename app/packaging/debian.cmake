@@ -23,10 +23,11 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "inverse rendering for time-of-flight cameras
-Renders time-gated images with all orders of reflection, differentiates them with respect to anything in the scene,
-and reconstructs scenes from measured images and histograms of photons.
+Renders time-gated images with all orders of reflection, differentiates them
+with respect to anything in the scene, and reconstructs scenes from measured
+images and histograms of photons.
 .
-The package holds the program, its Python package, and libraries and headers for C++.")
+Holds the program, its Python package, and libraries and headers for C++.")
 # Shared libraries by dpkg-shlibdeps; for Python what the package imports.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS python3 python3-h5py python3-matplotlib python3-numpy python3-scipy python3-yaml)
