@@ -2,7 +2,6 @@
 # optimisation, where it is asked for.
 include(CMakeFindDependencyMacro)
 find_dependency(embree 3.13 CONFIG)
-find_dependency(Imath CONFIG)
 find_dependency(OpenEXR 3.1 CONFIG)
 find_dependency(yaml-cpp 0.7 CONFIG)
 enable_language(C)  # FindHDF5 compiles a program in C

@@ -86,14 +86,21 @@ class InstallTest(unittest.TestCase):
         self.assertRegex(text, r"iteration 2: .*\niterations_reached\n")
         self.assertTrue((out / "run/final.exr").exists())
 
-    def test_unknown_component(self):
+    def configure(self, *lines):
+        """CMake's exit status and messages on a project that looks for isochron."""
         folder = self.scratch()
-        (folder / "CMakeLists.txt").write_text(
-            "cmake_minimum_required(VERSION 3.25)\nproject(x CXX)\nfind_package(isochron REQUIRED COMPONENTS rendering)\n")
+        (folder / "x.cpp").write_text("int main() {}")
+        (folder / "CMakeLists.txt").write_text("\n".join(["cmake_minimum_required(VERSION 3.25)", "project(x CXX)", *lines]))
         command = [CMAKE, "-S", folder, "-B", folder / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}"]
         result = subprocess.run(command, capture_output=True, text=True, check=False)
-        self.assertNotEqual(result.returncode, 0)
-        self.assertIn("isochron has no component rendering", result.stderr)
+        return result.returncode, " ".join(result.stderr.split())
+
+    def test_components(self):
+        core_alone = ["find_package(isochron 0.2 REQUIRED)", "add_executable(x x.cpp)", "target_link_libraries(x isochron::core)"]
+        self.assertEqual(self.configure(*core_alone), (0, ""))
+        status, errors = self.configure("find_package(isochron REQUIRED COMPONENTS rendering)")
+        self.assertNotEqual(status, 0)
+        self.assertIn("isochron has no component rendering (allowed: core, optim)", errors)
 
     def test_manual(self):
         self.assertIn("run", self.commands)
