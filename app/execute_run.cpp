@@ -28,7 +28,8 @@ int execute_run(const std::string& folder, const CommonOptions& common, bool for
     spdlog::warn("interrupted; go on with: isochron resume {}", folder);
     return 1;
   }
-  const bool plotted = common.no_plots || draw_plots(folder);
+  bool plotted = common.no_plots || draw_plots(folder);
+  plotted = (common.no_plots || write_report(folder)) && plotted;
   if (!common.quiet) fmt::print("{}{}", report, files_to_look_at(folder, !common.no_plots && plotted));
   if (status == RunStatus::diverged) {
     spdlog::error("{}: the run diverged; see log.csv and summary.yaml there", folder);

@@ -17,9 +17,11 @@
 #include "app/commands.h"
 #include "app/man_pages.h"
 #include "app/progress.h"
+#include "app/start_ranks.h"
 #include "core/base/error.h"
 #include "core/base/parallel.h"
 #include "core/base/progress.h"
+#include "core/base/ranks.h"
 #include "core/base/yaml_reader.h"
 #include "optim/problem/problem.h"
 
@@ -50,9 +52,7 @@ std::string one_line(std::string text) {
   return text;
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   isochron::keep_freed_memory();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of its write
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
@@ -65,6 +65,7 @@ int main(int argc, char** argv) {
   isochron::Action action;
   isochron::add_run(app, action);
   isochron::add_resume(app, action);
+  isochron::add_report(app, action);
   isochron::add_render(app, action);
   isochron::add_derive(app, action);
   isochron::add_gradient(app, action);
@@ -75,6 +76,7 @@ int main(int argc, char** argv) {
   isochron::add_plot(app, action);
   isochron::add_man_pages_option(app);
   try {
+    isochron::start_ranks();
     app.parse(argc, argv);
     return flushed(action());
   } catch (const CLI::Success& request) {
@@ -89,11 +91,18 @@ int main(int argc, char** argv) {
   } catch (const isochron::Interrupted&) {
     spdlog::error("interrupted, nothing more was written");
     return 1;
-  } catch (const std::bad_alloc&) {
-    spdlog::error("out of memory: lower resolution, the number of gates or unknowns, or threads");
-    return 1;
-  } catch (const std::exception& error) {
+  } catch (const isochron::SharedError& error) {
     spdlog::error("{}", one_line(error.what()));
     return 1;
+  } catch (const std::bad_alloc&) {
+    return isochron::fail_alone("out of memory: lower resolution, the number of gates or unknowns, or threads");
+  } catch (const std::exception& error) {
+    return isochron::fail_alone(one_line(error.what()));
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return isochron::end_ranks(run_program(argc, argv));
 }

@@ -17,7 +17,7 @@ void add_session_options(CLI::App& command, CommonOptions& options) {
       ->check(CLI::Range(0, 4096))
       ->type_name("N");
   command.add_flag("--quiet", options.quiet, "only warnings and errors");
-  command.add_flag("--no-plots", options.no_plots, "write no PNG");
+  command.add_flag("--no-plots", options.no_plots, "write no PNG and no report");
 }
 
 void add_experiment_options(CLI::App& command, CommonOptions& options) {

@@ -1,6 +1,7 @@
 #include "app/plots.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
@@ -14,8 +15,11 @@
 #include <string_view>
 #include <vector>
 
+#include "app/final_derivatives.h"
+#include "app/installation.h"
 #include "app/interrupt.h"
-#include "app/package_folder.h"
+#include "core/base/progress.h"
+#include "core/base/ranks.h"
 
 extern char** environ;
 
@@ -44,20 +48,28 @@ std::vector<std::string> environment_with_package() {
   return variables;
 }
 
-/// Runs a module of the package isochron with a folder as its argument.
-bool run_module(const std::string& module, const std::string& folder) {
-  // A folder named -x must not be taken for an option.
-  const std::string argument = folder.front() == '-' ? "./" + folder : folder;
+/// How a module of the package isochron ended.
+struct ModuleResult {
+  int status = -1;      ///< of its exit; -1 where it could not start, or was stopped
+  std::string message;  ///< the last line of its standard error
+};
+
+/// A folder named -x must not be taken for an option.
+std::string as_path(const std::string& folder) {
+  return folder.starts_with('-') ? "./" + folder : folder;
+}
+
+/// Runs a module of the package isochron.
+ModuleResult run_module(const std::string& module, const std::vector<std::string>& more) {
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) {
-    spdlog::warn("plots: cannot start: {}", std::strerror(errno));
-    return false;
-  }
+  if (pipe2(ends, O_CLOEXEC) != 0) return {-1, fmt::format("cannot start: {}", std::strerror(errno))};
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  std::array<const char*, 5> arguments = {"/usr/bin/python3", "-m", module.c_str(), argument.c_str(), nullptr};
+  std::vector<const char*> arguments = {"/usr/bin/python3", "-m", module.c_str()};
+  for (const std::string& argument : more) arguments.push_back(argument.c_str());
+  arguments.push_back(nullptr);
   const std::vector<std::string> variables = environment_with_package();
   std::vector<const char*> environment;
   for (const std::string& variable : variables) environment.push_back(variable.c_str());
@@ -81,30 +93,65 @@ bool run_module(const std::string& module, const std::string& folder) {
     }
   }
   close(ends[0]);
-  if (error != 0) {
-    spdlog::warn("plots: cannot start {}: {}", arguments[0], std::strerror(error));
-    return false;
-  }
+  if (error != 0) return {-1, fmt::format("cannot start {}: {}", arguments[0], std::strerror(error))};
   int status = 0;
   while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (WIFEXITED(status) && WEXITSTATUS(status) == 0) return true;
-  if (interrupted()) {
-    spdlog::warn("plots: interrupted; draw them with: isochron plot {}", argument);
-    return false;
-  }
-  spdlog::warn("plots: {} failed: {}", module, last_line(messages));
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, last_line(messages)};
+}
+
+/// Runs a module with a folder as its argument. On failure warns in one line and returns false.
+bool draw(const std::string& module, const std::string& folder) {
+  const ModuleResult result = run_module(module, {as_path(folder)});
+  if (result.status == 0) return true;
+  if (interrupted())
+    spdlog::warn("plots: interrupted; draw them with: isochron plot {}", as_path(folder));
+  else
+    spdlog::warn("plots: {} failed: {}", module, result.message);
   return false;
 }
 
 }  // namespace
 
 bool draw_plots(const std::string& folder) {
-  return run_module("isochron.plot", folder);
+  return !first_rank() || draw("isochron.plot", folder);
 }
 
 bool draw_charts(const std::string& folder) {
-  return run_module("isochron.plot_chart", folder);
+  return !first_rank() || draw("isochron.plot_chart", folder);
+}
+
+bool write_report(const std::string& folder) {
+  try_final_derivatives(folder);
+  if (!first_rank()) return true;
+  const ModuleResult result = run_module("isochron.report", {as_path(folder)});
+  if (result.status == 0) return true;
+  if (interrupted())
+    spdlog::warn("report: interrupted; write it with: isochron report {}", folder);
+  else
+    spdlog::warn("report: failed: {}", result.message);
+  return false;
+}
+
+void try_final_derivatives(const std::string& folder) {
+  try {
+    write_final_derivatives(folder);
+  } catch (const Interrupted&) {
+  } catch (const std::exception& error) {
+    spdlog::warn("report: without derivative images: {}", error.what());
+  }
+}
+
+int run_report(std::vector<std::string> arguments) {
+  if (!first_rank()) return 0;
+  for (std::string& argument : arguments)
+    if (argument != "--output") argument = as_path(argument);
+  const ModuleResult result = run_module("isochron.report", arguments);
+  if (result.status == 0)
+    spdlog::info("wrote {}", result.message);
+  else
+    spdlog::error("{}", interrupted() ? "interrupted, nothing was written" : result.message);
+  return result.status < 0 ? 1 : result.status;
 }
 
 }  // namespace isochron

@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <vector>
 
 namespace isochron {
 
@@ -7,5 +8,13 @@ namespace isochron {
 bool draw_plots(const std::string& folder);
 /// The same with isochron.plot_chart, for what `chart` and `stability` write.
 bool draw_charts(const std::string& folder);
+
+/// Writes FOLDER/report.html with isochron.report, for which derivative images are rendered (see final_derivatives.h). On
+/// failure warns in one line and returns false.
+bool write_report(const std::string& folder);
+/// write_final_derivatives(), with a warning in place of an exception.
+void try_final_derivatives(const std::string& folder);
+/// Runs isochron.report, reports what it wrote or what is wrong, and returns its exit status.
+int run_report(std::vector<std::string> arguments);
 
 }  // namespace isochron

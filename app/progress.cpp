@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "core/base/progress.h"
+#include "core/base/ranks.h"
 
 namespace isochron {
 namespace {
@@ -59,8 +60,8 @@ void keep_messages_off_the_bar() {
   sinks.push_back(std::make_shared<BarGuard>(-1));
 }
 
-ProgressDisplay::ProgressDisplay(bool quiet) : terminal_(isatty(STDERR_FILENO) == 1), ended_(quiet) {
-  if (!quiet) thread_ = std::thread([this] { watch(); });
+ProgressDisplay::ProgressDisplay(bool quiet) : terminal_(isatty(STDERR_FILENO) == 1), ended_(quiet || !first_rank()) {
+  if (!ended_) thread_ = std::thread([this] { watch(); });
 }
 
 ProgressDisplay::~ProgressDisplay() {

@@ -30,15 +30,16 @@ images and histograms of photons.
 Holds the program, its Python package, and libraries and headers for C++.")
 # Shared libraries by dpkg-shlibdeps; for Python what the package imports.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PACKAGE_DEPENDS python3 python3-h5py python3-matplotlib python3-numpy python3-scipy python3-yaml)
+set(CPACK_DEBIAN_PACKAGE_DEPENDS python3 python3-h5py python3-matplotlib python3-numpy python3-pil python3-scipy
+    python3-yaml)
 if(TARGET isochron_python)  # compiled for one version of Python
   set(Python3_EXECUTABLE /usr/bin/python3)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   math(EXPR next "${Python3_VERSION_MINOR} + 1")
   list(APPEND CPACK_DEBIAN_PACKAGE_DEPENDS "python3 (>= 3.${Python3_VERSION_MINOR})" "python3 (<< 3.${next})")
 endif()
-# What find_package(isochron) asks for.
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS
+# mpirun, and what find_package(isochron) asks for.
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS openmpi-bin
     cmake g++ libceres-dev libembree-dev libfmt-dev libhdf5-dev libopenexr-dev libspdlog-dev libtbb-dev libyaml-cpp-dev)
 list(JOIN CPACK_DEBIAN_PACKAGE_DEPENDS ", " CPACK_DEBIAN_PACKAGE_DEPENDS)
 list(JOIN CPACK_DEBIAN_PACKAGE_SUGGESTS ", " CPACK_DEBIAN_PACKAGE_SUGGESTS)

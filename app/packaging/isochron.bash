@@ -30,7 +30,8 @@ _isochron() {
   case "$takes" in
     POINT) COMPREPLY=($(compgen -W "initial target" -- "$word")) ;;
     *:{*}*) takes="${takes#*\{}"; COMPREPLY=($(compgen -W "${takes%%\}*}" -- "$word")) ;;
-    DIR) _isochron_files ;;
+    DIR*) _isochron_files ;;
+    FILE) _isochron_files "*" ;;
     *.*) _isochron_files "*.${takes##*.}" ;;
   esac
 }

@@ -1,13 +1,15 @@
-// CPU seconds of this process so far, all threads.
+// CPU seconds of this process so far, all threads; of all ranks (ranks.h), which meet here: what they decide by it is the same.
 #pragma once
 #include <time.h>
+
+#include "core/base/ranks.h"
 
 namespace isochron {
 
 inline double cpu_seconds() {
   timespec now;
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  return sum_over_ranks(static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec));
 }
 
 }  // namespace isochron

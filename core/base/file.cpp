@@ -16,6 +16,7 @@
 #include <stdexcept>
 
 #include "core/base/error.h"
+#include "core/base/ranks.h"
 
 namespace isochron {
 namespace {
@@ -86,9 +87,7 @@ int open_regular_file(const std::string& path, std::size_t& size, std::string& p
   return -1;
 }
 
-}  // namespace
-
-void write_file_atomically(const std::string& path, const std::string& contents) {
+void write_here(const std::string& path, const std::string& contents) {
   std::string temporary;
   const int descriptor = create_beside(path, temporary);
   if (descriptor < 0) fail_to_write(path, errno);
@@ -102,7 +101,7 @@ void write_file_atomically(const std::string& path, const std::string& contents)
   flush_folder(path);
 }
 
-std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {
+std::optional<std::string> read_here(const std::string& path, std::string& problem) {
   std::string contents;
   std::size_t size = 0;
   const int descriptor = open_regular_file(path, size, problem);
@@ -123,11 +122,35 @@ std::optional<std::string> read_regular_file(const std::string& path, std::strin
   return contents;
 }
 
+}  // namespace
+
+void write_file_atomically(const std::string& path, const std::string& contents) {
+  on_first_rank([&] { write_here(path, contents); });
+}
+
+std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {
+  if (rank_count() == 1) return read_here(path, problem);
+  constexpr char kRead = 'r', kProblem = 'p';
+  std::string answer = from_first_rank([&] {
+    const std::optional<std::string> contents = read_here(path, problem);
+    return contents ? kRead + *contents : kProblem + problem;
+  });
+  const bool read = answer[0] == kRead;
+  answer.erase(0, 1);
+  problem = read ? "" : answer;
+  if (!read) return std::nullopt;
+  return answer;
+}
+
 bool is_regular_file(const std::string& path, std::string& problem) {
   std::size_t size = 0;
   const int descriptor = open_regular_file(path, size, problem);
   if (descriptor >= 0) ::close(descriptor);
   return descriptor >= 0;
+}
+
+bool file_exists(const std::string& path) {
+  return !from_first_rank([&]() -> std::string { return std::filesystem::exists(path) ? "yes" : ""; }).empty();
 }
 
 std::string checksum(std::string_view contents) {

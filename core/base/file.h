@@ -5,6 +5,8 @@
 
 namespace isochron {
 
+// Files are those of rank 0 (ranks.h), which tells the others what it found.
+
 /// Writes a whole file or nothing: to a temporary file beside it, which is flushed to the disk and then
 /// renamed. A reader, or a run after a crash, sees the old contents or the new. Leaves no temporary file behind
 /// where it fails, and throws with path and reason: InputError where the path is at fault (no such folder, no
@@ -15,8 +17,10 @@ void write_file_atomically(const std::string& path, const std::string& contents)
 /// waits: a named pipe or a device is refused.
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem);
 
-/// Whether `read_regular_file` would open it, for libraries that read files themselves; else the reason in `problem`.
+/// Whether this rank's `read_regular_file` would open it, for libraries that read files themselves; else the reason in `problem`.
 bool is_regular_file(const std::string& path, std::string& problem);
+
+bool file_exists(const std::string& path);
 
 /// FNV-1a, 64 bits, as 16 hexadecimal digits: tells files apart that were torn or edited, no protection against
 /// intent.

@@ -1,11 +1,14 @@
 // Sums over partitions of work that do not depend on which thread takes which partition, nor on how many threads there are.
 #pragma once
 #include <atomic>
+#include <bit>
 #include <cstddef>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "core/base/parallel.h"
+#include "core/base/ranks.h"
 
 namespace isochron {
 
@@ -21,19 +24,46 @@ inline int partition_count(double samples, std::size_t values) {
   return partitions;
 }
 
+/// The heap of sum_of_partitions, whose leaves are shared out to ranks in their order.
+struct PartitionTree {
+  int leaves;
+  int leaves_below(int node) const { return leaves >> (std::bit_width(static_cast<unsigned>(node)) - 1); }
+  int first_leaf(int node) const { return node * leaves_below(node) - leaves; }
+  int rank_of_first(int node) const { return rank_of_part(first_leaf(node), leaves); }
+  bool is_of_one_rank(int node) const {
+    return rank_of_first(node) == rank_of_part(first_leaf(node) + leaves_below(node) - 1, leaves);
+  }
+};
+
+template <class Sum>
+std::string packed(const Sum& sum) {
+  Packer packer;
+  sum.pack(packer);
+  return std::move(packer.bytes);
+}
+template <class Sum>
+void unpack(const std::string& bytes, Sum& sum) {
+  Unpacker unpacker(bytes);
+  sum.unpack(unpacker);
+}
+
 /// The sum of what the partitions 0 ... count - 1 give; count is a power of two. run(partition) makes a Sum, which is
-/// movable, has a default constructor and add(const Sum& of_later_partitions). Sums are added along the binary tree whose
-/// leaves are the partitions, by the thread that completes a pair: an order that is the same for any number of threads,
-/// where few partial sums wait at a time (as many as threads, times the levels of the tree at most).
+/// movable, has a default constructor, add(const Sum& of_later_partitions), and pack(Packer&) and unpack(Unpacker&) to reach
+/// other ranks. Sums are added along the binary tree whose leaves are the partitions, by the thread that completes a pair: an
+/// order that is the same for any number of threads, where few partial sums wait at a time (as many as threads, times the
+/// levels of the tree at most). Of several ranks each runs the partitions of its part; a pair that two of them made is added
+/// by the one of the first half.
 template <class Sum, class Run>
 Sum sum_of_partitions(int count, Run&& run) {
   // A heap: nodes 2 n and 2 n + 1 are the halves of node n, the leaves begin at `count`.
   std::vector<Sum> partial(2 * static_cast<std::size_t>(count));
   std::vector<std::atomic<bool>> half_done(count);
-  parallel(count, [&](int partition) {
-    int node = count + partition;
-    partial[node] = run(partition);
-    for (; node > 1; node /= 2) {
+  const PartitionTree tree{count};
+  const RankPart own = part_of_rank(rank(), count);
+  parallel(own.end - own.begin, [&](int i) {
+    int node = count + own.begin + i;
+    partial[node] = run(own.begin + i);
+    for (; node > 1 && tree.is_of_one_rank(node / 2); node /= 2) {
       if (!half_done[node / 2].exchange(true)) return;  // the other half goes on from here
       Sum &first = partial[node & ~1], &second = partial[node | 1];
       first.add(second);
@@ -41,6 +71,23 @@ Sum sum_of_partitions(int count, Run&& run) {
       partial[node / 2] = std::move(first);
     }
   });
+  for (int node = count - 1; rank_count() > 1 && node > 0; --node) {
+    if (tree.is_of_one_rank(node)) continue;
+    const int first = tree.rank_of_first(2 * node), second = tree.rank_of_first(2 * node + 1);
+    if (rank() == first) {
+      if (second != first) unpack(receive(second), partial[2 * node + 1]);
+      partial[2 * node].add(partial[2 * node + 1]);
+      partial[2 * node + 1] = Sum();
+      partial[node] = std::move(partial[2 * node]);
+    } else if (rank() == second) {
+      send(first, packed(partial[2 * node + 1]));
+    }
+  }
+  if (rank_count() > 1) {
+    std::string bytes = first_rank() ? packed(partial[1]) : std::string();
+    broadcast(bytes);
+    unpack(bytes, partial[1]);
+  }
   return std::move(partial[1]);
 }
 

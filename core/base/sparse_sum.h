@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
+
+#include "core/base/ranks.h"
 
 namespace isochron {
 
@@ -41,6 +44,21 @@ class SparseSum {
     for (std::size_t block = 0; block < touched_.size(); ++block)
       if (touched_[block])
         for (std::size_t i = block * kBlock; i < std::min(size, (block + 1) * kBlock); ++i) f(i, values_[i]);
+  }
+
+  /// Touched blocks alone.
+  void pack(Packer& packer) const {
+    packer.put(touched_);
+    for (std::size_t block = 0; block < touched_.size(); ++block)
+      if (touched_[block]) packer.put(&values_[block * kBlock], kBlock);
+  }
+  void unpack(Unpacker& unpacker) {
+    std::vector<std::uint8_t> touched;
+    unpacker.get(touched);
+    *this = SparseSum(touched.size() * kBlock);
+    touched_ = std::move(touched);
+    for (std::size_t block = 0; block < touched_.size(); ++block)
+      if (touched_[block]) unpacker.get(&values_[block * kBlock], kBlock);
   }
 
  private:

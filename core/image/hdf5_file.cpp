@@ -9,6 +9,7 @@
 
 #include "core/base/error.h"
 #include "core/base/file.h"
+#include "core/base/ranks.h"
 
 namespace isochron {
 namespace {
@@ -76,7 +77,9 @@ Hdf5Shape shape_of(hid_t space) {
 
 Handle create_dataset(hid_t id, const char* name, hid_t type, const Hdf5Shape& shape) {
   const Handle space = make_space(shape);
-  const hid_t dataset = H5Dcreate2(id, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+  const Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_obj_track_times(properties, false);  // equal contents make equal files
+  const hid_t dataset = H5Dcreate2(id, name, type, space, H5P_DEFAULT, properties, H5P_DEFAULT);
   if (dataset < 0) fail_to_write();
   return Handle(dataset, H5Dclose);
 }
@@ -116,9 +119,16 @@ QuietHdf5::~QuietHdf5() {
 
 Hdf5Reader::Hdf5Reader(const std::string& file) : file_(file) {
   std::string problem;
-  if (!is_regular_file(file, problem)) fail(problem);
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_file_locking(access, false, true);  // locks fail on read-only and on some network file systems
+  if (rank_count() == 1) {
+    if (!is_regular_file(file, problem)) fail(problem);
+    H5Pset_file_locking(access, false, true);  // locks fail on read-only and on some network file systems
+  } else {
+    auto contents = read_regular_file(file, problem);
+    if (!contents) fail(problem);
+    H5Pset_fapl_core(access, contents->size(), false);
+    H5Pset_file_image(access, contents->data(), contents->size());
+  }
   id_ = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
   if (id_ < 0) fail("cannot be read as HDF5: " + last_error());
 }

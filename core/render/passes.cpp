@@ -101,10 +101,10 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   EllipsoidalConnections connections(worker, lengths), camera_lengths(worker, single_lengths),
       camera_pairs(worker, pairs);
   StandardPaths standard(worker, lengths.pairs);
-  const SamplePoints points(pass.stream, pass.range, options.numbers);
+  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
   const PointSet of_lengths = points.of_image(Technique::camera_lengths);
   const PointSet of_pairs = points.of_image(Technique::camera_pairs);
-  for_each_pixel(partition, [&](int pixel) {
+  for_each_pixel(partition, scene.camera.pixels(), [&](int pixel) {
     const bool from_camera = !scene.captures();
     if (lengths.value && from_camera)
       points.in_image(of_lengths, pixel, share * used.camera_lengths,
@@ -130,12 +130,12 @@ void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partitio
                from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
                from_light_rate = guide_->rate(BoundaryGuide::from_light),
                from_camera_rate = guide_->rate(BoundaryGuide::from_camera);
-  const SamplePoints points(pass.stream, pass.range, options.numbers);
+  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
   const PointSet of_edges = points.of_image(Technique::primary_edge);
   const PointSet of_borders = points.of_image(Technique::pixel_border);
   const PointSet of_segments = points.of_image(Technique::from_edge);
   const PointSet of_light_edges = points.of_image(Technique::from_light);
-  for_each_pixel(partition, [&](int pixel) {
+  for_each_pixel(partition, scene.camera.pixels(), [&](int pixel) {
     // Segments between surfaces or to a light: a capture's serve the pixel that they are drawn for, a camera's whichever sees
     // them.
     const auto segments = [&](Technique technique, const PointSet& of_image, double rate, auto&& sample) {
@@ -181,7 +181,9 @@ void Passes::learn() const {
   constexpr int kPartitions = kMostPartitions;  // their sums are few records
   std::vector<std::vector<GuideRecord>> records(kPartitions);
   std::vector<Guide::Each<double>> costs(kPartitions);
-  parallel(kPartitions, [&](int partition) {
+  const RankPart own = part_of_rank(rank(), kPartitions);
+  parallel(own.end - own.begin, [&](int i) {
+    const int partition = own.begin + i;
     GuideSink sink(gates, scene.layout, *basis);
     Worker worker(scene, gates, options, every_gate, sink);
     auto& cost = costs[partition];
@@ -195,10 +197,10 @@ void Passes::learn() const {
     PrimaryBoundary primary(worker, edges(), unguided, mix.interior == 1);
     SecondaryBoundary secondary(worker, edges(), unguided, mix.interior == 1);
     const double splat_scale = 1.0 / scene.camera.pixels();
-    for (long long i = partition; i < rounds; i += kPartitions) {
+    for (long long round = partition; round < rounds; round += kPartitions) {
       throw_if_stopped();
-      const int pixel = static_cast<int>(i * scene.camera.pixels() / rounds) % scene.camera.pixels();
-      Rng rng(kLearningStream, static_cast<std::uint64_t>(i), 0);
+      const int pixel = static_cast<int>(round * scene.camera.pixels() / rounds) % scene.camera.pixels();
+      Rng rng(kLearningStream, static_cast<std::uint64_t>(round), 0);
       run(Guide::primary, [&] { primary.sample(splat_scale, rng); });
       run(Guide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
       run(Guide::from_edge, [&] { secondary.sample_from_edge(0, splat_scale, rng); });
@@ -208,6 +210,12 @@ void Passes::learn() const {
     records[partition] = std::move(sink.records);
     count(worker);
   });
+  complete(
+      records, [](Packer& packer, const std::vector<GuideRecord>& part) { packer.put(part); },
+      [](Unpacker& unpacker, std::vector<GuideRecord>& part) { unpacker.get(part); });
+  complete(
+      costs, [](Packer& packer, const Guide::Each<double>& part) { packer.put(part); },
+      [](Unpacker& unpacker, Guide::Each<double>& part) { unpacker.get(part); });
   std::vector<GuideRecord> all;
   Guide::Each<double> cost{};
   for (int partition = 0; partition < kPartitions; ++partition) {
@@ -217,16 +225,10 @@ void Passes::learn() const {
   guide_.emplace(possible, all, cost);
 }
 
-template <class F>
-void Passes::for_each_pixel(Partition partition, F&& f) const {
-  const int pixels = scene.camera.pixels(), stride = partition.count * kPixelsPerBlock;
-  for (int block = partition.index * kPixelsPerBlock; block < pixels; block += stride)
-    for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) f(pixel);
-}
-
 void Passes::count(const Worker& worker) const {
   rays_ += worker.rays;
   arcs_ += worker.arcs;
+  if (cache_) cache_->count_rays(worker.rays);
 }
 
 }  // namespace isochron

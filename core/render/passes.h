@@ -1,16 +1,20 @@
 // Passes over the samples: how the techniques share the samples of images and of each term of the derivative. What they
 // find goes to a sink.
 #pragma once
+#include <algorithm>
 #include <atomic>
+#include <bit>
 #include <mutex>
 #include <optional>
 
 #include "core/base/random.h"
+#include "core/base/ranks.h"
 #include "core/films/sinks.h"
 #include "core/paths/options.h"
 #include "core/render/scene_cache.h"
 #include "core/techniques/boundary_guide.h"
 #include "core/techniques/gate_pick.h"
+#include "core/techniques/sample_points.h"
 #include "core/techniques/target_lengths.h"
 #include "core/techniques/worker.h"
 
@@ -19,9 +23,18 @@ namespace isochron {
 /// Pixels that a partition takes at a turn.
 inline constexpr int kPixelsPerBlock = 8;
 
-/// One of `count` partitions of the work of a pass: every partition takes its turn at the blocks of pixels.
+/// One of `count` partitions of the work of a pass, a power of two. They take turns at the blocks of pixels; where there are
+/// fewer blocks than partitions, several share a block, each with a part of its pixels' samples.
 struct Partition {
   int index, count;
+
+  static int blocks(int pixels) { return (pixels + kPixelsPerBlock - 1) / kPixelsPerBlock; }
+  /// Parts of the image that the partitions have: powers of two, at most one of them for each.
+  int pixel_parts(int pixels) const {
+    return std::min(count, static_cast<int>(std::bit_ceil(static_cast<unsigned>(blocks(pixels)))));
+  }
+  int pixel_part(int pixels) const { return index % pixel_parts(pixels); }
+  SamplePart samples(int pixels) const { return {index / pixel_parts(pixels), count / pixel_parts(pixels)}; }
 };
 
 /// A pass over samples [range) of every pixel.
@@ -64,10 +77,18 @@ class Passes {
   const SamplingMix mix;      ///< what the options resolve to
   const GatePick every_gate;  ///< all gates and pixels alike
 
-  /// Rays traced so far.
-  long long rays() const { return rays_; }
-  /// Work done so far, in rays.
-  double work() const { return isochron::work(rays_, arcs_); }
+  /// Rays traced so far, by all ranks, which meet here.
+  long long rays() const { return sum_over_ranks(rays_.load()); }
+  /// Work done so far, in rays, by all ranks, which meet here.
+  double work() const { return isochron::work(rays(), sum_over_ranks(arcs_.load())); }
+
+  /// Runs f(pixel) for the pixels of one partition, in a fixed order.
+  template <class F>
+  static void for_each_pixel(Partition partition, int pixels, F&& f) {
+    const int stride = partition.pixel_parts(pixels) * kPixelsPerBlock;
+    for (int block = partition.pixel_part(pixels) * kPixelsPerBlock; block < pixels; block += stride)
+      for (int pixel = block; pixel < std::min(block + kPixelsPerBlock, pixels); ++pixel) f(pixel);
+  }
 
  private:
   /// Whether the interior term takes the continuous part of dW in pairs.
@@ -80,10 +101,6 @@ class Passes {
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
 
   void learn() const;
-
-  /// Runs f(pixel) for the pixels of one partition, in a fixed order.
-  template <class F>
-  void for_each_pixel(Partition partition, F&& f) const;
 
   /// Adds the rays and arcs of a worker that has done its work.
   void count(const Worker& worker) const;

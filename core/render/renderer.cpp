@@ -24,6 +24,35 @@ struct Renderer::Impl : Passes {
     return GatedImage(scene.camera.width, scene.camera.height, gates.size(), scene.scene.grey ? 1 : 3);
   }
 
+  /// Whether there are enough of them for partitions that have their pixels for themselves.
+  bool has_many_pixels() const { return Partition::blocks(scene.pixels()) >= kFewestPartitions; }
+
+  /// run(partition) of every partition, whose samples add to pixels of its own alone, and so need no sums.
+  template <class Run>
+  void run_in_pixels(std::span<GatedImage> images, Run&& run) const {
+    const int count = Partition{0, kMostPartitions}.pixel_parts(scene.pixels());
+    const RankPart own = part_of_rank(rank(), count);
+    parallel(own.end - own.begin, [&](int i) { run(Partition{own.begin + i, count}); });
+    std::vector<int> partitions(count);
+    std::iota(partitions.begin(), partitions.end(), 0);
+    const auto exchange = [&](int partition, auto&& values_of_pixel) {
+      for_each_pixel({partition, count}, scene.pixels(), [&](int pixel) {
+        for (GatedImage& image : images) {
+          const std::size_t values = image.data.size() / static_cast<std::size_t>(image.pixels());
+          values_of_pixel(&image.data[pixel * values], values);
+        }
+      });
+    };
+    complete(
+        partitions,
+        [&](Packer& packer, int partition) {
+          exchange(partition, [&](const double* values, std::size_t n) { packer.put(values, n); });
+        },
+        [&](Unpacker& unpacker, int partition) {
+          exchange(partition, [&](double* values, std::size_t n) { unpacker.get(values, n); });
+        });
+  }
+
   /// Of a gradient. Partitions take turns at blocks of pixels.
   static int part_of(int pixel) { return pixel / kPixelsPerBlock % kGradientParts; }
 
@@ -104,8 +133,8 @@ void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange
     PrimalSink sink(impl_->gates, film);
     impl_->run_images({stream, range}, partition, sink);
   };
-  if (pixels_are_independent()) {  // partitions have no pixel in common and need no sums of their own
-    parallel(kMostPartitions, [&](int partition) { run(image, {partition, kMostPartitions}); });
+  if (pixels_are_independent() && impl_->has_many_pixels()) {
+    impl_->run_in_pixels({&image, 1}, [&](Partition partition) { run(image, partition); });
     return;
   }
   const int partitions = impl_->partitions_for(range, image.data.size());
@@ -128,9 +157,9 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
     TangentSink sink(impl_->gates, impl_->scene.layout, *impl_->basis, films);
     impl_->run_term(term, {stream, range}, partition, impl_->every_gate, sink);
   };
-  if (pixels_are_independent(term)) {
+  if (pixels_are_independent(term) && impl_->has_many_pixels()) {
     const std::vector<Film> films(images.begin(), images.end());
-    parallel(kMostPartitions, [&](int partition) { run(films, {partition, kMostPartitions}); });
+    impl_->run_in_pixels(images, [&](Partition partition) { run(films, partition); });
     return images;
   }
   const std::size_t size = images[0].data.size(), values = size * columns;
@@ -168,9 +197,14 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
       });
     return own;
   });
+  complete(
+      by_partition, [](Packer& packer, const std::vector<double>& part) { packer.put(part); },
+      [](Unpacker& unpacker, std::vector<double>& part) { unpacker.get(part); });
   sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
-  // Whatever the number of partitions, a multiple of kGradientParts, each part is of the same pixels, see part_of.
-  for (std::size_t i = 0; i < by_partition.size(); ++i) add_to((*parts)[i % kGradientParts], by_partition[i]);
+  // Whatever the number of partitions, each part is of the same pixels, see part_of.
+  const int pixels = impl_->scene.pixels();
+  for (int i = 0; i < static_cast<int>(by_partition.size()); ++i)
+    add_to((*parts)[Partition{i, partitions}.pixel_part(pixels) % kGradientParts], by_partition[i]);
 }
 
 ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange range) const {
@@ -180,6 +214,8 @@ ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange rang
       add_to(image.data, other.image.data);
       add_to(by_shape, other.by_shape);
     }
+    void pack(Packer& packer) const { packer.put(image.data), packer.put(by_shape); }
+    void unpack(Unpacker& unpacker) { unpacker.get(image.data), unpacker.get(by_shape); }
   };
   Sum blank;
   const GatedImage shape = impl.blank();
@@ -187,12 +223,14 @@ ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange rang
   blank.by_shape.assign(impl.scene.scene.shapes.size(), 0.0);
   if (impl.scene.emitters.empty()) return blank;
   const int partitions = impl.partitions_for(range, blank.image.data.size());
-  return sum_of_partitions<Sum>(partitions, [&](int partition) {
+  const Sum sum = sum_of_partitions<Sum>(partitions, [&](int partition) {
     Sum own = blank;
     ImageBreakdownSink sink(impl.scene, impl.gates, own);
     impl.run_images({stream, range}, {partition, partitions}, sink);
     return own;
   });
+  blank.add(sum);  // from another rank come the numbers alone
+  return blank;
 }
 
 GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedImage> adjoints, const Stream& stream,
@@ -206,6 +244,8 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
       add_to(by_gate, other.by_gate);
       add_to(by_shape, other.by_shape);
     }
+    void pack(Packer& packer) const { packer.put(by_bounces), packer.put(by_gate), packer.put(by_shape); }
+    void unpack(Unpacker& unpacker) { unpacker.get(by_bounces), unpacker.get(by_gate), unpacker.get(by_shape); }
   };
   Sum sum;
   sum.adjoints = static_cast<int>(count);
@@ -229,12 +269,14 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
   }
   const GatePick pick(impl.gates, largest);
   const int partitions = impl.partitions_for(range, sum.by_bounces.size() + sum.by_gate.size() + sum.by_shape.size());
-  return sum_of_partitions<Sum>(partitions, [&](int partition) {
+  const Sum all = sum_of_partitions<Sum>(partitions, [&](int partition) {
     Sum own = sum;
     GradientBreakdownSink sink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own);
     impl.run_term(term, {stream, range}, {partition, partitions}, pick, sink);
     return own;
   });
+  sum.add(all);
+  return sum;
 }
 
 }  // namespace isochron

@@ -1,5 +1,6 @@
 // Scenes made ready for rendering, kept from one evaluation to the next, so that each pays for what has changed alone.
 #pragma once
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -27,6 +28,10 @@ class SceneCache {
   /// The edges to search for intersections of meshes.
   const CrossingEdges& crossing();
 
+  /// Rays traced in its scenes so far.
+  void count_rays(long long rays) { rays_ += rays; }
+  long long rays() const { return rays_; }
+
  private:
   const Scene& at_first_;
   const CasterUpdate update_;
@@ -34,6 +39,7 @@ class SceneCache {
   std::vector<std::unique_ptr<ReadyScene>> idle_;
   int made_ = 0;
   std::optional<CrossingEdges> crossing_;
+  std::atomic<long long> rays_{0};
 };
 
 }  // namespace isochron

@@ -23,6 +23,11 @@ enum class Technique : std::uint32_t {
   from_light
 };
 
+/// One of `count` parts of the samples of each pixel.
+struct SamplePart {
+  int index = 0, count = 1;
+};
+
 /// One set of points, to be visited in parts.
 class PointSet {
  public:
@@ -34,13 +39,14 @@ class PointSet {
 
   /// sample(rng) for the points from number `from` up to `to` of a set that goes on from part to part. Both may be
   /// fractions: all of a set's parts are then shifted by the same random number, so that each has to - from samples
-  /// on average.
+  /// on average. Of these, only those of `part`.
   template <class F>
-  void visit(double from, double to, F&& sample) const {
+  void visit(double from, double to, SamplePart part, F&& sample) const {
     const bool whole = from == std::floor(from) && to == std::floor(to);
     const double shift = whole ? 0 : rng_.shift();
-    const auto end = static_cast<std::int64_t>(to + shift);
-    for (auto i = static_cast<std::int64_t>(from + shift); i < end; ++i) {
+    const auto begin = static_cast<std::int64_t>(from + shift), count = static_cast<std::int64_t>(to + shift) - begin;
+    const std::int64_t end = begin + count * (part.index + 1) / part.count;
+    for (std::int64_t i = begin + count * part.index / part.count; i < end; ++i) {
       throw_if_stopped();
       const auto number = static_cast<std::uint32_t>(i);
       Rng rng = together_ ? rng_.with_point(number, key_, number) : rng_.with_sample(number);
@@ -56,15 +62,15 @@ class PointSet {
 
 class SamplePoints {
  public:
-  SamplePoints(const Stream& stream, SampleRange range, Numbers numbers)
-      : stream_(stream), range_(range), numbers_(numbers) {}
+  SamplePoints(const Stream& stream, SampleRange range, Numbers numbers, SamplePart part = {})
+      : stream_(stream), range_(range), numbers_(numbers), part_(part) {}
 
   /// sample(rng) for each of the samples that a technique takes from `pixel`: `rate` times those of the range, on average.
   template <class F>
   void in_pixel(Technique technique, int pixel, double rate, F&& sample) const {
     if (rate > 0)
       PointSet(stream_, technique, static_cast<std::uint32_t>(pixel), range_, numbers_)
-          .visit(0, rate * range_.count(), sample);
+          .visit(0, rate * range_.count(), part_, sample);
   }
   /// The points of a technique that serves the whole image.
   PointSet of_image(Technique technique) const { return {stream_, technique, kImage, range_, numbers_}; }
@@ -72,7 +78,7 @@ class SamplePoints {
   template <class F>
   void in_image(const PointSet& points, int pixel, double rate, F&& sample) const {
     const double per_pixel = rate * range_.count();
-    points.visit(per_pixel * pixel, per_pixel * (pixel + 1), sample);
+    points.visit(per_pixel * pixel, per_pixel * (pixel + 1), part_, sample);
   }
 
  private:
@@ -81,6 +87,7 @@ class SamplePoints {
   const Stream stream_;
   const SampleRange range_;
   const Numbers numbers_;
+  const SamplePart part_;
 };
 
 }  // namespace isochron

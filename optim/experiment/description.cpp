@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/base/error.h"
+#include "core/base/ranks.h"
 #include "core/scene/scene_loader.h"
 #include "optim/experiment/choices.h"
 #include "optim/experiment/number_file.h"
@@ -18,11 +19,13 @@ constexpr int kMostSamples = 1 << 30;
 constexpr int kMostBounces = 10000;
 std::string existing_file(const YamlValue& value, const std::filesystem::path& folder) {
   const std::string text = value.text();
-  std::error_code none;  // such as of names that are too long
-  const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text, none);
-  if (none || !std::filesystem::is_regular_file(path, none))
-    value.fail("there is no file " + quote(text), "a path relative to the experiment file");
-  return path.string();
+  const std::string found = from_first_rank([&] {
+    std::error_code none;  // such as of names that are too long
+    const std::filesystem::path path = std::filesystem::weakly_canonical(folder / text, none);
+    return none || !std::filesystem::is_regular_file(path, none) ? "" : path.string();
+  });
+  if (found.empty()) value.fail("there is no file " + quote(text), "a path relative to the experiment file");
+  return found;
 }
 
 /// The scene loader's, whose messages here name both numbers and their range.

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/base/error.h"
+#include "core/base/ranks.h"
 #include "optim/experiment/files.h"
 
 namespace isochron {
@@ -178,8 +179,10 @@ void edit_experiment(const std::string& file, std::span<const Edit> edits, const
   } catch (const InputError& error) {
     problem = std::string("cannot be edited safely: ") + error.what();
   }
-  std::error_code ignored;
-  fs::remove(trial, ignored);
+  on_first_rank([&] {
+    std::error_code ignored;
+    fs::remove(trial, ignored);
+  });
   if (!problem.empty()) throw InputError(file + ": " + problem + " (allowed: to paste the advice by hand)");
   write_file_atomically(file, after);
 }

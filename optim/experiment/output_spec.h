@@ -10,6 +10,7 @@ namespace isochron {
 struct OutputSpec {
   std::string geometry = "ply";  ///< a format of mesh_formats(), or none
   int every = 0;                 ///< meshes of every so many iterations besides the first and the last; 0: of none
+  int frames = 24;               ///< images over the iterations at most, see frames.h; 0: none
   /// Per sensor point, of final.h5, whose noise should be small beside that of counts: the real capture of hidden_s takes 4096
   /// to a thousandth of its deviance.
   int histogram_samples = 4096;
@@ -23,6 +24,8 @@ inline void describe(Keys& keys, OutputSpec& output) {
   keys.value("geometry", field::choice(formats, choose, [&output] { return output.geometry; }),
              "format of the meshes of the shapes that move: initial, final and, where known, target");
   keys.value("every", field::integer(output.every, 0), "and those of every so many; 0: none", {.unit = "iterations"});
+  keys.value("frames", field::integer(output.frames, 0, 10000),
+             "images over the iterations that DIR/frames keeps for reports, at most (fewer above 64 MB); 0: none");
   keys.value("histogram_samples", field::integer(output.histogram_samples, 1, 1 << 30),
              "of the expected counts of a capture in final.h5, per sensor point");
 }

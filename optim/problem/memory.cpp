@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/base/ranks.h"
 #include "optim/problem/estimates.h"
 
 namespace isochron {
@@ -86,8 +87,16 @@ std::vector<MemoryUse> rendering_memory(const Problem& problem, double copies) {
 }  // namespace
 
 double available_memory() {
-  return std::min({kilobytes("/proc/meminfo", "MemAvailable:"), group_memory(), limit(RLIMIT_AS, "VmSize:"),
-                   limit(RLIMIT_DATA, "VmData:")});
+  const double shared = std::min(kilobytes("/proc/meminfo", "MemAvailable:"), group_memory()) / rank_count_here();
+  double available = std::min({shared, limit(RLIMIT_AS, "VmSize:"), limit(RLIMIT_DATA, "VmData:")});
+  Packer own;
+  own.put(available);
+  for (const std::string& bytes : gather(own.bytes)) {
+    double other = 0;
+    Unpacker(bytes).get(other);
+    available = std::min(available, other);
+  }
+  return available;
 }
 
 std::vector<MemoryUse> image_memory(const Problem& problem) {

@@ -110,6 +110,9 @@ class Problem {
   /// a small share of their number.
   EstimatorOptions estimator(int visibility_samples, Purpose purpose = Purpose::gradients) const;
 
+  /// Rays traced so far, those of target and expected counts aside.
+  long long rays() const { return cache_->rays(); }
+
   /// Which of a target's readings count.
   const Readings& readings() const { return readings_; }
   /// Throws InputError, which begins with `what`, where the loss has no use for a target.

@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file.h"
+#include "core/base/ranks.h"
 #include "optim/experiment/experiment.h"
 #include "optim/experiment/files.h"
 
@@ -141,8 +143,10 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
   const std::string fresh = folder + "/checkpoint.new.yaml";
   write_file_atomically(fresh, text);
   // Between the two renames only `previous` exists, which load_checkpoint accepts.
-  if (std::filesystem::exists(latest)) std::filesystem::rename(latest, previous);
-  std::filesystem::rename(fresh, latest);
+  on_first_rank([&] {
+    if (std::filesystem::exists(latest)) std::filesystem::rename(latest, previous);
+    std::filesystem::rename(fresh, latest);
+  });
 }
 
 std::optional<Checkpoint> load_checkpoint(const std::string& folder, const Parameters& parameters,
@@ -150,7 +154,7 @@ std::optional<Checkpoint> load_checkpoint(const std::string& folder, const Param
   std::string problems;
   for (const char* name : {"checkpoint.yaml", "checkpoint.previous.yaml"}) {
     const std::string file = folder + "/" + name;
-    if (!std::filesystem::exists(file)) continue;
+    if (!file_exists(file)) continue;
     const auto text = read_file(file);
     try {
       if (!text) throw Damaged("cannot be read");
@@ -158,7 +162,7 @@ std::optional<Checkpoint> load_checkpoint(const std::string& folder, const Param
       Checkpoint checkpoint = parse(file, *text, parameters, note);
       if (!problems.empty()) {
         // The next save moves the latest over the one before: a damaged file must not replace a whole one.
-        std::filesystem::remove(folder + "/checkpoint.yaml");
+        on_first_rank([&] { std::filesystem::remove(folder + "/checkpoint.yaml"); });
         note = problems + "; going on from " + (note.empty() ? file : note);
       }
       if (warning) *warning = note;

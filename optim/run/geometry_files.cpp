@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "core/base/file.h"
+#include "core/base/ranks.h"
 #include "core/scene/mesh_writer.h"
 
 namespace isochron {
@@ -41,7 +42,7 @@ GeometryFiles::GeometryFiles(const std::string& folder, const OutputSpec& output
     for (int i = 2; taken(); ++i) name = fmt::format("{}_{}", stem, i);
     files_.push_back({shape, name});
   }
-  if (!files_.empty()) std::filesystem::create_directories(folder_);
+  if (!files_.empty()) on_first_rank([&] { std::filesystem::create_directories(folder_); });
 }
 
 void GeometryFiles::write(const std::string& moment, const std::vector<double>& theta) const {
@@ -53,9 +54,18 @@ void GeometryFiles::write(const std::string& moment, const std::vector<double>& 
   for (const File& file : files_) {
     const Shape& shape = scene.shapes[file.shape];
     if (!all_known(scene, shape)) continue;
-    write_file_atomically(fmt::format("{}/{}_{}.{}", folder_, moment, file.name, format.name),
-                          format.write(scene, shape));
+    write_file_atomically(path(moment, file), format.write(scene, shape));
   }
+}
+
+void GeometryFiles::remove(const std::string& moment) const {
+  on_first_rank([&] {
+    for (const File& file : files_) std::filesystem::remove(path(moment, file));
+  });
+}
+
+std::string GeometryFiles::path(const std::string& moment, const File& file) const {
+  return fmt::format("{}/{}_{}.{}", folder_, moment, file.name, output_.geometry);
 }
 
 void GeometryFiles::write_iteration(int iteration, const std::vector<double>& theta) const {

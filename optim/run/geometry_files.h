@@ -16,6 +16,7 @@ class GeometryFiles {
 
   /// All of them at theta, but for shapes of which a parameter is unknown (NaN).
   void write(const std::string& moment, const std::vector<double>& theta) const;
+  void remove(const std::string& moment) const;
   /// Where the experiment wants it, those at the beginning of an iteration, as NNNNNN_SHAPE.
   void write_iteration(int iteration, const std::vector<double>& theta) const;
 
@@ -24,6 +25,8 @@ class GeometryFiles {
     int shape;
     std::string name;  ///< behind the moment
   };
+  std::string path(const std::string& moment, const File& file) const;
+
   std::string folder_;
   OutputSpec output_;
   const Parameters& parameters_;

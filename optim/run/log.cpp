@@ -8,6 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "core/base/ranks.h"
 #include "optim/experiment/files.h"
 
 namespace isochron {
@@ -45,8 +46,10 @@ Log::Log(const std::string& file, const Parameters& parameters, int next) : name
       if (std::atoi(line.c_str()) < next) kept += line + "\n";
   }
   write_file_atomically(file, kept);
-  file_.reset(std::fopen(file.c_str(), "a"));
-  if (!file_) throw std::runtime_error(file + ": cannot be written");
+  on_first_rank([&] {
+    file_.reset(std::fopen(file.c_str(), "a"));
+    if (!file_) throw std::runtime_error(file + ": cannot be written");
+  });
 }
 
 void Log::append(const LogRow& row, const std::vector<double>& theta, const std::vector<double>& gradient) {
@@ -70,9 +73,11 @@ void Log::append(const LogRow& row, const std::vector<double>& theta, const std:
   columns(gradient);
   text += fmt::format(",{}\n", number(row.loss_noise));
   // The row must be on the disk before the checkpoint that follows it: a resume never writes it again.
-  if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0 ||
-      fsync(fileno(file_.get())) != 0)
-    throw std::runtime_error(name_ + ": cannot be written");
+  on_first_rank([&] {
+    if (std::fwrite(text.data(), 1, text.size(), file_.get()) != text.size() || std::fflush(file_.get()) != 0 ||
+        fsync(fileno(file_.get())) != 0)
+      throw std::runtime_error(name_ + ": cannot be written");
+  });
 }
 
 }  // namespace isochron

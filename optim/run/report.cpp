@@ -103,10 +103,12 @@ std::string files_to_look_at(const std::string& folder, bool plots) {
   const auto line = [&](const std::string& names, const char* what) {
     if (!names.empty()) text += fmt::format("    {}: {}\n", what, names);
   };
+  if (plots) line(present({"report.html"}), "page");
   line(present({"summary.yaml", "log.csv", "final.exr", "final.h5", "target.exr", "initial.exr"}), "results");
   line(present({"geometry/"}), "meshes");
   if (plots)
     line(present({"capture.png", "final.png", "target.png", "initial.png", "residual.png", "rmse.png"}), "pictures");
+  line(present({"frames/", "report/"}), "behind the page");
   line(present({"experiment.yaml", "inputs/", "checkpoint.yaml", "checkpoint.previous.yaml"}), "to resume");
   return text.empty() ? text : fmt::format("  {}\n{}", folder, text);
 }

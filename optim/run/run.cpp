@@ -1,13 +1,16 @@
 #include "optim/run/run.h"
 
 #include <fmt/format.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <cmath>
-#include <filesystem>
 #include <limits>
+#include <optional>
 
 #include "core/base/error.h"
+#include "core/base/file.h"
+#include "core/base/ranks.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/capture_data.h"
@@ -16,8 +19,10 @@
 #include "optim/problem/memory.h"
 #include "optim/problem/problem.h"
 #include "optim/problem/rendered_objective.h"
+#include "optim/problem/standard_errors.h"
 #include "optim/problem/vector_math.h"
 #include "optim/run/checkpoint.h"
+#include "optim/run/frames.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/inputs.h"
 #include "optim/run/log.h"
@@ -32,6 +37,13 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// Most memory that the process has had, in bytes.
+long long peak_memory() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return 1024LL * usage.ru_maxrss;
 }
 
 /// Whether the folder's run has come to its end before.
@@ -61,6 +73,7 @@ class Run {
     if (saved) state_ = *saved;
     const bool had_ended = has_ended(path("summary.yaml"));
     const int first = state_.iteration;
+    const Clock::time_point start = Clock::now();
     if (!saved) state_.theta = parameters_.initial();
     last_.loss = last_.loss_noise = last_.image_rmse = last_.param_rmse = std::numeric_limits<double>::quiet_NaN();
     LoopResult result;
@@ -71,7 +84,11 @@ class Run {
       save_checkpoint(options_.folder, state_, parameters_);
       result.status = RunStatus::interrupted;
     }
-    write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_));
+    // Ranks that were told to stop do not wait for each other.
+    const long long rays = result.status == RunStatus::interrupted ? problem_.rays() : sum_over_ranks(problem_.rays());
+    write_file_atomically(
+        path("summary.yaml"),
+        summary_yaml(result, state_, last_, parameters_, {first, seconds_since(start), rays, peak_memory()}, errors_));
     if (options_.report)
       options_.report((had_ended && state_.iteration == first ? nothing_left(result, options_.folder) : "") +
                       run_report(result, state_, last_, parameters_));
@@ -87,7 +104,7 @@ class Run {
 
   void load_target() {
     const std::string file = path("target.exr");
-    if (!std::filesystem::exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
+    if (!file_exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
     target_ = problem_.read_target(file);
   }
 
@@ -98,7 +115,8 @@ class Run {
     const GeometryFiles geometry(options_.folder, problem_.experiment().output, parameters_);
     if (state_.iteration == 0) geometry.write("target", parameters_.target());
     Log log(path("log.csv"), parameters_, state_.iteration);
-    GatedImage final_image;
+    const Frames frames(options_.folder, problem_.experiment().output.frames, target_, notes_);
+    Evaluation final;
     const Clock::time_point call_start = Clock::now();
     Clock::time_point iteration_start = call_start;
     const int first = state_.iteration;
@@ -123,9 +141,15 @@ class Run {
         state_.image_rmse_initial = last_.image_rmse;
         state_.param_rmse_initial = last_.param_rmse;
       }
-      if (!closing) geometry.write_iteration(last_.iteration, theta);
+      if (!closing) {
+        geometry.write_iteration(last_.iteration, theta);
+        if (frames.wants(last_.iteration)) {
+          frames.write(last_.iteration, now.image);
+          geometry.write("current", theta);
+        }
+      }
       log.append(last_, theta, now.gradient);
-      final_image = now.image;
+      final = now;
       if (!closing) report(first, seconds_since(call_start));
     };
     loop.save = [&] {
@@ -141,9 +165,18 @@ class Run {
     };
     const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
     geometry.write("final", state_.theta);
-    write_exr(path("final.exr"), final_image, notes_);
+    geometry.remove("current");
+    write_exr(path("final.exr"), final.image, notes_);
+    errors_ = find_errors(*optimizer, final);
     write_expected_counts();
     return result;
+  }
+
+  ParameterErrors find_errors(const Optimizer& optimizer, const Evaluation& final) const {
+    const double scale = variance_scale(problem_, final);
+    if (const std::vector<double> diagonal = optimizer.curvature_diagonal(); !diagonal.empty())
+      return {"gauss_newton_diagonal", least_standard_errors(diagonal, scale)};
+    return {"gauss_newton_matrix", standard_errors(final.curvature, scale)};
   }
 
   void write_expected_counts() const {
@@ -176,6 +209,7 @@ class Run {
   Checkpoint state_;
   GatedImage target_;
   LogRow last_;
+  ParameterErrors errors_;
 };
 
 /// Goes on in a locked folder that holds a run.
@@ -197,21 +231,27 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_jacobian_fits(problem);
     require_memory(problem, run_memory(problem));
   }
-  const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
-  const FolderLock lock = prepare_run_folder(options.folder, options.force, options.warning);
-  Experiment copied = experiment;
-  write_inputs(options.folder, inputs, copied);
-  write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  std::optional<FolderLock> lock;
+  on_first_rank([&] {
+    const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
+    lock.emplace(prepare_run_folder(options.folder, options.force, options.warning));
+    Experiment copied = experiment;
+    write_inputs(options.folder, inputs, copied);
+    write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
+  });
   // As a resumed run does, so that both see the same to the last bit.
   return go_on(options, {});
 }
 
 RunStatus resume_run(const RunOptions& options) {
-  if (!std::filesystem::exists(options.folder + "/experiment.yaml"))
-    throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
-  make_output_folder(options.folder);
-  const FolderLock lock(options.folder, options.warning);
-  check_inputs(options.folder, options.warning);
+  std::optional<FolderLock> lock;
+  on_first_rank([&] {
+    if (!file_exists(options.folder + "/experiment.yaml"))
+      throw InputError(fmt::format("{}: holds no run to resume (there is no experiment.yaml)", options.folder));
+    make_output_folder(options.folder);
+    lock.emplace(options.folder, options.warning);
+    check_inputs(options.folder, options.warning);
+  });
   return go_on(options, options.warning);
 }
 

@@ -20,9 +20,10 @@ namespace {
 void clear_run(const std::string& folder) {
   for (const char* file : {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml",
                            "target.exr", "initial.exr", "final.exr", "final.h5", "target.png", "initial.png",
-                           "final.png", "residual.png", "rmse.png", "capture.png"})
+                           "final.png", "residual.png", "rmse.png", "capture.png", "report.html"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
-  for (const char* part : {"inputs", "geometry"}) std::filesystem::remove_all(std::filesystem::path(folder) / part);
+  for (const char* part : {"inputs", "geometry", "frames", "report"})
+    std::filesystem::remove_all(std::filesystem::path(folder) / part);
 }
 
 /// Renames a folder to the first free of FOLDER.1, FOLDER.2, ...; returns the new name.

@@ -18,7 +18,7 @@ std::string optional_number(double value) {
 }  // namespace
 
 std::string summary_yaml(const LoopResult& result, const Checkpoint& state, const LogRow& last,
-                         const Parameters& parameters) {
+                         const Parameters& parameters, const RunCost& cost, const ParameterErrors& errors) {
   std::string text =
       fmt::format("status: {}\niterations: {}\nseconds: {}\nrejected_steps: {}\nrate: {}\nfinal: {}\n",
                   name(result.status), state.iteration, std::max(state.seconds, last.seconds),
@@ -37,6 +37,18 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
     fmt::format_to(out, "  {}: {{initial: {}, final: {}}}\n", block.name,
                    optional_number(parameters.distance_to_target(parameters.initial(), block)),
                    optional_number(parameters.distance_to_target(state.theta, block)));
+  if (!errors.values.empty()) {
+    fmt::format_to(out, "standard_errors_from: {}\nstandard_errors:\n", errors.from);  // in units of the parameter
+    for (const Parameters::Block& block : parameters.blocks()) {
+      std::vector<std::string> numbers;
+      for (int i = block.begin; i < block.begin + block.count; ++i)
+        numbers.push_back(optional_number(errors.values[i]));
+      const std::string list = fmt::format("{}", fmt::join(numbers, ", "));
+      fmt::format_to(out, "  {}: {}\n", block.name, block.count == 1 ? list : "[" + list + "]");
+    }
+  }
+  fmt::format_to(out, "last_call: {{first_iteration: {}, seconds: {:.6g}, rays: {}, peak_memory_bytes: {}}}\n",
+                 cost.first_iteration, cost.seconds, cost.rays, cost.peak_memory);
   text += "parameters:\n";
   for (const Parameters::Block& block : parameters.blocks()) {
     const auto begin = state.theta.begin() + block.begin;

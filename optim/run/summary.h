@@ -1,15 +1,30 @@
 #pragma once
 #include <string>
+#include <vector>
 
 #include "optim/run/log.h"
 #include "optim/run/loop.h"
 
 namespace isochron {
 
+/// What the last call of a run took: since it began or was resumed.
+struct RunCost {
+  int first_iteration = 0;    ///< the one that it began with
+  double seconds = 0;         ///< target and closing images included
+  long long rays = 0;         ///< of the iterations
+  long long peak_memory = 0;  ///< of the process, bytes
+};
+
+/// Standard errors of the unknowns, see standard_errors.h. `values` is empty where they are not known.
+struct ParameterErrors {
+  std::string from;  ///< gauss_newton_matrix, or gauss_newton_diagonal: lower bounds
+  std::vector<double> values;
+};
+
 /// Text of summary.yaml. `last`: the last row, that of the final parameters unless the run was interrupted;
 /// `state` holds those parameters. Unknown numbers are null. `noise_share` is that of
 /// loss_spread().
 std::string summary_yaml(const LoopResult& result, const Checkpoint& state, const LogRow& last,
-                         const Parameters& parameters);
+                         const Parameters& parameters, const RunCost& cost = {}, const ParameterErrors& errors = {});
 
 }  // namespace isochron

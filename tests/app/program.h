@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
+#include <map>
 #include <string>
 #include <thread>
 #include <vector>
@@ -93,6 +94,13 @@ class Program : public testing::Test {
     EXPECT_EQ(state(a), state(b));
     for (const char* image : {"/target.exr", "/initial.exr", "/final.exr"})
       EXPECT_TRUE(folder_.read(a + image) == folder_.read(b + image)) << image;
+    const auto frames = [&](const std::string& out) {
+      std::map<std::string, std::string> found;
+      for (const auto& entry : std::filesystem::directory_iterator(folder_.file(out + "/frames")))
+        found[entry.path().filename()] = folder_.read(out + "/frames/" + entry.path().filename().string());
+      return found;
+    };
+    EXPECT_TRUE(frames(a) == frames(b));
     EXPECT_NE(folder_.read(b + "/summary.yaml").find("status: iterations_reached"), std::string::npos);
   }
 

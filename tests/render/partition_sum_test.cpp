@@ -11,6 +11,8 @@ namespace {
 struct Number {
   double value = 0;
   void add(const Number& other) { value += other.value; }
+  void pack(Packer& packer) const { packer.put(value); }
+  void unpack(Unpacker& unpacker) { unpacker.get(value); }
 };
 
 double term(int i) {

@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
+#include <vector>
 
 #include "scene_building.h"
 #include "support.h"
@@ -50,6 +52,29 @@ TEST(SamplePoints, EverySampleHasNumbersOfItsOwn) {
       }
     EXPECT_EQ(all.size(), count);  // 1100 numbers of 32 bits: two are equal by chance in 1e-4 of such sets
     EXPECT_NEAR(static_cast<double>(count), 2 * 2 * 2 * 20 * 4 * 1.7, 90);
+  }
+}
+
+TEST(SamplePoints, PartsMakeUpTheWhole) {
+  for (const double rate : {1.0, 1.7, 0.4}) {
+    constexpr int kParts = 3, kPixel = 6;
+    const auto numbers = [&](SamplePart part) {
+      const SamplePoints points(kStream, {3, 10}, Numbers::low_discrepancy, part);
+      std::vector<double> all;
+      points.in_pixel(Technique::walk, kPixel, rate, [&](Rng& rng) { all.push_back(rng.uniform()); });
+      const std::vector<double> more = numbers_of(points, Technique::from_edge, kPixel, kPixel + 1, rate);
+      all.insert(all.end(), more.begin(), more.end());
+      std::sort(all.begin(), all.end());
+      return all;
+    };
+    std::vector<double> united;
+    for (int i = 0; i < kParts; ++i) {
+      const std::vector<double> part = numbers({i, kParts});
+      EXPECT_LT(part.size(), numbers({}).size());
+      united.insert(united.end(), part.begin(), part.end());
+    }
+    std::sort(united.begin(), united.end());
+    EXPECT_EQ(united, numbers({})) << rate;
   }
 }
 

@@ -22,7 +22,8 @@ matplotlib.use("Agg")
 from isochron import exr
 from isochron.pictures.curves import plot_log, plot_pixel, plot_row
 from isochron.pictures.reading import Folder, PlotError, read_stack
-from isochron.pictures.sheets import plot_derivatives, plot_images, plot_signed, scale_of
+from isochron.pictures.scales import scale_of
+from isochron.pictures.sheets import plot_derivatives, plot_images, plot_signed
 
 RUN_IMAGES = ["target", "initial", "final"]  # share one scale, to be compared
 

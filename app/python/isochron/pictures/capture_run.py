@@ -5,31 +5,14 @@ import re
 
 import h5py
 import numpy as np
-import yaml
 
 from isochron import exr
 from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
-from isochron.pictures.reading import PlotError
+from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
 
 METRES_PER_PS = 299792458e-12
 METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time; light's way in it
-LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in Python alone, a number per sensor point takes seconds
-
-
-def read_yaml(path):
-    try:
-        data = yaml.load(path.read_text(encoding="utf-8"), LOADER)
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise PlotError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict):
-        raise PlotError(f"{path}: no keys")
-    return data
-
-
-def numbers(values):
-    """A value or a list of them; YAML takes 1e-05 for text."""
-    return np.array([float(v) for v in (values if isinstance(values, list) else [values])])
 
 
 class Surface:

@@ -8,7 +8,8 @@ from matplotlib.ticker import MaxNLocator
 from isochron.pictures.capture_run import METRES_PER_PS
 from isochron.pictures.curves import edges_of
 from isochron.pictures.scene_views import draw_views, residuals
-from isochron.pictures.sheets import save, scale_of
+from isochron.pictures.scales import scale_of
+from isochron.pictures.sheets import save
 
 COUNTS, FIT, REST = "#7f9fbf", "#c1272d", "#4d4d4d"
 DEVIATIONS = 4.0  # end of the scale of residuals

@@ -5,7 +5,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from isochron.pictures.reading import PlotError, read_log
-from isochron.pictures.sheets import plain_ticks, save, scale_of
+from isochron.pictures.scales import scale_of
+from isochron.pictures.sheets import plain_ticks, save
 
 MOST_CURVES = 10  # parameters in the plot of errors: those that were furthest off at the start
 

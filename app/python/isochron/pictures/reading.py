@@ -8,11 +8,27 @@ import yaml
 
 from isochron import exr
 
+LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in Python alone, a number per sensor point takes seconds
 CHANNEL = re.compile(r"(?:(?P<component>.+)\.)?gate(?P<gate>\d+)\.(?P<channel>[RGBY])")
 
 
 class PlotError(Exception):
     """Something that keeps a picture from being drawn, in one line."""
+
+
+def read_yaml(path):
+    try:
+        data = yaml.load(path.read_text(encoding="utf-8"), LOADER)
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise PlotError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+    if not isinstance(data, dict):
+        raise PlotError(f"{path}: no keys")
+    return data
+
+
+def numbers(values):
+    """A value or a list of them; YAML takes 1e-05 for text."""
+    return np.array([float(v) for v in (values if isinstance(values, list) else [values])])
 
 
 class Gates:
@@ -51,7 +67,7 @@ class Folder:
         if not path.exists():
             return
         try:
-            data = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+            data = yaml.load(path.read_text(encoding="utf-8"), LOADER) or {}
             gates = data.get("gates") or {}
             self.experiment = str(data.get("name", self.experiment))
             centers = gates.get("centers")

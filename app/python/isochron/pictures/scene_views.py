@@ -46,11 +46,13 @@ def draw_surfaces(axes, run, values, colours, scale):
 
 
 class Views:
-    """Pictures side by side, equal in extent and orientation."""
+    """Pictures side by side, equal in extent and orientation, and beside them room for a box of numbers where it is wanted."""
 
-    def __init__(self, figure, run, low, high, chosen, count):
+    def __init__(self, figure, run, low, high, chosen, count, with_box):
         self.figure, self.run, self.low, self.high, self.chosen = figure, run, low, high, chosen
-        *self.free, self.box = figure.subplots(1, count + 1, width_ratios=[1] * count + [0.8 if count > 2 else 0.62])
+        ratios = [1] * count + ([0.8 if count > 2 else 0.62] if with_box else [])
+        self.free = list(figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0])
+        self.box = self.free.pop() if with_box else None
 
     def add(self, title, draw, label, extend="neither"):
         axes = self.free.pop(0)
@@ -81,13 +83,14 @@ def _scale_of_albedo(values):
     return 0.0, max(float(np.percentile(values, 99)), 1e-6), bool(values.max() > np.percentile(values, 99))
 
 
-def draw_views(figure, run, chosen):
+def draw_views(figure, run, chosen, with_box=True):
+    """Returns what stands in the box: names and values, a heading being a name without a value."""
     low, high = extent_of(run)
     painted = [s.albedo for s in run.surfaces]
     planes = {s.name: Plane(s.points) for s in run.surfaces}
     bent = [s.points[:, 2] if not planes[s.name].flat or len(run.surfaces) > 1 else None for s in run.surfaces]
     has_paint, has_depth = (any(v is not None for v in values) for values in (painted, bent))
-    views = Views(figure, run, low, high, chosen, 1 + has_paint + has_depth)
+    views = Views(figure, run, low, high, chosen, 1 + has_paint + has_depth, with_box)
     if has_paint:
         first, last, beyond = _scale_of_albedo([v for v in painted if v is not None])
         views.add("Recovered albedo, seen from the wall",
@@ -105,11 +108,13 @@ def draw_views(figure, run, chosen):
               lambda axes: axes.imshow(picture, cmap="inferno", vmin=0, vmax=1, origin="lower", aspect="equal",
                                        interpolation="nearest", extent=projection.extent),
               "relative to its maximum")
-    write_box(views.box, run, planes, projection)
+    lines = lines_about(run, planes, projection)
+    if with_box:
+        write_box(views.box, lines)
+    return lines
 
 
-def write_box(axes, run, planes, projection):
-    axes.axis("off")
+def lines_about(run, planes, projection):
     lines = [("The data", None), *about_data(run), ("The fit", None), *about_fit(run)]
     for name, plane in planes.items():
         if plane.flat:
@@ -117,6 +122,11 @@ def write_box(axes, run, planes, projection):
     lines += [("The back-projection", None), ("filter", "second derivative along time"),
               ("", f"of gaussians of {projection.sigma / run.ps:.3g} ps"),
               ("maximum over", f"depths {projection.depths[0]:.3f} to {projection.depths[-1]:.3f} m")]
+    return lines
+
+
+def write_box(axes, lines):
+    axes.axis("off")
     step = min(0.056, 1.0 / len(lines))
     for i, (name, value) in enumerate(lines):
         y = 1.02 - i * step

@@ -1,0 +1,31 @@
+"""Colour scales and the choice of gates, which all pictures share."""
+
+import numpy as np
+
+PERCENTILE = 99.5  # of the non-zero values: the end of the colour scale; outliers must not darken the rest
+NON_FINITE = "magenta"
+NON_FINITE_RGB = (255, 0, 255)
+
+
+def scale_of(*arrays):
+    """End of the colour scale: a high percentile of the non-zero magnitudes."""
+    values = np.abs(np.concatenate([a.ravel() for a in arrays]))
+    values = values[np.isfinite(values) & (values > 0)]
+    return float(np.percentile(values, PERCENTILE)) if values.size else 1.0
+
+
+def srgb(x):
+    """Display encoding of linear light in [0, 1]."""
+    x = np.clip(x, 0, 1)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
+
+
+def pick_gates(most, *stacks):
+    """At most so many gates, evenly spread from the first to the last in which anything exceeds a hundredth of the scale."""
+    count = len(stacks[0])
+    if count <= most:
+        return list(range(count))
+    peaks = np.max([np.abs(np.nan_to_num(s)).reshape(count, -1).max(1) for s in stacks], axis=0)
+    lit = np.flatnonzero(peaks > 0.01 * scale_of(*stacks))
+    first, last = (lit[0], lit[-1]) if len(lit) else (0, count - 1)
+    return sorted({int(round(g)) for g in np.linspace(first, last, min(most, last - first + 1))})

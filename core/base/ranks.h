@@ -1,0 +1,132 @@
+// Processes that share the work of one command, as mpirun starts them: ranks. All run the same program on the same input and
+// call what is below in the same order; without mpirun there is one, and nothing of it costs anything. Rank 0 alone reads
+// what users give, writes files and prints.
+#pragma once
+#include <cstdint>
+#include <cstring>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+namespace isochron {
+
+/// How ranks reach each other. Messages are bytes of any number. Everything waits for the others, unless the process is told to
+/// stop: then it returns false, and the ranks are out of step for good.
+class Ranks {
+ public:
+  virtual ~Ranks() = default;
+  virtual int rank() const = 0;
+  virtual int count() const = 0;
+  /// Of those on this machine, which share its memory.
+  virtual int count_here() const = 0;
+  /// Rank 0's bytes, to all.
+  virtual bool broadcast(std::string& bytes) = 0;
+  virtual bool send(int to, const std::string& bytes) = 0;
+  virtual bool receive(int from, std::string& bytes) = 0;
+  /// Ends them all where they cannot go on together.
+  virtual void abort(int status) = 0;
+};
+
+/// To be called once, before anything else. `ranks` must outlive all work.
+void set_ranks(Ranks& ranks);
+
+int rank();
+int rank_count();
+int rank_count_here();
+inline bool first_rank() {
+  return rank() == 0;
+}
+
+/// Of all ranks' bytes, in their order.
+std::vector<std::string> gather(const std::string& own);
+/// Throw Interrupted once a stop is requested.
+void send(int to, const std::string& bytes);
+std::string receive(int from);
+void broadcast(std::string& bytes);
+
+/// Thrown by all ranks alike, which stay in step.
+struct SharedError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Runs f on rank 0 alone, where what is called from it does not wait for other ranks. An exception that f throws there is
+/// thrown by all: an InputError, or else a SharedError with its message. After a request to stop the others do nothing.
+void on_first_rank(const std::function<void()>& f);
+/// The same, where f returns something for all.
+std::string from_first_rank(const std::function<std::string()>& f);
+
+/// Part of `count` things in a row that a rank takes.
+struct RankPart {
+  int begin, end;
+};
+RankPart part_of_rank(int rank, int count);
+/// The rank that takes thing i.
+int rank_of_part(int i, int count);
+
+/// Bytes of plain values, put one behind the other and taken out in the same order.
+class Packer {
+ public:
+  template <class T>
+  void put(const T* values, std::size_t count) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    bytes.append(reinterpret_cast<const char*>(values), count * sizeof(T));
+  }
+  template <class T>
+  void put(const T& value) {
+    put(&value, 1);
+  }
+  /// With its length.
+  template <class T>
+  void put(const std::vector<T>& values) {
+    put(static_cast<std::uint64_t>(values.size()));
+    put(values.data(), values.size());
+  }
+  std::string bytes;
+};
+
+class Unpacker {
+ public:
+  explicit Unpacker(const std::string& bytes) : at_(bytes.data()) {}
+  template <class T>
+  void get(T* values, std::size_t count) {
+    if (count > 0) std::memcpy(values, at_, count * sizeof(T));
+    at_ += count * sizeof(T);
+  }
+  template <class T>
+  void get(T& value) {
+    get(&value, 1);
+  }
+  template <class T>
+  void get(std::vector<T>& values) {
+    std::uint64_t count = 0;
+    get(count);
+    values.resize(count);
+    get(values.data(), count);
+  }
+
+ private:
+  const char* at_;
+};
+
+/// Sum over all ranks, in their order.
+double sum_over_ranks(double own);
+long long sum_over_ranks(long long own);
+
+/// Completes what was made for a rank's part of `items` alone: pack(packer, item) and unpack(unpacker, item) of each.
+template <class Item, class Pack, class Unpack>
+void complete(std::vector<Item>& items, Pack&& pack, Unpack&& unpack) {
+  if (rank_count() == 1 || items.empty()) return;
+  const int count = static_cast<int>(items.size());
+  Packer own;
+  for (int i = part_of_rank(rank(), count).begin; i < part_of_rank(rank(), count).end; ++i) pack(own, items[i]);
+  const std::vector<std::string> all = gather(own.bytes);
+  for (int r = 0; r < rank_count(); ++r) {
+    if (r == rank()) continue;
+    Unpacker other(all[r]);
+    for (int i = part_of_rank(r, count).begin; i < part_of_rank(r, count).end; ++i) unpack(other, items[i]);
+  }
+}
+
+}  // namespace isochron

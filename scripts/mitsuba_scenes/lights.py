@@ -1,0 +1,47 @@
+"""Lights without an extent. The projector is the laser of captures alone."""
+
+import numpy as np
+
+from . import matrices
+from .spectra import written
+
+
+def lights(scene, report, colours):
+    """Lines of our file."""
+    lines = []
+    for _, node in scene.objects("emitter"):
+        name = node.id or f"light_{len(lines) + 1}"
+        text = report.attempt(light, node, report, colours)
+        if text:
+            lines.append(f"{{name: {name}, {text}}}")
+    return lines
+
+
+def light(node, report, colours):
+    if node.type not in ("point", "spot"):
+        node.fail("no such emitter here (allowed: area, point, spot; in captures a projector)")
+    matrix = node.transform()
+    position = node.point("position") if node.type == "point" else None
+    if position is None:
+        position = matrix[:3, 3]
+    text = f"type: {node.type}, position: {vector(position)}"
+    if node.type == "spot":
+        cutoff = node.number("cutoff_angle", 20.0)
+        beam = node.number("beam_width", 0.75 * cutoff)
+        if not 0 <= beam < cutoff <= 180:
+            node.fail(f"beam_width {beam:g} and cutoff_angle {cutoff:g} make no cone")
+        text += (f", direction: {vector(matrices.directions(matrix, (0, 0, 1)))}, cone: {cutoff:.9g}, "
+                 f"blend: {1 - beam / cutoff:.9g}")
+        report.note(node.place, f"{node}: fades by smoothstep, not linearly, from {beam:g} to {cutoff:g} degrees")
+    intensity = colours.colour(node, "intensity", 1.0, emission=True)
+    if not intensity.min() > 0:
+        node.fail(f"intensity {written(intensity)} is not above 0", "intensity")
+    node.ignore("sampling_weight")
+    report.refuse_rest(node)
+    return f"{text}, intensity: {written(intensity)}"
+
+
+def vector(values):
+    largest = np.abs(values).max()
+    # What is left of zeros after sines and cosines is zero.
+    return "[" + ", ".join(f"{0.0 if abs(x) < 1e-14 * largest else x:.10g}" for x in values) + "]"
