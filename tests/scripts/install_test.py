@@ -49,10 +49,19 @@ class InstallTest(unittest.TestCase):
         folder = self.scratch()
         run(self.program, "run", self.share / "experiments/cube.yaml", *settings, cwd=folder)
         names = {path.name for path in (folder / "runs/cube").iterdir()}
-        self.assertLessEqual({"final.exr", "final.png", "rmse.png", "summary.yaml"}, names)
+        self.assertLessEqual({"final.exr", "final.png", "report.html", "rmse.png", "summary.yaml"}, names)
         (folder / "runs/cube/final.png").unlink()
         run(self.program, "plot", "runs/cube", cwd=folder)
         self.assertTrue((folder / "runs/cube/final.png").exists())
+
+    def test_ranks(self):
+        if not (BUILD / "isochron_mpi.so").exists():
+            self.skipTest("built without MPI")
+        root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}  # as in containers
+        folder = self.scratch()
+        run("mpirun", "--oversubscribe", "--bind-to", "none", "-n", "2", self.program, "render", "--samples", "4", "-o", folder,
+            self.share / "experiments/cube.yaml", env={**os.environ, **root}, cwd=folder)
+        self.assertTrue((folder / "render.exr").exists())
 
     def test_its_own_python_package(self):
         packages = self.prefix / "lib/python3/dist-packages"
