@@ -4,9 +4,8 @@
   scripts/import_scene.py cbox.xml -o my/cbox -D res=64
   build/isochron render my/cbox/experiment.yaml
 
-What it cannot turn it names, each with its line, and writes nothing (exit status 2); with --skip it leaves that out, or takes
-what stands in for it: a diffuse material of albedo 0.5 for a material, nothing for a shape, a light or a key. scenes/README.md
-says what becomes of what.
+What it cannot turn it names, each with its line, and writes nothing (exit status 2). With --skip it goes on without it: a
+material becomes a diffuse one of albedo 0.5, all else is left out. scenes/README.md says what becomes of what.
 """
 
 import argparse
@@ -135,19 +134,23 @@ def import_scene(options):
     write_folder(options.output, files, options.force)
     for line in report.by_line(report.notes):
         print(line)
-    print(f"{options.output}: scene.yaml, experiment.yaml, {len(files) - 2} meshes")
+    print(f"{options.output}: scene.yaml, experiment.yaml; OBJ files: {len(files) - 2}")
     return 0
 
 
-def main():
+def main(arguments):
+    options = parse(arguments)
     try:
-        return import_scene(parse(sys.argv[1:]))
+        return import_scene(options)
     except SceneError as error:
         print(f"import_scene.py: {error}", file=sys.stderr)
+        return 2
+    except RecursionError:
+        print(f"import_scene.py: {options.scene}: objects refer to each other in a circle", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import matrices
-from .spectra import written
+from .writing import colour_text, quoted, vector_text
 
 
 def lights(scene, report, colours):
@@ -13,7 +13,7 @@ def lights(scene, report, colours):
         name = node.id or f"light_{len(lines) + 1}"
         text = report.attempt(light, node, report, colours)
         if text:
-            lines.append(f"{{name: {name}, {text}}}")
+            lines.append(f"{{name: {quoted(name)}, {text}}}")
     return lines
 
 
@@ -24,24 +24,18 @@ def light(node, report, colours):
     position = node.point("position") if node.type == "point" else None
     if position is None:
         position = matrix[:3, 3]
-    text = f"type: {node.type}, position: {vector(position)}"
+    text = f"type: {node.type}, position: {vector_text(position)}"
     if node.type == "spot":
         cutoff = node.number("cutoff_angle", 20.0)
         beam = node.number("beam_width", 0.75 * cutoff)
         if not 0 <= beam < cutoff <= 180:
             node.fail(f"beam_width {beam:g} and cutoff_angle {cutoff:g} make no cone")
-        text += (f", direction: {vector(matrices.directions(matrix, (0, 0, 1)))}, cone: {cutoff:.9g}, "
+        text += (f", direction: {vector_text(matrices.directions(matrix, (0, 0, 1)))}, cone: {cutoff:.9g}, "
                  f"blend: {1 - beam / cutoff:.9g}")
         report.note(node.place, f"{node}: fades by smoothstep, not linearly, from {beam:g} to {cutoff:g} degrees")
     intensity = colours.colour(node, "intensity", 1.0, emission=True)
     if not intensity.min() > 0:
-        node.fail(f"intensity {written(intensity)} is not above 0", "intensity")
+        node.fail(f"intensity {colour_text(intensity)} is not above 0", "intensity")
     node.ignore("sampling_weight")
     report.refuse_rest(node)
-    return f"{text}, intensity: {written(intensity)}"
-
-
-def vector(values):
-    largest = np.abs(values).max()
-    # What is left of zeros after sines and cosines is zero.
-    return "[" + ", ".join(f"{0.0 if abs(x) < 1e-14 * largest else x:.10g}" for x in values) + "]"
+    return f"{text}, intensity: {colour_text(intensity)}"

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from .spectra import written
+from .writing import colour_text
+
 
 # At 589 nm, between 0 and 20 degrees Celsius.
 IOR = {"vacuum": 1, "air": 1.000277, "water": 1.333, "acetone": 1.36, "ethanol": 1.361, "glycerol": 1.4729,
@@ -52,7 +53,7 @@ class Materials:
         return self.text_of(inside[0], two_sided=True)
 
     def diffuse(self, node, sides):
-        return f"{{type: diffuse, albedo: {written(self.colours.reflectance(node, 'reflectance', 0.5))}{sides}}}"
+        return f"{{type: diffuse, albedo: {colour_text(self.colours.reflectance(node, 'reflectance', 0.5))}{sides}}}"
 
     def roughness(self, node):
         if not node.type.startswith("rough"):
@@ -75,7 +76,7 @@ class Materials:
     def conductor(self, node, sides):
         reflectance = self.metal(node) * self.colours.reflectance(node, "specular_reflectance", 1.0)
         return (f"{{type: rough_conductor, roughness: {self.roughness(node):.9g}, "
-                f"reflectance: {written(reflectance)}{sides}}}")
+                f"reflectance: {colour_text(reflectance)}{sides}}}")
 
     def metal(self, node):
         """Reflectance at normal incidence."""
@@ -89,7 +90,7 @@ class Materials:
             node.fail(f"what does {material} reflect? (known: {', '.join(METALS)}; or give eta and k)", "material")
         if np.ptp(reflectance) > 0 or reflectance[0] < 1:
             self.report.note(node.place, f"{node}: reflects at every angle what it does at normal incidence, "
-                             f"{written(reflectance)}")
+                             f"{colour_text(reflectance)}")
         return reflectance
 
     def dielectric(self, node, _):

@@ -62,8 +62,3 @@ def points(matrix, places):
 
 def directions(matrix, vectors):
     return np.asarray(vectors, float) @ matrix[:3, :3].T
-
-
-def normals(matrix, vectors):
-    """Of surfaces, not of unit length. A mirrored solid keeps its outside."""
-    return np.asarray(vectors, float) @ np.linalg.inv(matrix[:3, :3])

@@ -1,7 +1,7 @@
 """Meshes: Mitsuba's primitives, OBJ and PLY files with their normals, and transforms of them.
 
-A mesh has `points` [N, 3] and `faces`, lists of numbers of points that run counter-clockwise seen from the outside. Where its
-file gives normals, they are `normals` [M, 3], and `corners` are lists of their numbers, as faces are of points.
+A mesh has `points` [N, 3] and `faces`, lists of numbers of points that run counter-clockwise seen from the outside. Where
+its file gives normals, they are `normals` [M, 3], and `corners` are lists of their numbers, as faces are of points.
 """
 
 from dataclasses import dataclass

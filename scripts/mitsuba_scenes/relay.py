@@ -3,9 +3,8 @@
 import numpy as np
 
 from . import matrices
-from .lights import vector
 from .sensors import WITHOUT_EFFECT, limited
-from .spectra import written
+from .writing import colour_text, vector_text
 
 
 class Capture:
@@ -29,7 +28,7 @@ class Capture:
         self.max_bounces = self.bounces()
         self.reflects = self.wall_reflects() or sensor.type == "perspective"
         self.scale = self.find_scale()
-        self.integrator.ignore(*WITHOUT_EFFECT, "nlos_laser_sampling", "discard_direct_paths")
+        self.integrator.ignore(*WITHOUT_EFFECT, "nlos_laser_sampling", "discard_direct_paths", "hide_emitters")
         for node in (self.integrator, self.projector, sensor):
             report.refuse_rest(node)
 
@@ -107,10 +106,11 @@ class Capture:
         return np.array(spots)
 
     def written_lines(self):
-        laser = "confocal" if self.spots is None else "{points: [" + ", ".join(map(vector, self.spots)) + "]}"
-        lines = [*self.wall.lines, f"  normal: {vector(self.wall.normal)}", f"  laser: {laser}"]
+        laser = "confocal" if self.spots is None else "{points: [" + ", ".join(map(vector_text, self.spots)) + "]}"
+        lines = [*self.wall.lines, f"  normal: {vector_text(self.wall.normal)}", f"  laser: {laser}"]
         if self.integrator.boolean("account_first_and_last_bounces"):
-            lines.append(f"  origin: {{laser: {vector(self.laser_origin)}, sensor: {vector(self.wall.origin)}}}")
+            laser, sensor = vector_text(self.laser_origin), vector_text(self.wall.origin)
+            lines.append(f"  origin: {{laser: {laser}, sensor: {sensor}}}")
         return lines
 
     def bounces(self):
@@ -142,9 +142,10 @@ class Capture:
         to_laser = self.laser_origin - (self.wall.points if self.spots is None else self.spots)
         distances = np.linalg.norm(to_laser, axis=1)
         if not distances.min() > 0:
-            self.report.note(self.projector.place, f"{self.projector}: is on the wall, which then gets no light in mitransient")
+            self.report.note(self.projector.place, f"{self.projector}: is on the wall: mitransient's values are unknown")
             return None
         falloff = np.abs(to_laser @ self.wall.normal) / distances**3
         colour = np.pi * irradiance * self.projector.number("scale", 1.0) * self.albedo**2 * self.film.bins[1]
-        least, most = (written(np.array([float(f"{x:.6g}") for x in colour * f])) for f in (falloff.min(), falloff.max()))
+        extremes = (np.array([float(f"{x:.6g}") for x in colour * f]) for f in (falloff.min(), falloff.max()))
+        least, most = map(colour_text, extremes)
         return least if least == most else f"{least} to {most}, from spot to spot"

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .lights import vector
+from .writing import vector_text
+
 
 PATHS = ("path", "direct", "prb", "prb_basic", "prbvolpath", "volpath", "volpathmis", "transient_path",
          "transient_prbvolpath")
@@ -61,17 +62,14 @@ def slope(sensor, film, report):
     """Half the image's width at the distance 1. Fails where the camera is none of ours."""
     if sensor.type != "perspective":
         sensor.fail("no such sensor here (allowed: perspective, or an nlos_capture_meter on a rectangle)")
-    near, axes = sensor.number("near_clip", 0.01), sensor.transform()[:3, :3]
-    sensor.ignore("far_clip", "focus_distance", "shutter_open", "shutter_close")
+    axes = sensor.transform()[:3, :3]
+    sensor.ignore("near_clip", "far_clip", "focus_distance", "shutter_open", "shutter_close")
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-5):
         sensor.fail("its to_world scales", "to_world")
     if np.linalg.det(axes) < 0:
         sensor.fail("its to_world mirrors the image", "to_world")
     if sensor.number("principal_point_offset_x", 0) or sensor.number("principal_point_offset_y", 0):
         sensor.fail("its principal point is not in the middle")
-    if film.bins:
-        report.note(sensor.place, f"{sensor}: paths begin at the pinhole here; mitransient itself counts from the near "
-                    f"plane, {near:g} less in the middle of the image")
     result = np.tan(np.radians(field_of_view(sensor, film)) / 2) * crop_of(sensor, film)
     report.refuse_rest(sensor)
     return result
@@ -79,11 +77,15 @@ def slope(sensor, film, report):
 
 def camera(sensor, film, report):
     """Our camera's lines."""
+    if film.bins:
+        near = sensor.number("near_clip", 0.01)
+        report.note(sensor.place, f"{sensor}: paths begin at the pinhole here; mitransient itself counts from the near "
+                    f"plane, {near:g} less in the middle of the image")
     fov = 2 * np.degrees(np.arctan(slope(sensor, film, report)))
     to_world = sensor.transform()
     position, axes = to_world[:3, 3], to_world[:3, :3]
-    return [f"  position: {vector(position)}", f"  look_at: {vector(position + axes[:, 2])}", f"  up: {vector(axes[:, 1])}",
-            f"  fov: {fov:.10g}", f"  resolution: [{film.width}, {film.height}]"]
+    return [f"  position: {vector_text(position)}", f"  look_at: {vector_text(position + axes[:, 2])}",
+            f"  up: {vector_text(axes[:, 1])}", f"  fov: {fov:.10g}", f"  resolution: [{film.width}, {film.height}]"]
 
 
 def field_of_view(sensor, film):
@@ -115,9 +117,11 @@ def bounces(integrator, report, most):
         return most
     if integrator.type not in PATHS:
         integrator.fail("no such integrator here (allowed: " + ", ".join(PATHS) + ")")
-    integrator.ignore(*WITHOUT_EFFECT, "hide_emitters")
+    integrator.ignore(*WITHOUT_EFFECT)
+    if integrator.boolean("hide_emitters"):
+        report.attempt(integrator.fail, "the camera sees the emitters here", "hide_emitters")
     if integrator.boolean("camera_unwarp"):
-        report.attempt(integrator.fail, "paths begin at the pinhole here, so that there is no camera_unwarp", "camera_unwarp")
+        report.attempt(integrator.fail, "no camera_unwarp: paths begin at the pinhole here", "camera_unwarp")
     if integrator.boolean("discard_direct_light"):
         report.attempt(integrator.fail, "light that comes straight from a lamp counts here", "discard_direct_light")
     depth = integrator.integer("max_depth", 6 if integrator.type.startswith(("transient", "prb")) else -1)

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import matrices, meshes
 from .document import SceneError
-from .spectra import written
+from .writing import colour_text
 
 WITHOUT_EFFECT = ("silhouette_sampling_weight", "flip_tex_coords")
 
@@ -89,7 +89,7 @@ class Shapes:
             emitter.fail("radiance is negative", "radiance")
         emitter.ignore("sampling_weight")
         self.report.refuse_rest(emitter)
-        return written(radiance) if radiance.max() > 0 else ""
+        return colour_text(radiance) if radiance.max() > 0 else ""
 
     def mesh_of(self, node):
         """In its own space, before to_world."""

@@ -1,7 +1,8 @@
 """Colours: linear RGB of what Mitsuba calls spectra and textures."""
 
 import numpy as np
-from matplotlib import image
+
+from .writing import colour_text
 
 # Equal energy at all wavelengths, as RGB with the white point D65: what Mitsuba's RGB variants make of a uniform emitter.
 EQUAL_ENERGY = np.array([1.204794, 0.948292, 0.908916])
@@ -27,7 +28,7 @@ class Colours:
     def reflectance(self, node, name, default):
         rgb = self.colour(node, name, default)
         if rgb.min() < 0 or rgb.max() > 1:
-            node.fail(f"{name} {written(rgb)} is not between 0 and 1", name)
+            node.fail(f"{name} {colour_text(rgb)} is not between 0 and 1", name)
         return rgb
 
     def of_spectrum(self, node, name, text, emission):
@@ -54,13 +55,15 @@ class Colours:
             hint = " (--mean-textures takes its mean colour)" if kind in ("bitmap", "checkerboard") else ""
             texture.fail(f"no textures{hint}")
         if kind in ("bitmap", "checkerboard"):
-            self.report.note(texture.place, f"{texture}: its mean colour, {written(rgb)}")
+            self.report.note(texture.place, f"{texture}: its mean colour, {colour_text(rgb)}")
             texture.ignore("to_uv", "filter_type", "wrap_mode")
         self.report.refuse_rest(texture)
         return rgb
 
 
 def mean_of_bitmap(texture):
+    from matplotlib import image  # slow to load
+
     file = texture.file()
     raw = texture.boolean("raw")
     try:
@@ -74,10 +77,3 @@ def mean_of_bitmap(texture):
     if not raw:
         pixels = np.where(pixels <= 0.04045, pixels / 12.92, ((pixels + 0.055) / 1.055) ** 2.4)
     return np.broadcast_to(pixels.mean(axis=(0, 1), dtype=float), 3)
-
-
-def written(rgb):
-    """As our files have it: one number where it is grey."""
-    if np.ptp(rgb) == 0:
-        return f"{rgb[0]:.9g}"
-    return "[" + ", ".join(f"{value:.9g}" for value in rgb) + "]"

@@ -5,6 +5,7 @@ import re
 from . import materials, meshes, relay, sensors, shapes, spectra, walls
 from .document import Document
 from .lights import lights
+from .writing import quoted
 
 
 def turned(path, options, report):
@@ -44,7 +45,7 @@ def is_capture(scene, sensor):
 
 
 def captured(scene, sensor, film, found, report, colours, options):
-    """The capture's lines, its bounces and a comment; of what is found the wall is taken away unless it reflects in between."""
+    """The capture's lines, its bounces and a comment. The wall is taken away unless it reflects in between."""
     if not film.bins:
         sensor.fail("the film of a capture is a transient_hdr_film")
     if sensor.type == "nlos_capture_meter":
@@ -70,7 +71,8 @@ def chosen_sensor(scene, found, options, report):
         scene.fail("has no sensor that could be turned")
     if options.sensor is None:
         if len(sensors_found) > 1:
-            report.note(sensors_found[0].place, f"{sensors_found[0]}: the first of {len(sensors_found)} sensors (--sensor ID)")
+            first = sensors_found[0]
+            report.note(first.place, f"{first}: the first of {len(sensors_found)} sensors (--sensor ID)")
         return sensors_found[0]
     for node in sensors_found:
         if node.id == options.sensor:
@@ -93,7 +95,8 @@ def scene_text(title, view, found, shining):
     lines.append("shapes:")
     for shape in found.found:
         emission = f", emission: {shape.emission}" if shape.emission else ""
-        lines.append(f"  - {{name: {quoted(shape.name)}, file: {file_name(shape)}, material: {quoted(shape.material)}{emission}}}")
+        name, material = quoted(shape.name), quoted(shape.material)
+        lines.append(f"  - {{name: {name}, file: {file_name(shape)}, material: {material}{emission}}}")
     if shining:
         lines += ["lights:", *(f"  - {light}" for light in shining)]
     return "\n".join(lines) + "\n"
@@ -110,8 +113,3 @@ def experiment_text(path, title, film, most, comment):
         lines.append(f"# {comment}")
     lines += [f"name: {name}", "scene: scene.yaml", f"max_bounces: {most}", f"gates: {gates}"]
     return "\n".join(lines) + "\n"
-
-
-def quoted(text):
-    """A word of YAML."""
-    return text if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", text) else '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

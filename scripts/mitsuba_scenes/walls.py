@@ -1,12 +1,12 @@
 """The walls of captures: points that a detector looks at, and where a laser's ray meets the wall.
 
-A wall has `shape`, `normal` (towards the detector), `points` (rows one after the other), `lines` (our keys for them) and hit().
+A wall has `shape`, `normal` (towards the detector), `points` (rows one after the other), `lines` (our keys) and hit().
 """
 
 import numpy as np
 
 from . import matrices
-from .lights import vector
+from .writing import vector_text
 
 ON_PLANE = 1e-5  # of the largest coordinate: files hold single precision
 
@@ -22,8 +22,8 @@ class RectangleWall:
         self.points = self.point(*np.meshgrid(u, v)).reshape(-1, 3)
         across = self.points[film.width - 1] - self.points[0] if film.width > 1 else matrix[:3, 0]
         down = self.points[-film.width] - self.points[0] if film.height > 1 else matrix[:3, 1]
-        self.lines = [f"  sensor: {{corner: {vector(self.points[0])}, across: {vector(across)}, down: {vector(down)}, "
-                      f"size: [{film.width}, {film.height}]}}"]
+        corner, across, down = map(vector_text, (self.points[0], across, down))
+        self.lines = [f"  sensor: {{corner: {corner}, across: {across}, down: {down}, size: [{film.width}, {film.height}]}}"]
 
     def point(self, u, v):
         """Of texture coordinates from 0 to 1."""
@@ -54,7 +54,7 @@ class SeenWall:
         if np.abs(heights).max() > ON_PLANE * np.abs(self.points).max():
             sensor.fail(f"it sees more than a flat wall: {', '.join(sorted({shape.name for shape in found}))}")
         self.normal = facing(self.shape, self.origin, normals[0], self.points[0])
-        self.lines = ["  sensor: {points: [" + ", ".join(map(vector, self.points)) + "]}"]
+        self.lines = ["  sensor: {points: [" + ", ".join(map(vector_text, self.points)) + "]}"]
 
     def hit(self, origin, direction):
         return next(iter(first_hits(self.shapes, origin, [direction])[0]), None)
