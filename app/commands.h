@@ -16,5 +16,6 @@ void add_check(CLI::App& app, Action& action);
 void add_inspect(CLI::App& app, Action& action);
 void add_chart(CLI::App& app, Action& action);
 void add_stability(CLI::App& app, Action& action);
+void add_plot(CLI::App& app, Action& action);
 
 }  // namespace isochron

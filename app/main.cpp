@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "app/commands.h"
+#include "app/man_pages.h"
 #include "app/progress.h"
 #include "app/start_ranks.h"
 #include "core/base/error.h"
@@ -72,6 +73,8 @@ int run_program(int argc, char** argv) {
   isochron::add_inspect(app, action);
   isochron::add_chart(app, action);
   isochron::add_stability(app, action);
+  isochron::add_plot(app, action);
+  isochron::add_man_pages_option(app);
   try {
     isochron::start_ranks();
     app.parse(argc, argv);

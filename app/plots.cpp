@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "app/final_derivatives.h"
+#include "app/installation.h"
 #include "app/interrupt.h"
 #include "core/base/progress.h"
 #include "core/base/ranks.h"
@@ -35,7 +36,7 @@ std::string last_line(std::string text) {
 std::vector<std::string> environment_with_package() {
   constexpr std::string_view kVariable = "PYTHONPATH=";
   std::vector<std::string> variables;
-  std::string path = std::string(kVariable) + ISOCHRON_PYTHON_PACKAGES;
+  std::string path = std::string(kVariable) + package_folder();
   for (char** variable = environ; *variable; ++variable) {
     if (std::string_view(*variable).starts_with(kVariable)) {
       path += std::string(":") + (*variable + kVariable.size());
@@ -104,8 +105,7 @@ bool draw(const std::string& module, const std::string& folder) {
   const ModuleResult result = run_module(module, {as_path(folder)});
   if (result.status == 0) return true;
   if (interrupted())
-    spdlog::warn("plots: interrupted; draw them with: scripts/{}.py {}", module.substr(module.find('.') + 1),
-                 as_path(folder));
+    spdlog::warn("plots: interrupted; draw them with: isochron plot {}", as_path(folder));
   else
     spdlog::warn("plots: {} failed: {}", module, result.message);
   return false;

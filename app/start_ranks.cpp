@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "app/installation.h"
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/base/ranks.h"
@@ -26,21 +27,15 @@ bool started_by_mpi() {
   return false;
 }
 
-/// Beside the program, or installed with it.
-std::string module_file() {
-  namespace fs = std::filesystem;
-  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
-  for (const fs::path& path : {folder / "isochron_mpi.so", folder.parent_path() / "lib/isochron/isochron_mpi.so"})
-    if (fs::exists(path)) return path.string();
-  throw InputError("started by MPI, but built without it (allowed: to install libopenmpi-dev and build again)");
-}
-
 }  // namespace
 
 void start_ranks() {
   if (!started_by_mpi()) return;
+  const std::string file = mpi_module();
+  if (!std::filesystem::exists(file))
+    throw InputError("started by MPI, but built without it (allowed: to install libopenmpi-dev and build again)");
   // Open MPI's own modules look for its symbols among the global ones.
-  void* module = dlopen(module_file().c_str(), RTLD_NOW | RTLD_GLOBAL);
+  void* module = dlopen(file.c_str(), RTLD_NOW | RTLD_GLOBAL);
   if (!module) throw InputError(fmt::format("MPI cannot be used: {}", dlerror()));
   using Start = Ranks* (*)(bool (*)());
   const auto start = reinterpret_cast<Start>(dlsym(module, "isochron_start_ranks"));

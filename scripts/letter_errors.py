@@ -21,22 +21,9 @@ import yaml
 
 import use_package
 from isochron import exr
+from isochron.pictures.mesh_files import read_mesh
 
 WALL_NORMAL = np.array([0.0, 0.0, 1.0])
-
-
-def vertices(path):
-    """Positions in a binary PLY of the program."""
-    data = path.read_bytes()
-    head, _, body = data.partition(b"end_header\n")
-    lines = head.decode("ascii").splitlines()
-    if "format binary_little_endian 1.0" not in lines:
-        raise ValueError(f"{path}: not a binary PLY")
-    count = next(int(l.split()[2]) for l in lines if l.startswith("element vertex"))
-    kinds = [l.split()[1:] for l in lines if l.startswith("property") and "list" not in l]
-    names = {"float": "<f4", "double": "<f8", "uchar": "u1"}
-    table = np.frombuffer(body, np.dtype([(name, names[kind]) for kind, name in kinds]), count)
-    return np.stack([table[axis].astype(float) for axis in "xyz"], axis=1)
 
 
 def plane(points, weights):
@@ -71,7 +58,7 @@ def errors(run):
     truth, found = np.asarray(truth, dtype=float), np.asarray(summary["parameters"]["paint"])
     target = exr.read(run / "target.exr")
     image = np.sum([np.asarray(channel, dtype=float) for channel in target.values()], axis=0)
-    return {**surface_errors(*(vertices(run / f"geometry/{which}_board.ply") for which in ("final", "target")), truth),
+    return {**surface_errors(*(read_mesh(run / f"geometry/{which}_board.ply")[0] for which in ("final", "target")), truth),
             "albedo": float(np.corrcoef(found, truth)[0, 1]),
             "counts": float(image.mean()),
             "seconds": float(summary["seconds"])}

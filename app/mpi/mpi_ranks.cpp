@@ -33,50 +33,35 @@ class MpiRanks : public Ranks {
   int count_here() const override { return count_here_; }
 
   bool broadcast(std::string& bytes) override {
-    return in_parts(
-        bytes,
-        [](char* part, int size, MPI_Request* request) {
-          MPI_Ibcast(part, size, MPI_CHAR, 0, MPI_COMM_WORLD, request);
-        },
-        [](unsigned long long* size, MPI_Request* request) {
-          MPI_Ibcast(size, 1, MPI_UNSIGNED_LONG_LONG, 0, MPI_COMM_WORLD, request);
-        });
+    return in_parts(bytes, [](void* part, int size, MPI_Request* request) {
+      MPI_Ibcast(part, size, MPI_BYTE, 0, MPI_COMM_WORLD, request);
+    });
   }
   bool send(int to, const std::string& bytes) override {
-    std::string& data = const_cast<std::string&>(bytes);  // as MPI wants it, which does not change it
-    return in_parts(
-        data,
-        [to](char* part, int size, MPI_Request* request) {
-          MPI_Isend(part, size, MPI_CHAR, to, kTag, MPI_COMM_WORLD, request);
-        },
-        [to](unsigned long long* size, MPI_Request* request) {
-          MPI_Isend(size, 1, MPI_UNSIGNED_LONG_LONG, to, kTag, MPI_COMM_WORLD, request);
-        });
+    std::string& data = const_cast<std::string&>(bytes);  // sending does not change it
+    return in_parts(data, [to](const void* part, int size, MPI_Request* request) {
+      MPI_Isend(part, size, MPI_BYTE, to, kTag, MPI_COMM_WORLD, request);
+    });
   }
   bool receive(int from, std::string& bytes) override {
-    return in_parts(
-        bytes,
-        [from](char* part, int size, MPI_Request* request) {
-          MPI_Irecv(part, size, MPI_CHAR, from, kTag, MPI_COMM_WORLD, request);
-        },
-        [from](unsigned long long* size, MPI_Request* request) {
-          MPI_Irecv(size, 1, MPI_UNSIGNED_LONG_LONG, from, kTag, MPI_COMM_WORLD, request);
-        });
+    return in_parts(bytes, [from](void* part, int size, MPI_Request* request) {
+      MPI_Irecv(part, size, MPI_BYTE, from, kTag, MPI_COMM_WORLD, request);
+    });
   }
   void abort(int status) override { MPI_Abort(MPI_COMM_WORLD, status); }
 
  private:
-  /// The number of bytes goes first, so that whoever receives them makes room.
-  template <class Bytes, class Size>
-  bool in_parts(std::string& bytes, const Bytes& start_bytes, const Size& start_size) {
+  /// start(data, size, request) for the number of bytes, so that whoever receives them makes room, and then for the bytes.
+  template <class Start>
+  bool in_parts(std::string& bytes, const Start& start) {
     unsigned long long size = bytes.size();
     MPI_Request request;
     if (!in_step_) return false;
-    start_size(&size, &request);
+    start(&size, sizeof(size), &request);
     if (!wait(request)) return false;
-    if (bytes.size() != size) bytes.resize(size);
+    bytes.resize(size);
     for (std::size_t done = 0; done < size; done += kMostBytes) {
-      start_bytes(bytes.data() + done, static_cast<int>(std::min<std::size_t>(size - done, kMostBytes)), &request);
+      start(bytes.data() + done, static_cast<int>(std::min<std::size_t>(size - done, kMostBytes)), &request);
       if (!wait(request)) return false;
     }
     return true;

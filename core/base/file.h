@@ -20,6 +20,7 @@ std::optional<std::string> read_regular_file(const std::string& path, std::strin
 /// Whether this rank's `read_regular_file` would open it, for libraries that read files themselves; else the reason in `problem`.
 bool is_regular_file(const std::string& path, std::string& problem);
 
+/// Whether there is a file or a folder.
 bool file_exists(const std::string& path);
 
 /// FNV-1a, 64 bits, as 16 hexadecimal digits: tells files apart that were torn or edited, no protection against

@@ -124,30 +124,4 @@ int rank_of_part(int i, int count) {
   return static_cast<int>(((i + 1LL) * rank_count() - 1) / count);
 }
 
-double sum_over_ranks(double own) {
-  if (rank_count() == 1) return own;
-  Packer packer;
-  packer.put(own);
-  double sum = 0;
-  for (const std::string& bytes : gather(packer.bytes)) {
-    double value = 0;
-    Unpacker(bytes).get(value);
-    sum += value;
-  }
-  return sum;
-}
-
-long long sum_over_ranks(long long own) {
-  if (rank_count() == 1) return own;
-  Packer packer;
-  packer.put(own);
-  long long sum = 0;
-  for (const std::string& bytes : gather(packer.bytes)) {
-    long long value = 0;
-    Unpacker(bytes).get(value);
-    sum += value;
-  }
-  return sum;
-}
-
 }  // namespace isochron

@@ -110,9 +110,24 @@ class Unpacker {
   const char* at_;
 };
 
+/// A plain value of every rank, in their order.
+template <class T>
+std::vector<T> of_all_ranks(const T& own) {
+  if (rank_count() == 1) return {own};
+  Packer packer;
+  packer.put(own);
+  std::vector<T> values;
+  for (const std::string& bytes : gather(packer.bytes)) Unpacker(bytes).get(values.emplace_back());
+  return values;
+}
+
 /// Sum over all ranks, in their order.
-double sum_over_ranks(double own);
-long long sum_over_ranks(long long own);
+template <class T>
+T sum_over_ranks(const T& own) {
+  T sum{};
+  for (const T& value : of_all_ranks(own)) sum += value;
+  return sum;
+}
 
 /// Completes what was made for a rank's part of `items` alone: pack(packer, item) and unpack(unpacker, item) of each.
 template <class Item, class Pack, class Unpack>
@@ -127,6 +142,13 @@ void complete(std::vector<Item>& items, Pack&& pack, Unpack&& unpack) {
     Unpacker other(all[r]);
     for (int i = part_of_rank(r, count).begin; i < part_of_rank(r, count).end; ++i) unpack(other, items[i]);
   }
+}
+/// The same for plain values, or vectors of them.
+template <class Item>
+void complete(std::vector<Item>& items) {
+  complete(
+      items, [](Packer& packer, const Item& item) { packer.put(item); },
+      [](Unpacker& unpacker, Item& item) { unpacker.get(item); });
 }
 
 }  // namespace isochron

@@ -213,12 +213,8 @@ void Passes::learn() const {
     records[partition] = std::move(sink.records);
     count(worker);
   });
-  complete(
-      records, [](Packer& packer, const std::vector<GuideRecord>& part) { packer.put(part); },
-      [](Unpacker& unpacker, std::vector<GuideRecord>& part) { unpacker.get(part); });
-  complete(
-      costs, [](Packer& packer, const Guide::Each<double>& part) { packer.put(part); },
-      [](Unpacker& unpacker, Guide::Each<double>& part) { unpacker.get(part); });
+  complete(records);
+  complete(costs);
   std::vector<GuideRecord> all;
   Guide::Each<double> cost{};
   for (int partition = 0; partition < kPartitions; ++partition) {

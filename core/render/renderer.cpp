@@ -197,9 +197,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
       });
     return own;
   });
-  complete(
-      by_partition, [](Packer& packer, const std::vector<double>& part) { packer.put(part); },
-      [](Unpacker& unpacker, std::vector<double>& part) { unpacker.get(part); });
+  complete(by_partition);
   sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
   // Whatever the number of partitions, each part is of the same pixels, see part_of.
   const int pixels = impl_->scene.pixels();

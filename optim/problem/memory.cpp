@@ -88,15 +88,9 @@ std::vector<MemoryUse> rendering_memory(const Problem& problem, double copies) {
 
 double available_memory() {
   const double shared = std::min(kilobytes("/proc/meminfo", "MemAvailable:"), group_memory()) / rank_count_here();
-  double available = std::min({shared, limit(RLIMIT_AS, "VmSize:"), limit(RLIMIT_DATA, "VmData:")});
-  Packer own;
-  own.put(available);
-  for (const std::string& bytes : gather(own.bytes)) {
-    double other = 0;
-    Unpacker(bytes).get(other);
-    available = std::min(available, other);
-  }
-  return available;
+  const std::vector<double> available =
+      of_all_ranks(std::min({shared, limit(RLIMIT_AS, "VmSize:"), limit(RLIMIT_DATA, "VmData:")}));
+  return *std::min_element(available.begin(), available.end());
 }
 
 std::vector<MemoryUse> image_memory(const Problem& problem) {

@@ -5,7 +5,6 @@ import contextlib
 import io
 import pathlib
 import shutil
-import struct
 import subprocess
 import sys
 import tempfile
@@ -23,6 +22,7 @@ from isochron.pictures.back_projection import BackProjection
 from isochron.pictures.capture_run import METRES_PER_PS, CaptureRun
 from isochron.pictures.deviance import Fit
 from isochron.pictures.wall import Plane, Wall
+from report_folders import write_ply
 
 PS, START, BINS = 20, 2000, 120
 LENGTHS = (START + PS * (np.arange(BINS) + 0.5)) * METRES_PER_PS
@@ -58,13 +58,6 @@ def light_of(points, place, laser=None):
     way = way + (way if laser is None else np.linalg.norm(np.asarray(laser) - place))
     pulse = np.exp(-0.5 * ((LENGTHS[:, np.newaxis, np.newaxis] - way) / (1.5 * PS * METRES_PER_PS)) ** 2)
     return 2 + 30 * pulse
-
-
-def write_ply(path, points, triangles):
-    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty double x\nproperty double y\n"
-            f"property double z\nelement face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n")
-    faces = b"".join(struct.pack("<B3i", 3, *t) for t in triangles)
-    path.write_bytes(head.encode() + np.asarray(points, "<f8").tobytes() + faces)
 
 
 class PlotCaptureTest(unittest.TestCase):

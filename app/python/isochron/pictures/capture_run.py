@@ -8,7 +8,7 @@ import numpy as np
 from isochron import exr
 from isochron.captures import read_capture
 from isochron.errors import InputError
-from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
+from isochron.pictures.mesh_files import name_in_files, read_mesh, read_scene_mesh
 from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
 from isochron.runs import read_values
@@ -147,8 +147,7 @@ class CaptureRun:
         self.surfaces = []
         for path in sorted((self.directory / "geometry").glob("final_*")):
             name = path.stem.removeprefix("final_")
-            # Files are named after shapes, but for letters that file systems may not have.
-            shape = next((s for s in paints if re.sub(r"[^A-Za-z0-9_-]", "_", s) == name), name)
+            shape = next((s for s in paints if name_in_files(s) == name), name)
             self._add_surface(path, shape, read_mesh(path), paints.pop(shape, None))
         moved = {str(spec.get("shape")) for spec in self.specs.values() if spec.get("type") != "albedo"}
         for shape, paint in paints.items():

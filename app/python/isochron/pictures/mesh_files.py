@@ -1,5 +1,7 @@
 """Meshes that runs write: PLY (binary, little-endian, doubles) and OBJ; and those of scenes, where they are such files."""
 
+import re
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -28,6 +30,11 @@ def _read_obj(data):
     faces = [[int(w.split("/")[0]) - 1 for w in words[1:]] for words in lines if words[:1] == ["f"]]
     triangles = [(face[0], a, b) for face in faces for a, b in zip(face[1:], face[2:])]
     return points.reshape(-1, 3), np.array(triangles, int).reshape(-1, 3)
+
+
+def name_in_files(shape):
+    """A shape's name as in the names of a run's meshes: without letters that file systems may not have."""
+    return re.sub(r"[^A-Za-z0-9_-]", "_", shape)
 
 
 def read_mesh(path):

@@ -1,11 +1,10 @@
 """The shapes that moved, initial, current and target, within the outlines of the scene: the data of a view that turns."""
 
 import base64
-import re
 
 import numpy as np
 
-from isochron.pictures.mesh_files import read_mesh, read_scene_mesh
+from isochron.pictures.mesh_files import name_in_files, read_mesh, read_scene_mesh
 from isochron.pictures.reading import PlotError
 from isochron.report.markup import Markup, data_for_scripts, element, section
 
@@ -95,7 +94,7 @@ class Geometry:
             self._add_view(scene)
             for entry in scene.get("shapes") or []:
                 name = str(entry.get("name"))
-                if re.sub(r"[^A-Za-z0-9_-]", "_", name) not in self.moved:
+                if name_in_files(name) not in self.moved:
                     self._add_outline(name, path.parent / str(entry.get("file", "")), entry.get("transform") or {})
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             self.run.note(f"{path}: cannot be drawn: {error}")

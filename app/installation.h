@@ -1,0 +1,14 @@
+// What lies beside the program: in its build folder, or where app/packaging installs it, seen from the program. So an
+// installation can be moved as a whole.
+#pragma once
+#include <string>
+
+namespace isochron {
+
+/// The folder that Python finds the package isochron in.
+std::string package_folder();
+
+/// The module with the ranks of MPI; where it was not built, no such file is there.
+std::string mpi_module();
+
+}  // namespace isochron

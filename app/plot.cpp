@@ -1,0 +1,31 @@
+#include <filesystem>
+#include <memory>
+
+#include "app/commands.h"
+#include "app/interrupt.h"
+#include "app/plots.h"
+
+namespace isochron {
+namespace {
+
+int plot(const std::string& folder) {
+  catch_interrupts();
+  const std::filesystem::path path = folder;
+  for (const char* table : {"chart.csv", "chart_solvers.csv", "stability.csv"})
+    if (std::filesystem::exists(path / table)) return draw_charts(folder) ? 0 : 1;
+  return draw_plots(folder) ? 0 : 1;
+}
+
+}  // namespace
+
+void add_plot(CLI::App& app, Action& action) {
+  auto folder = std::make_shared<std::string>();
+  CLI::App* sub = app.add_subcommand("plot", "Draw the pictures of an output folder again, as after --no-plots");
+  sub->add_option("folder", *folder, "folder that a command has written")->required()->type_name("DIR");
+  sub->footer(
+      "Examples:\n"
+      "  isochron plot runs/cube");
+  sub->callback([&action, folder] { action = [folder] { return plot(*folder); }; });
+}
+
+}  // namespace isochron
