@@ -193,8 +193,8 @@ def import_capture(options):
         said.append(measured_response(arrays, layout, options, counts, start))
     counts = rebinned(counts, lead + first, lead + last, options.rebin)
     width, start = layout.bin_ps * options.rebin, options.t_start_ps + first * layout.bin_ps
-    writing.write_capture(options.output, counts, width * METRES_PER_PS, start * METRES_PER_PS, points,
-                          np.asarray(options.normal) / np.linalg.norm(options.normal), options.laser, layout.format)
+    write_capture(options.output, counts, width * METRES_PER_PS, start * METRES_PER_PS, points,
+                  np.asarray(options.normal) / np.linalg.norm(options.normal), options.laser, layout.format)
     mean = counts.mean(dtype=float) * len(counts)
     return [f"{options.output}: {layout.format}, {counts.shape[1]} x {counts.shape[2]} points, {len(counts)} bins of "
             f"{width:g} ps from {start:g} ps, {mean:.4g} counts a point"] + said
