@@ -57,15 +57,8 @@ void warn(const std::string& text) {
   spdlog::warn("{}", text);
 }
 
-Experiment read_experiment(const CommonOptions& options) {
-  Experiment experiment = load_experiment(options.file, options.set);
-  if (options.samples) experiment.samples.set_all(*options.samples);
-  if (options.seed) experiment.seed = *options.seed;
-  return experiment;
-}
-
 std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix) {
-  return options.output.empty() ? "runs/" + experiment.name + suffix : options.output;
+  return output_folder(options.output, experiment, suffix);
 }
 
 void add_parameter_option(CLI::App& command, std::string& name) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "app/experiment_source.h"
 #include "optim/experiment/experiment.h"
 #include "optim/problem/problem.h"
 
@@ -15,14 +16,11 @@ namespace isochron {
 /// What main does once the command line is parsed; returns the exit status.
 using Action = std::function<int()>;
 
-struct CommonOptions {
-  std::string file;            ///< experiment, or for resume the folder
-  std::string output;          ///< empty: runs/NAME of run, runs/NAME-COMMAND of others
-  std::string at;              ///< empty: initial
-  std::optional<int> samples;  ///< per pixel, for every term that is not left out
-  int threads = 0;             ///< 0: all cores
-  std::optional<std::uint64_t> seed;
-  std::vector<std::string> set;
+/// `file` is the experiment, or for resume the folder.
+struct CommonOptions : ExperimentSource {
+  std::string output;  ///< empty: runs/NAME of run, runs/NAME-COMMAND of others
+  std::string at;      ///< empty: initial
+  int threads = 0;     ///< 0: all cores
   bool quiet = false;
   bool no_plots = false;
 };
@@ -37,9 +35,6 @@ void begin_session(const CommonOptions& options);
 
 /// Shows a warning of one line.
 void warn(const std::string& text);
-
-/// Reads the experiment with the command line's changes. Throws InputError.
-Experiment read_experiment(const CommonOptions& options);
 
 /// The -o folder or runs/NAME followed by `suffix`.
 std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix = "");

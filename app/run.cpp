@@ -13,20 +13,13 @@ struct RunCommand {
   bool force = false;
 };
 
-/// Makes the point of --at the one to start from.
-void start_at(const std::string& point, Experiment& experiment) {
-  const Problem problem(experiment);
-  const std::vector<double> theta = problem.parameters().parse_point(point);
-  for (std::size_t i = 0; i < experiment.parameters.size(); ++i) {
-    const Parameters::Block& block = problem.parameters().blocks()[i];
-    experiment.parameters[i].initial.assign(theta.begin() + block.begin, theta.begin() + block.begin + block.count);
-  }
-}
-
 int run(const RunCommand& command) {
   begin_session(command.common);
   Experiment experiment = read_experiment(command.common);
-  if (!command.common.at.empty()) start_at(command.common.at, experiment);
+  if (!command.common.at.empty()) {
+    const Problem problem(experiment);
+    start_at(problem.parameters().parse_point(command.common.at), problem.parameters(), experiment);
+  }
   const std::string folder = output_folder(command.common, experiment);
   return execute_run(folder, command.common, command.force,
                      [&](const RunOptions& options) { return start_run(experiment, options); });

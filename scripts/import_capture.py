@@ -23,8 +23,10 @@ import pathlib
 import sys
 
 import numpy as np
-from captures import response, writing
+import use_package
+from captures import response
 from captures.reading import CaptureError, open_arrays
+from isochron.captures import write_capture, write_response
 
 METRES_PER_PS = 299792458e-12
 LEAD_PS = 500  # kept before time zero where bins are aligned: the pulse's rise belongs to the response
@@ -168,7 +170,7 @@ def measured_response(arrays, layout, options, counts, start_ps):
     if found is None:
         raise CaptureError(f"{arrays.path}: {layout.name} has no direct light")
     offsets, values = found
-    writing.write_response(options.response, offsets, values)
+    write_response(options.response, offsets, values)
     mean = np.average(offsets[1:-1], weights=values[1:-1])
     return f"{options.response}: {offsets[0]:g} to {offsets[-1]:g} ps, {mean:.1f} ps on average"
 
@@ -191,8 +193,8 @@ def import_capture(options):
         said.append(measured_response(arrays, layout, options, counts, start))
     counts = rebinned(counts, lead + first, lead + last, options.rebin)
     width, start = layout.bin_ps * options.rebin, options.t_start_ps + first * layout.bin_ps
-    writing.write_capture(options.output, counts, width * METRES_PER_PS, start * METRES_PER_PS, points,
-                          np.asarray(options.normal) / np.linalg.norm(options.normal), options.laser, layout.format)
+    write_capture(options.output, counts, width * METRES_PER_PS, start * METRES_PER_PS, points,
+                  np.asarray(options.normal) / np.linalg.norm(options.normal), options.laser, layout.format)
     mean = counts.mean(dtype=float) * len(counts)
     return [f"{options.output}: {layout.format}, {counts.shape[1]} x {counts.shape[2]} points, {len(counts)} bins of "
             f"{width:g} ps from {start:g} ps, {mean:.4g} counts a point"] + said

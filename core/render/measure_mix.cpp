@@ -69,17 +69,7 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
   std::vector<double> sign;
   Rng rng(stream, 0, 0);
   for (int column = 0; column < basis.columns; ++column) sign.push_back(rng.uniform() < 0.5 ? -1 : 1);
-  TangentBasis one;
-  one.columns = 1;
-  one.row_begin.push_back(0);
-  for (std::size_t row = 0; row + 1 < basis.row_begin.size(); ++row) {
-    double sum = 0;
-    for (int e = basis.row_begin[row]; e < basis.row_begin[row + 1]; ++e)
-      sum += sign[basis.entries[e].column] * basis.entries[e].coefficient;
-    if (basis.differentiates(static_cast<int>(row))) one.entries.push_back({0, sum});
-    one.row_begin.push_back(static_cast<int>(one.entries.size()));
-  }
-  return one;
+  return basis.combined(sign);
 }
 
 /// Sums over square blocks of pixels.

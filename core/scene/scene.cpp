@@ -77,4 +77,22 @@ std::vector<double> TangentBasis::transpose_apply(const std::vector<double>& dof
   return gradient;
 }
 
+TangentBasis TangentBasis::combined(const std::vector<double>& coefficients) const {
+  TangentBasis one;
+  one.columns = 1;
+  one.row_begin.push_back(0);
+  for (std::size_t row = 0; row + 1 < row_begin.size(); ++row) {
+    double sum = 0;
+    bool changes = false;
+    for (int e = row_begin[row]; e < row_begin[row + 1]; ++e) {
+      const double coefficient = coefficients[entries[e].column];
+      sum += coefficient * entries[e].coefficient;
+      changes = changes || coefficient != 0;
+    }
+    if (changes) one.entries.push_back({0, sum});
+    one.row_begin.push_back(static_cast<int>(one.entries.size()));
+  }
+  return one;
+}
+
 }  // namespace isochron

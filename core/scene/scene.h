@@ -116,6 +116,8 @@ struct TangentBasis {
   bool differentiates(int dof) const { return row_begin[dof] != row_begin[dof + 1]; }
   /// Transpose product: gradient over dofs -> gradient over columns.
   std::vector<double> transpose_apply(const std::vector<double>& dof_gradient) const;
+  /// One column: the sum of all, each times its coefficient. What only columns with the coefficient 0 change, it does not.
+  TangentBasis combined(const std::vector<double>& coefficients) const;
 };
 
 }  // namespace isochron

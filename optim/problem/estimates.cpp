@@ -58,14 +58,59 @@ int pixels_of(const Problem& problem) {
   return problem.scene().camera.width * problem.scene().camera.height;
 }
 
+bool by_differences(const Problem& problem) {
+  return problem.experiment().gradient.method == GradientMethod::finite_difference;
+}
+
+/// `total` alone, of so many images that `difference(stream, range)` makes.
+template <class Difference>
+std::vector<DerivativeEstimate> differences(const Problem& problem, int count, std::uint32_t iteration,
+                                            const Poll& poll, int most_replicates, Difference&& difference) {
+  const int samples = problem.experiment().samples.primal;
+  require_replicates("primal", samples);
+  const Stream stream = problem.stream(Pass::finite_difference, iteration);
+  const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image == 0;
+  const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
+  return {collect("total", samples, replicates, independent, count, poll,
+                  [&](SampleRange range) { return difference(stream, range); })};
+}
+
+/// Along each column of the basis.
+std::vector<DerivativeEstimate> derivatives(const Problem& problem, const std::vector<double>& theta,
+                                            const TangentBasis& basis, std::uint32_t iteration, const Poll& poll,
+                                            int most_replicates) {
+  const SampleSpec& spec = problem.experiment().samples;
+  for (Term term : kTerms)
+    if (spec.term(term) > 0) require_replicates(name(term), spec.term(term));  // before anything is rendered
+  const Scene scene = problem.parameters().apply(theta);
+  const Renderer renderer = problem.renderer(scene, problem.estimator(spec.visibility, Purpose::images), &basis);
+  std::vector<DerivativeEstimate> components;
+  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return spec.term(t) > 0; });
+  ProgressStage stage("rendering the derivatives", static_cast<int>(terms));
+  for (Term term : kTerms) {
+    const int samples = spec.term(term);
+    if (samples == 0) continue;
+    const Stream stream = problem.stream(pass_of(term), iteration);
+    const bool independent = renderer.pixels_are_independent(term);
+    const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
+    components.push_back(collect(name(term), samples, replicates, independent, basis.columns, poll,
+                                 [&](SampleRange range) { return renderer.derive(term, stream, range); }));
+    stage.advance();
+  }
+  if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
+  components.insert(components.begin(), total_of(components));
+  return components;
+}
+
 }  // namespace
 
-ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll) {
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll,
+                             std::uint32_t iteration) {
   const int samples = problem.experiment().samples.primal;
   require_replicates("primal", samples);
   const Scene scene = problem.parameters().apply(theta);
   const Renderer renderer = problem.renderer(scene, problem.image_estimator());
-  const Stream stream = problem.stream(Pass::primal);
+  const Stream stream = problem.stream(Pass::primal, iteration);
   const bool independent = renderer.pixels_are_independent();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
   DerivativeEstimate result = collect("image", samples, replicates, independent, 1, poll, [&](SampleRange range) {
@@ -76,40 +121,31 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
 
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
                                                      int first, int count, const Poll& poll, int most_replicates) {
-  const SampleSpec& spec = problem.experiment().samples;
-  const int pixels = pixels_of(problem);
-  if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
-    require_replicates("primal", spec.primal);
-    const Stream stream = problem.stream(Pass::finite_difference);
-    const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image == 0;
-    const int replicates = replicate_count(spec.primal, pixels, independent, most_replicates);
-    return {collect("total", spec.primal, replicates, independent, count, poll, [&](SampleRange range) {
+  if (by_differences(problem))
+    return differences(problem, count, 0, poll, most_replicates, [&](const Stream& stream, SampleRange range) {
       std::vector<GatedImage> images;
       for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
       return images;
-    })};
-  }
-  for (Term term : kTerms)
-    if (spec.term(term) > 0) require_replicates(name(term), spec.term(term));  // before anything is rendered
-  const Scene scene = problem.parameters().apply(theta);
-  const TangentBasis basis = select_columns(problem.parameters().tangent(theta), first, count);
-  const Renderer renderer = problem.renderer(scene, problem.estimator(spec.visibility, Purpose::images), &basis);
-  std::vector<DerivativeEstimate> components;
-  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return spec.term(t) > 0; });
-  ProgressStage stage("rendering the derivatives", static_cast<int>(terms));
-  for (Term term : kTerms) {
-    const int samples = spec.term(term);
-    if (samples == 0) continue;
-    const Stream stream = problem.stream(pass_of(term));
-    const bool independent = renderer.pixels_are_independent(term);
-    const int replicates = replicate_count(samples, pixels, independent, most_replicates);
-    components.push_back(collect(name(term), samples, replicates, independent, count, poll,
-                                 [&](SampleRange range) { return renderer.derive(term, stream, range); }));
-    stage.advance();
-  }
-  if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
-  components.insert(components.begin(), total_of(components));
-  return components;
+    });
+  return derivatives(problem, theta, select_columns(problem.parameters().tangent(theta), first, count), 0, poll,
+                     most_replicates);
+}
+
+std::vector<DerivativeEstimate> estimate_tangent(const Problem& problem, const std::vector<double>& theta,
+                                                 const std::vector<double>& tangent, const Poll& poll,
+                                                 std::uint32_t iteration) {
+  if (by_differences(problem))
+    return differences(problem, 1, iteration, poll, kMostReplicates, [&](const Stream& stream, SampleRange range) {
+      GatedImage sum = problem.blank();
+      for (int i = 0; i < problem.parameters().size(); ++i) {
+        if (tangent[i] == 0) continue;
+        const GatedImage along = problem.finite_difference(theta, i, stream, range);
+        for (std::size_t k = 0; k < sum.data.size(); ++k) sum.data[k] += tangent[i] * along.data[k];
+      }
+      return std::vector<GatedImage>{std::move(sum)};
+    });
+  return derivatives(problem, theta, problem.parameters().tangent(theta).combined(tangent), iteration, poll,
+                     kMostReplicates);
 }
 
 int gradient_repeats(const Problem& problem) {

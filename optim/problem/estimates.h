@@ -19,7 +19,8 @@ struct ImageEstimate {
 };
 
 /// The gated images at theta. Throws InputError when samples.primal is below 2.
-ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll);
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll,
+                             std::uint32_t iteration = 0);
 
 /// One component of the derivative images of a range of unknowns.
 struct DerivativeEstimate {
@@ -34,6 +35,11 @@ struct DerivativeEstimate {
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
                                                      int first, int count, const Poll& poll,
                                                      int most_replicates = kMostReplicates);
+
+/// The same of one unknown, along which all others move as `tangent` says, with the random numbers of an iteration.
+std::vector<DerivativeEstimate> estimate_tangent(const Problem& problem, const std::vector<double>& theta,
+                                                 const std::vector<double>& tangent, const Poll& poll,
+                                                 std::uint32_t iteration = 0);
 
 struct GradientEstimate {
   Statistics gradient;  ///< one entry per unknown; replicates of residual and derivative

@@ -87,10 +87,14 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       counts_(read_counts(experiment_, scene_)),
       gates_(make_gates(experiment_.gates)),
       parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters, length_unit(experiment_.gates))),
-      cache_(std::make_unique<SceneCache>(scene_, caster_update(experiment_, scene_))),
+      caster_update_(caster_update(experiment_, scene_)),
+      cache_(std::make_unique<SceneCache>(scene_, caster_update_)),
       readings_(make_readings(experiment_, gates_, scene_.camera.width, scene_.camera.height,
                               scene_.capture ? scene_.camera.height / scene_.capture->rows : 1)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
+  const SampleSpec& samples = experiment_.samples;
+  choice_ = {
+      {samples.primal, samples.interior, samples.visibility, samples.path_length}, experiment_.seed, evaluations_};
   for (std::size_t i = 0; i < experiment_.parameters.size(); ++i) {
     const ParameterSpec& spec = experiment_.parameters[i];
     const Parameters::Block& block = parameters_->blocks()[i];
@@ -131,7 +135,7 @@ std::string Problem::light_that_leaves_the_camera() const {
 }
 
 const EstimatorOptions& Problem::estimator(Purpose purpose) const {
-  auto& known = estimator_[purpose == Purpose::gradients];
+  auto& known = settled_.estimator[purpose == Purpose::gradients];
   if (!known) {
     EstimatorOptions options = experiment_.estimator;
     const std::vector<double> theta = parameters_->initial();
@@ -152,13 +156,30 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
 }
 
 const EstimatorOptions& Problem::image_estimator() const {
-  if (!image_estimator_) {
+  if (!settled_.image_estimator) {
     EstimatorOptions options = experiment_.estimator;
     options.mix = measure_mix(parameters_->apply(parameters_->initial()), gates_, options, nullptr, stream(Pass::mix),
                               Purpose::images, {double{1} * experiment_.samples.primal, 0, 0});
-    image_estimator_ = options;
+    settled_.image_estimator = options;
   }
-  return *image_estimator_;
+  return *settled_.image_estimator;
+}
+
+void Problem::choose(const SampleSpec& samples, std::uint64_t seed, int evaluations) {
+  constexpr std::size_t kMostRemembered = 16;
+  const Choice choice{{samples.primal, samples.interior, samples.visibility, samples.path_length}, seed, evaluations};
+  if (choice == choice_) return;
+  if (remembered_.size() >= kMostRemembered) remembered_.clear();
+  remembered_[choice_] = std::move(settled_);
+  settled_ = std::move(remembered_[choice]);
+  choice_ = choice;
+  experiment_.samples = samples;
+  experiment_.seed = seed;
+  evaluations_ = evaluations;
+  if (const CasterUpdate update = caster_update(experiment_, scene_); update != caster_update_) {
+    caster_update_ = update;
+    cache_ = std::make_unique<SceneCache>(scene_, update);
+  }
 }
 
 void Problem::require_parameters() const {
@@ -178,6 +199,10 @@ Evaluation Problem::no_evaluation(const GatedImage& target) const {
   result.loss = result.mean_squared_error = std::numeric_limits<double>::infinity();
   result.gradient.assign(static_cast<std::size_t>(parameters_->size()), kNothing);
   return result;
+}
+
+GatedImage Problem::blank() const {
+  return GatedImage(scene_.camera.width, scene_.camera.height, gates_.size(), scene_.grey ? 1 : 3);
 }
 
 GatedImage Problem::render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const {

@@ -2,9 +2,11 @@
 #pragma once
 #include <array>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "core/base/progress.h"
@@ -76,6 +78,10 @@ class Problem {
   /// Takes the place of the experiment's numbers of samples; what automatic sampling has settled on stays.
   void set_samples(const SampleSpec& samples) { experiment_.samples = samples; }
 
+  /// All is as if the experiment's file had these samples and this seed, and set_evaluations been called. Automatic sampling
+  /// settles for each such choice by itself, and remembers some.
+  void choose(const SampleSpec& samples, std::uint64_t seed, int evaluations);
+
   /// Throws InputError when the experiment has no parameters: nothing to differentiate.
   void require_parameters() const;
 
@@ -88,6 +94,8 @@ class Problem {
   /// What `evaluate` gives where it does not: infinite loss, an image and a gradient of NaN.
   Evaluation no_evaluation(const GatedImage& target) const;
 
+  /// A black image of the experiment's shape.
+  GatedImage blank() const;
   /// Gated images at theta. Throws InputError where it cannot be rendered.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
@@ -146,6 +154,12 @@ class Problem {
   /// The name of a light at the camera that parameters move away from it; empty where there is none.
   std::string light_that_leaves_the_camera() const;
 
+  /// What automatic sampling has settled on.
+  struct Settled {
+    std::array<std::optional<EstimatorOptions>, 2> estimator;  ///< per purpose
+    std::optional<EstimatorOptions> image_estimator;
+  };
+
   static std::uint32_t pass_number(Pass pass) { return static_cast<std::uint32_t>(pass); }
 
   Experiment experiment_;
@@ -153,13 +167,16 @@ class Problem {
   std::optional<GatedImage> counts_;  ///< of the target's file; reading them may set the gates' bins
   GateSet gates_;
   std::unique_ptr<Parameters> parameters_;
+  CasterUpdate caster_update_;
   std::unique_ptr<SceneCache> cache_;
   Readings readings_;
   Preconditioner preconditioner_;
   PairPenalty penalty_;
-  int evaluations_;                                                   ///< of the loss gradient
-  mutable std::array<std::optional<EstimatorOptions>, 2> estimator_;  ///< per purpose
-  mutable std::optional<EstimatorOptions> image_estimator_;
+  int evaluations_;  ///< of the loss gradient
+  mutable Settled settled_;
+  using Choice = std::tuple<std::array<int, 4>, std::uint64_t, int>;
+  Choice choice_;                         ///< that settled_ belongs to
+  std::map<Choice, Settled> remembered_;  ///< of other choices
 };
 
 Pass pass_of(Term term);

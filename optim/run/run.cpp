@@ -151,6 +151,7 @@ class Run {
       log.append(last_, theta, now.gradient);
       final = now;
       if (!closing) report(first, seconds_since(call_start));
+      if (options_.row) options_.row(last_, theta, now, closing);
     };
     loop.save = [&] {
       state_.seconds += seconds_since(iteration_start);

@@ -8,8 +8,10 @@
 #pragma once
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "optim/experiment/experiment.h"
+#include "optim/run/log.h"
 #include "optim/run/loop.h"
 
 namespace isochron {
@@ -24,9 +26,12 @@ struct Progress {
 
 struct RunOptions {
   std::string folder;
-  bool force = false;                               ///< overwrite a run that the folder holds (else it is moved aside)
-  std::function<bool()> stop;                       ///< asked between passes; true: leave a checkpoint and return
-  std::function<void(const Progress&)> progress;    ///< after every row of the log
+  bool force = false;                             ///< overwrite a run that the folder holds (else it is moved aside)
+  std::function<bool()> stop;                     ///< asked between passes; true: leave a checkpoint and return
+  std::function<void(const Progress&)> progress;  ///< after every row of the log
+  /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends
+  /// the run; Interrupted as `stop` does.
+  std::function<void(const LogRow&, const std::vector<double>& theta, const Evaluation& now, bool closing)> row;
   std::function<void(const std::string&)> warning;  ///< one line
   std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
 };

@@ -6,10 +6,7 @@ import zipfile
 import h5py
 import numpy as np
 import scipy.io
-
-
-class CaptureError(Exception):
-    """A file or an option that cannot be used: one line."""
+from isochron.captures import CaptureError
 
 
 class Arrays:

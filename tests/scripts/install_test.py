@@ -68,6 +68,10 @@ class InstallTest(unittest.TestCase):
         where = "import isochron.plot; print(isochron.plot.__file__)"
         found = run(sys.executable, "-c", where, env={"PYTHONPATH": str(packages)}, cwd=self.folder).stdout
         self.assertEqual(pathlib.Path(found.strip()), packages / "isochron/plot.py")
+        for path in BUILD.glob("python/isochron/_core*.so"):
+            self.assertTrue((packages / "isochron" / path.name).exists())
+            run(sys.executable, "-c", "import isochron; isochron.Experiment('cube.yaml').render(samples=2)",
+                env={"PYTHONPATH": str(packages)}, cwd=self.share / "experiments")
         # The program looks nowhere else: without the package there are no pictures.
         (packages / "isochron").rename(packages / "hidden")
         try:
@@ -76,6 +80,10 @@ class InstallTest(unittest.TestCase):
             self.assertRegex(result.stderr, "No module named '?isochron")
         finally:
             (packages / "hidden").rename(packages / "isochron")
+
+    def test_scripts(self):
+        for script in sorted((self.share / "scripts").glob("import_*.py")):
+            self.assertIn("usage:", run(sys.executable, script, "--help", env={}, cwd=self.folder).stdout)
 
     def test_cpp(self):
         build, out = self.scratch(), self.scratch()

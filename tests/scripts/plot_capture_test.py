@@ -17,7 +17,7 @@ import h5py
 import matplotlib.image
 import numpy as np
 from isochron import plot_capture
-from captures.writing import write_capture
+from isochron.captures import write_capture
 from isochron.pictures.back_projection import BackProjection
 from isochron.pictures.capture_run import METRES_PER_PS, CaptureRun
 from isochron.pictures.deviance import Fit

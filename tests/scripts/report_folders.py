@@ -9,8 +9,8 @@ import sys
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent / "app/python")]
 import numpy as np
-from captures.writing import write_capture
 from isochron import exr
+from isochron.captures import write_capture
 
 METRES_PER_PS = 299792458e-12
 SCENE = """camera: {position: [0, 1, 4], look_at: [0, 0.3, 0], up: [0, 1, 0], fov: 40, resolution: [8, 6]}

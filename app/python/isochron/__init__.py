@@ -1,1 +1,36 @@
-"""isochron: inverse rendering for time-of-flight cameras."""
+"""isochron: inverse rendering for time-of-flight cameras.
+
+Experiment renders, differentiates and optimises; read_run, read_image, read_exr and read_capture read what was written, and
+work where the compiled part of the package is missing, too. isochron.torch makes images that PyTorch differentiates.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from isochron.errors import InputError
+from isochron.experiment import Evaluation, Experiment, Gradient, Iteration, Parameter, resume
+from isochron.exr import read as read_exr
+from isochron.exr import write as write_exr
+from isochron.image import Coordinates, Image
+from isochron.parallel import set_threads, threads
+from isochron.runs import Run, read_image, read_run
+
+if TYPE_CHECKING:
+    from isochron.captures import Capture, read_capture, write_capture
+
+__all__ = ["Capture", "Coordinates", "Evaluation", "Experiment", "Gradient", "Image", "InputError", "Iteration", "Parameter", "Run",
+           "read_capture", "read_exr", "read_image", "read_run", "resume", "set_threads", "threads", "write_capture", "write_exr"]
+
+
+def __getattr__(name: str) -> Any:
+    # h5py takes long to load.
+    if name in ("Capture", "read_capture", "write_capture"):
+        from isochron import captures
+
+        return getattr(captures, name)
+    raise AttributeError(f"module 'isochron' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return __all__

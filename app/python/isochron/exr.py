@@ -4,17 +4,23 @@ Follows the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit fl
 integers are read too.
 """
 
+from __future__ import annotations
+
 import struct
 import zlib
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
+
+from isochron.errors import InputError
 
 MAGIC = 20000630
 SAMPLE_TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
 LINES_PER_BLOCK = {0: 1, 2: 1, 3: 16}  # by compression: none, ZIPS, ZIP
 
 
-class ExrError(Exception):
+class ExrError(InputError):
     """The file is no EXR, is damaged, or uses what this reader leaves out."""
 
 
@@ -97,27 +103,31 @@ def _parse(data):
     return images
 
 
-def read(path):
+def read(path: Any) -> dict[str, np.ndarray]:
     """All channels: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
     with open(path, "rb") as file:
         data = file.read()
     try:
         return _parse(data)
+    except ExrError:
+        raise
     except (IndexError, KeyError, ValueError, struct.error, zlib.error) as error:
         raise ExrError(f"damaged file ({error})") from error
 
 
-def attributes(path):
+def attributes(path: Any) -> dict[str, bytes]:
     """The header: name -> value as bytes. Raises ExrError, OSError."""
     with open(path, "rb") as file:
         data = file.read()
     try:
         return _header(data)[0]
+    except ExrError:
+        raise
     except (IndexError, ValueError, struct.error) as error:
         raise ExrError(f"damaged file ({error})") from error
 
 
-def write(path, images, notes=None):
+def write(path: Any, images: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> None:
     """Writes name -> array of height x width as 32-bit floats with ZIPS compression; `notes` (name -> text) go into the
     header."""
     names = sorted(images)

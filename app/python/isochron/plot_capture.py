@@ -17,9 +17,9 @@ import sys
 import matplotlib
 
 matplotlib.use("Agg")
+from isochron.errors import InputError
 from isochron.pictures.capture_run import CaptureRun
 from isochron.pictures.capture_sheet import draw_sheet
-from isochron.pictures.reading import PlotError
 
 
 class Parser(argparse.ArgumentParser):
@@ -39,7 +39,7 @@ def main(arguments):
     try:
         draw_sheet(CaptureRun(options.run), output)
         return 0
-    except PlotError as error:
+    except InputError as error:
         print(f"plot_capture.py: {error}", file=sys.stderr)
     except OSError as error:
         print(f"plot_capture.py: {output}: cannot be written: {error.strerror or error}", file=sys.stderr)

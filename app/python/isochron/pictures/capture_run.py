@@ -3,13 +3,15 @@
 import pathlib
 import re
 
-import h5py
 import numpy as np
 
 from isochron import exr
+from isochron.captures import read_capture
+from isochron.errors import InputError
 from isochron.pictures.mesh_files import name_in_files, read_mesh, read_scene_mesh
 from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
+from isochron.runs import read_values
 
 METRES_PER_PS = 299792458e-12
 METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time; light's way in it
@@ -45,6 +47,8 @@ class CaptureRun:
         self.gate_unit = METRES.get(gates.get("unit", "scene"), self.scene_unit)
         try:
             self._read_fit(directory / "final.h5")
+        except InputError:
+            raise
         except (OSError, KeyError, ValueError, TypeError, IndexError) as error:
             reason = str(error).strip("'\"")
             raise PlotError(f"{directory / 'final.h5'}: cannot be read: {reason}") from error
@@ -54,19 +58,17 @@ class CaptureRun:
         self._read_surfaces()
 
     def _read_fit(self, path):
-        with h5py.File(path, "r") as file:
-            light = file["H"]
-            points = file["sensor_grid_xyz"][()]
-            behind = points.ndim - 1
-            self.spots = int(np.prod(light.shape[1:-behind]))
-            first = (slice(None),) + (0,) * (light.ndim - 1 - behind)
-            self.fit = np.asarray(light[first], np.float32).reshape(len(light), points.shape[0], -1)
-            self.points = points.reshape(points.shape[0], -1, 3)
-            self.delta, self.start = float(file["delta_t"][()]), float(file["t_start"][()])
-            normals = file["sensor_grid_normals"][()].reshape(-1, 3)
-            laser = file["laser_grid_xyz"][()].reshape(-1, 3) if "laser_grid_xyz" in file else points.reshape(-1, 3)
-            extra = bool(file["t_accounts_first_and_last_bounces"][()])
-            origins = [file[f"{name}_xyz"][()] for name in ("laser", "sensor")] if extra else None
+        capture = read_capture(path)
+        light, points = capture.counts, capture.points
+        behind = points.ndim - 1
+        self.spots = int(np.prod(light.shape[1:-behind]))
+        first = (slice(None),) + (0,) * (light.ndim - 1 - behind)
+        self.fit = light[first].reshape(len(light), points.shape[0], -1)
+        self.points = points.reshape(points.shape[0], -1, 3)
+        self.delta, self.start = capture.delta_t, capture.t_start
+        normals = capture.normals.reshape(-1, 3)
+        laser = (points if capture.laser is None else capture.laser).reshape(-1, 3)
+        origins = capture.origins
         flat = self.points.reshape(-1, 3)
         self.confocal = self.spots == 1 and laser.shape == flat.shape and np.allclose(laser, flat)
         self.laser = self.points if self.confocal else np.broadcast_to(laser[0], self.points.shape)
@@ -112,15 +114,8 @@ class CaptureRun:
 
     def _read_parameters(self):
         """Final values by name: those that summary.yaml gives, or, of a run that is under way, the checkpoint's."""
-        self.summary, values = {}, {}
+        self.summary, self.values = read_values(self.directory)
         try:
-            if (self.directory / "summary.yaml").exists():
-                self.summary = read_yaml(self.directory / "summary.yaml")
-                values = self.summary["parameters"]
-            elif (self.directory / "checkpoint.yaml").exists():
-                entries = read_yaml(self.directory / "checkpoint.yaml")["parameters"]
-                values = {entry["name"]: entry["value"] for entry in entries}
-            self.values = {name: numbers(value) for name, value in values.items()}
             self.specs = {spec["name"]: spec for spec in self.experiment.get("parameters") or []}
             self.unknowns = sum(len(v) for v in self.values.values())
             offsets = [n for n, s in self.specs.items() if s.get("type") == "time_offset" and n in self.values]

@@ -7,12 +7,13 @@ import numpy as np
 import yaml
 
 from isochron import exr
+from isochron.errors import InputError
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in Python alone, a number per sensor point takes seconds
 CHANNEL = re.compile(r"(?:(?P<component>.+)\.)?gate(?P<gate>\d+)\.(?P<channel>[RGBY])")
 
 
-class PlotError(Exception):
+class PlotError(InputError):
     """Something that keeps a picture from being drawn, in one line."""
 
 
@@ -84,8 +85,9 @@ class Folder:
 
     def gates(self, path, count):
         """Gates of one EXR file."""
+        header = exr.attributes(path)
         try:
-            notes = {k: v.decode("utf-8") for k, v in exr.attributes(path).items() if k.startswith("isochron.")}
+            notes = {k: v.decode("utf-8") for k, v in header.items() if k.startswith("isochron.")}
             if "isochron.gateUnit" in notes:
                 centers = [float(c) for c in notes.get("isochron.gateCenters", "").split()]
                 return Gates(count, centers or None, notes["isochron.gateUnit"], notes["isochron.quantity"])

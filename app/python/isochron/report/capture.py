@@ -3,7 +3,7 @@ found as who stands at the wall sees it, and how well the fit explains the count
 
 import numpy as np
 
-from isochron.pictures.reading import PlotError
+from isochron.errors import InputError
 from isochron.pictures.scales import scale_of
 from isochron.report.charts import Chart, Series, grid
 from isochron.report.images import Viewer, row_of, slice_of
@@ -21,7 +21,7 @@ def capture_section(run):
     if (run.directory / "final.h5").exists():
         try:
             parts += fitted(run)
-        except PlotError as error:
+        except InputError as error:
             run.note(str(error))
     return section("capture", "The capture", *parts)
 

@@ -1,0 +1,282 @@
+"""Experiments: rendered, differentiated and run by the program's own code."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from isochron.errors import InputError
+from isochron.image import Coordinates, Image
+from isochron.runs import Run, read_run
+
+Path = str | os.PathLike[str]
+Theta = np.ndarray | Sequence[float] | Mapping[str, Any] | None
+Overrides = Mapping[str, Any] | Sequence[str]
+
+
+def extension() -> Any:
+    """The compiled part of this package, loaded when first needed. Raises ImportError where it was not built."""
+    try:
+        return importlib.import_module("isochron._core")
+    except ModuleNotFoundError as error:
+        if error.name != "isochron._core":
+            raise
+        raise ImportError("isochron: Experiment, resume and threads need the package's extension, which is not beside it: scripts/build "
+                          "makes it, for PYTHONPATH=build/python; without it there are only the readers") from None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Parameter:
+    """One named parameter of an experiment. Values are in its unit; arrays have its shape."""
+
+    name: str
+    type: str
+    """As the experiment's file says: translation, rotation, vertices, albedo, emission, time_offset, ..."""
+    unit: str
+    """'scene units' (of the offset along a direction of length one), 'degrees', the gates' unit; '' for what has none."""
+    scale: float
+    """How much of the unit counts as one where parameters of different units are compared."""
+    shape: tuple[int, ...]
+    """() for one value, (3,) for a colour, (n,) or (n, 3) for vertices."""
+    slice: slice
+    """Where its values stand in theta."""
+    initial: np.ndarray
+    target: np.ndarray
+    """NaN where unknown."""
+    lower: np.ndarray
+    """-inf where there is no bound."""
+    upper: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Estimates of one iteration. All are unbiased, so that `loss` can lie below 0 where the least possible is 0."""
+
+    loss: float
+    loss_noise: float
+    """Standard error of the loss."""
+    mean_squared_error: float
+    """Of the image against the target."""
+    gradient: np.ndarray
+    """[unknown]: of the loss, per unit of each parameter."""
+    image: Image
+    """[gate, row, column, channel]"""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Gradient:
+    """Of the loss, with errors; arrays are [unknown], per unit of each parameter."""
+
+    gradient: np.ndarray
+    standard_error: np.ndarray
+    degrees_of_freedom: np.ndarray
+    """Of the standard errors, for Student's law."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Iteration:
+    """What a callback is told after a row of a run's log."""
+
+    iteration: int
+    closing: bool
+    """Whether the row is of final parameters that no iteration had, such as an average."""
+    seconds: float
+    """Spent in iterations so far."""
+    loss: float
+    loss_noise: float
+    """Standard error of the loss."""
+    image_rmse: float
+    """Root mean square error of the image against the target; 0 where its square is estimated below 0."""
+    param_rmse: float
+    """Distance to the parameters' target values, in units of their scales; NaN where these are unknown."""
+    gradient_norm: float
+    """Of the gradient by parameters in units of their scales."""
+    theta: np.ndarray
+    """[unknown]"""
+    gradient: np.ndarray
+    """[unknown]"""
+    image: np.ndarray
+    """[gate, row, column, channel]"""
+
+
+Callback = Callable[[Iteration], Any]
+
+
+def _row(callback: Callback | None) -> Callable[[dict[str, Any]], bool] | None:
+    if callback is None:
+        return None
+    return lambda values: bool(callback(Iteration(**values)))
+
+
+def _overrides(overrides: Overrides) -> list[str]:
+    if not isinstance(overrides, Mapping):
+        return [str(text) for text in overrides]
+
+    def text(key: str, value: Any) -> str:
+        if value is None:
+            return ""
+        try:
+            return json.dumps(value, default=lambda other: other.tolist(), allow_nan=False)
+        except (AttributeError, TypeError, ValueError):
+            raise InputError(f"overrides: {key}: {value!r} has no YAML (allowed: numbers, texts, booleans, None, lists, "
+                             "dictionaries, arrays)") from None
+
+    return [f"{key}={text(key, value)}" for key, value in overrides.items()]
+
+
+class Experiment:
+    """An experiment's file made ready: scene, gates, parameters, samples.
+
+    overrides: values in place of the file's, {"samples.primal": 16, "parameters[0].initial": 0.2} (None removes a key), or
+    a list of "KEY.PATH=VALUE", as the option --set of the commands.
+
+    Wherever `theta` is asked for: an array [unknown] in the order of `parameters`, a dictionary from names to values (those
+    that are not named have their initial values), or None: the initial values. Random numbers follow from `seed` and
+    `iteration` alone, the number of threads does not matter. Give each iteration of an optimisation another `iteration`;
+    with another `seed`, automatic sampling is settled anew, which takes time.
+
+    Calls render without Python's lock. Ctrl-C ends them. Raises InputError.
+    """
+
+    def __init__(self, path: Path, overrides: Overrides = ()) -> None:
+        self._session = extension().Session(os.fspath(path), _overrides(overrides))
+        self._parameters = {}
+        for item in self._session.parameters():
+            begin, count = item.pop("begin"), item.pop("count")
+            for key in ("initial", "target", "lower", "upper"):
+                item[key] = item[key].reshape(item["shape"])
+            self._parameters[item["name"]] = Parameter(slice=slice(begin, begin + count), **item)
+        self._coordinates = Coordinates(**self._session.coordinates())
+        self._shape = tuple(self._session.shape())
+
+    def __repr__(self) -> str:
+        return f"<isochron.Experiment {self.name}: {', '.join(self._parameters) or 'no parameters'}>"
+
+    @property
+    def name(self) -> str:
+        return str(self._session.name())
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """Name -> Parameter, in the order of theta."""
+        return dict(self._parameters)
+
+    @property
+    def coordinates(self) -> Coordinates:
+        """Of all images of the experiment."""
+        return self._coordinates
+
+    @property
+    def initial(self) -> np.ndarray:
+        """[unknown]: theta where optimisations start."""
+        return self._flat("initial")
+
+    @property
+    def lower(self) -> np.ndarray:
+        """[unknown]: the least that theta may be; -inf where there is no bound."""
+        return self._flat("lower")
+
+    @property
+    def upper(self) -> np.ndarray:
+        """[unknown]: the most that theta may be; inf where there is no bound."""
+        return self._flat("upper")
+
+    @property
+    def target(self) -> Image:
+        """[gate, row, column, channel]: what optimisations aim at, rendered at the target values or read from a file; as runs
+        use it, rounded to 32 bits. Computed when first asked for."""
+        return Image(self._session.target(), self._coordinates)
+
+    def theta(self, values: Theta = None) -> np.ndarray:
+        """[unknown]: of a dictionary from names to values, of None the initial values, of an array itself."""
+        if values is not None and not isinstance(values, Mapping):
+            return np.asarray(values, dtype=float).reshape(-1)
+        flat = self.initial
+        for name, value in (values or {}).items():
+            if name not in self._parameters:
+                raise InputError(f"theta: there is no parameter '{name}' (allowed: {', '.join(self._parameters) or 'none'})")
+            parameter = self._parameters[name]
+            try:
+                flat[parameter.slice] = np.broadcast_to(np.asarray(value, dtype=float), parameter.shape).reshape(-1)
+            except ValueError:
+                raise InputError(f"theta: {name}: shape {np.shape(value)} (allowed: {parameter.shape}, or one number)") from None
+        return flat
+
+    def values(self, theta: Theta) -> dict[str, np.ndarray]:
+        """Name -> array of the parameter's shape."""
+        flat = self.theta(theta)
+        return {name: flat[p.slice].reshape(p.shape) for name, p in self._parameters.items()}
+
+    def render(self, theta: Theta = None, samples: int | None = None, seed: int | None = None, iteration: int = 0) -> Image:
+        """Gated images [gate, row, column, channel] in the unit of `coordinates.quantity`, those that `isochron render` writes.
+
+        samples: per pixel, at least 2; default: samples.primal of the experiment.
+        """
+        return Image(self._session.render(self.theta(theta), samples, seed, iteration), self._coordinates)
+
+    def jvp(self, theta: Theta, tangent: Theta, samples: int | None = None, seed: int | None = None,
+            iteration: int = 0) -> Image:
+        """Derivative [gate, row, column, channel] of the images along `tangent`, the Jacobian times it; with one 1 and else
+        zeros in it what `isochron derive --parameter NAME` writes as `total`.
+
+        tangent: [unknown], or a dictionary from names to values, in which what is not named is 0.
+        """
+        if isinstance(tangent, Mapping):
+            tangent = self.theta({**{name: 0.0 for name in self._parameters}, **tangent})
+        along = np.asarray(tangent, dtype=float).reshape(-1)
+        return Image(self._session.jvp(self.theta(theta), along, samples, seed, iteration), self._coordinates)
+
+    def vjp(self, theta: Theta, adjoint: Any, samples: int | None = None, seed: int | None = None,
+            iteration: int = 0) -> np.ndarray:
+        """[unknown]: the transposed Jacobian of the images times `adjoint`, an array that broadcasts to
+        [gate, row, column, channel]. With the derivative of a loss by the image it is the loss's gradient, whatever the number
+        of unknowns for the price of about one image. Its samples go where the adjoint is large."""
+        try:
+            full = np.broadcast_to(np.asarray(adjoint, dtype=float), self._shape)
+        except ValueError:
+            raise InputError(f"adjoint: shape {np.shape(adjoint)} (allowed: {self._shape}, or what broadcasts to it)") from None
+        return np.asarray(self._session.vjp(self.theta(theta), np.moveaxis(full, 0, 2), samples, seed, iteration))
+
+    def evaluate(self, theta: Theta = None, iteration: int = 0) -> Evaluation:
+        """Loss, its gradient and the image: exactly what the experiment's optimiser evaluates in an iteration at theta. The
+        same iteration has the same random numbers, so that differences between its thetas are far less noisy than the loss."""
+        found = self._session.evaluate(self.theta(theta), iteration)
+        found["image"] = Image(found["image"], self._coordinates)
+        return Evaluation(**found)
+
+    def loss_and_gradient(self, theta: Theta = None, iteration: int = 0) -> tuple[float, np.ndarray]:
+        """Loss and gradient [unknown] of `evaluate`, as scipy.optimize.minimize(..., jac=True) wants them."""
+        found = self.evaluate(theta, iteration)
+        return found.loss, found.gradient
+
+    def gradient(self, theta: Theta = None, samples: int | None = None, seed: int | None = None) -> Gradient:
+        """The loss's gradient with standard errors, what `isochron gradient` writes."""
+        return Gradient(**self._session.gradient(self.theta(theta), samples, seed))
+
+    def run(self, folder: Path | None = None, *, start: Theta = None, callback: Callback | None = None,
+            force: bool = False) -> Run:
+        """Optimises, as `isochron run` does, into a folder (default: runs/NAME), and reads it.
+
+        start: theta to begin at, in place of the initial values.
+        callback: called with an Iteration after every row of the log; the run stops, and can be resumed, where it returns
+        something true or raises.
+        force: an earlier run in the folder is deleted, not moved aside.
+        """
+        first = None if start is None else self.theta(start)
+        return read_run(self._session.run("" if folder is None else os.fspath(folder), first, _row(callback), force))
+
+    def _flat(self, key: str) -> np.ndarray:
+        parts = [getattr(p, key).reshape(-1) for p in self._parameters.values()]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+
+def resume(folder: Path, callback: Callback | None = None) -> Run:
+    """Goes on from the last checkpoint of a run, to the same result bit for bit, and reads it. callback: as of Experiment.run."""
+    extension().resume(os.fspath(folder), _row(callback))
+    return read_run(folder)

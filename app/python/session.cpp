@@ -1,0 +1,157 @@
+#include "app/python/session.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "app/experiment_source.h"
+#include "app/python/work.h"
+#include "core/base/error.h"
+#include "optim/problem/darkness.h"
+#include "optim/problem/estimates.h"
+#include "optim/problem/memory.h"
+#include "optim/problem/rendered_objective.h"
+
+namespace py = pybind11;
+
+namespace isochron {
+namespace {
+
+void require_all_finite(const std::vector<double>& values, const std::string& what) {
+  for (const double value : values)
+    if (!std::isfinite(value)) throw InputError(fmt::format("{}: {} is not finite", what, value));
+}
+
+}  // namespace
+
+Session::Session(const std::string& file, const std::vector<std::string>& overrides) {
+  std::vector<std::string> warnings;
+  run_work([&](Work&) {
+    experiment_ = read_experiment({file, overrides, {}, {}});
+    problem_ = std::make_unique<Problem>(experiment_, [&](const std::string& text) { warnings.push_back(text); });
+  });
+  own_evaluations_ = std::max(1, experiment_.optimizer.iterations);
+  warn_python(warnings);
+}
+
+std::vector<double> Session::point(const Array& theta) const {
+  const Parameters& parameters = problem_->parameters();
+  if (theta.size() != parameters.size())
+    throw InputError(fmt::format("theta: {} values are given (allowed: {})", theta.size(), parameters.size()));
+  const std::vector<double> values = to_vector(theta);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!(values[i] >= parameters.lower()[i] && values[i] <= parameters.upper()[i] && std::isfinite(values[i])))
+      throw InputError(fmt::format("theta: {}: {} is out of bounds (allowed: {} to {})",
+                                   parameters.component_names()[i], values[i], parameters.lower()[i],
+                                   parameters.upper()[i]));
+  return values;
+}
+
+void Session::require_renderable(const std::vector<double>& theta) const {
+  if (!problem_->can_render(theta))
+    throw InputError(
+        fmt::format("theta: puts a vertex too far away (allowed: coordinates of at most {})", kLargestCoordinate));
+}
+
+void Session::choose(Samples samples, Seed seed, int evaluations) {
+  SampleSpec spec = experiment_.samples;
+  if (samples) {
+    if (*samples < 1 || *samples > 1 << 30)
+      throw InputError(fmt::format("samples: {} is out of range (allowed: 1 to {})", *samples, 1 << 30));
+    spec.set_all(*samples);
+  }
+  problem_->choose(spec, seed.value_or(experiment_.seed), evaluations);
+}
+
+py::array Session::render(const Array& array, Samples samples, Seed seed, std::uint32_t iteration) {
+  const std::vector<double> theta = point(array);
+  std::string dark;
+  GatedImage found = run_work_for([&] {
+    choose(samples, seed, own_evaluations_);
+    require_renderable(theta);
+    require_memory(*problem_, image_memory(*problem_));
+    GatedImage image = estimate_image(*problem_, theta, throw_if_stopped, iteration).image;
+    require_finite(image, "the image");
+    dark = darkness_warning(*problem_, theta, image, "the image");
+    return image;
+  });
+  if (!dark.empty()) warn_python({dark});
+  return to_array(std::move(found));
+}
+
+py::array Session::jvp(const Array& array, const Array& tangent, Samples samples, Seed seed, std::uint32_t iteration) {
+  const std::vector<double> theta = point(array), direction = to_vector(tangent);
+  require_all_finite(direction, "tangent");
+  if (direction.size() != theta.size())
+    throw InputError(fmt::format("tangent: {} values are given (allowed: {})", direction.size(), theta.size()));
+  return to_array(run_work_for([&] {
+    choose(samples, seed, own_evaluations_);
+    require_renderable(theta);
+    problem_->require_parameters();
+    require_memory(*problem_, derivative_memory(*problem_, 1, 4 + kMostReplicates));
+    GatedImage image = estimate_tangent(*problem_, theta, direction, throw_if_stopped, iteration)[0].images[0];
+    require_finite(image, "the derivative");
+    return image;
+  }));
+}
+
+py::array Session::vjp(const Array& array, const Array& adjoint, Samples samples, Seed seed, std::uint32_t iteration) {
+  const std::vector<double> theta = point(array);
+  const GatedImage image = to_image(adjoint, problem_->blank());
+  require_all_finite(image.data, "adjoint");
+  return to_array(run_work_for([&] {
+    choose(samples, seed, own_evaluations_);
+    require_renderable(theta);
+    problem_->require_parameters();
+    return problem_->transpose_apply(theta, image, iteration, throw_if_stopped);
+  }));
+}
+
+py::dict Session::evaluate(const Array& array, std::uint32_t iteration) {
+  const std::vector<double> theta = point(array);
+  target();
+  Evaluation found = run_work_for([&] {
+    choose_own();
+    problem_->require_parameters();
+    require_two_samples(*problem_);
+    return RenderedObjective(*problem_, *target_, throw_if_stopped).evaluate(theta, iteration);
+  });
+  py::dict result;
+  result["loss"] = found.loss;
+  result["loss_noise"] = found.loss_noise;
+  result["mean_squared_error"] = found.mean_squared_error;
+  result["gradient"] = to_array(std::move(found.gradient));
+  result["image"] = to_array(std::move(found.image));
+  return result;
+}
+
+py::dict Session::gradient(const Array& array, Samples samples, Seed seed) {
+  const std::vector<double> theta = point(array);
+  Statistics found = run_work_for([&] {
+    choose(samples, seed, 1);
+    require_renderable(theta);
+    problem_->require_parameters();
+    gradient_repeats(*problem_);  // too few samples must show before the target is rendered
+    return estimate_gradient(*problem_, theta, problem_->make_target(throw_if_stopped), throw_if_stopped).gradient;
+  });
+  py::dict result;
+  result["gradient"] = to_array(std::move(found.mean));
+  result["standard_error"] = to_array(std::move(found.standard_error));
+  result["degrees_of_freedom"] = to_array(std::move(found.degrees));
+  return result;
+}
+
+py::array Session::target() {
+  if (!target_)
+    target_ = run_work_for([&] {
+      choose_own();
+      GatedImage image = problem_->make_target(throw_if_stopped);
+      require_finite(image, "the target");
+      // Runs read it from a file of such numbers.
+      for (double& value : image.data) value = static_cast<float>(value);
+      return image;
+    });
+  return to_array(*target_);
+}
+
+}  // namespace isochron

@@ -1,0 +1,67 @@
+// Runs from Python.
+#include "app/experiment_source.h"
+#include "app/python/session.h"
+#include "app/python/work.h"
+#include "core/base/progress.h"
+#include "optim/run/run.h"
+
+namespace py = pybind11;
+
+namespace isochron {
+namespace {
+
+/// What Python's callback gets of a row of the log.
+py::dict row_of(const LogRow& row, const std::vector<double>& theta, const Evaluation& now, bool closing) {
+  py::dict result;
+  result["iteration"] = row.iteration;
+  result["closing"] = closing;
+  result["seconds"] = row.seconds;
+  result["loss"] = row.loss;
+  result["loss_noise"] = row.loss_noise;
+  result["image_rmse"] = row.image_rmse;
+  result["param_rmse"] = row.param_rmse;
+  result["gradient_norm"] = row.gradient_norm;
+  result["theta"] = to_array(theta);
+  result["gradient"] = to_array(now.gradient);
+  result["image"] = to_array(now.image);
+  return result;
+}
+
+/// `row(dict)` returns whether to stop.
+void execute(const std::string& folder, bool force, const py::object& row,
+             const std::function<void(const RunOptions&)>& start) {
+  std::vector<std::string> warnings;
+  run_work([&](Work& work) {
+    RunOptions options;
+    options.folder = folder;
+    options.force = force;
+    options.stop = stop_requested;
+    options.warning = [&](const std::string& text) { warnings.push_back(text); };
+    if (!row.is_none())
+      options.row = [&](const LogRow& values, const std::vector<double>& theta, const Evaluation& now, bool closing) {
+        work.call([&] {
+          const py::object stop = row(row_of(values, theta, now, closing));
+          if (stop.cast<bool>() && !closing) request_stop();
+        });
+      };
+    start(options);
+  });
+  warn_python(warnings);
+}
+
+}  // namespace
+
+std::string Session::run(const std::string& folder, const std::optional<Array>& start, const py::object& row,
+                         bool force) {
+  Experiment experiment = experiment_;
+  if (start) start_at(point(*start), problem_->parameters(), experiment);
+  const std::string output = output_folder(folder, experiment);
+  execute(output, force, row, [&](const RunOptions& options) { start_run(experiment, options); });
+  return output;
+}
+
+void resume_session(const std::string& folder, const py::object& row) {
+  execute(folder, false, row, [](const RunOptions& options) { resume_run(options); });
+}
+
+}  // namespace isochron
