@@ -19,7 +19,7 @@ assert loss > 0 and gradient.shape == (1,) and gradient[0] != 0, (loss, gradient
 print(isochron.__file__, image.shape)
 END
 
-man isochron-run | grep "optimise" >/dev/null
+man isochron-run | grep "Optimise from the initial values" >/dev/null
 echo "manual: $(man -w isochron)"
 
 source /usr/share/bash-completion/completions/isochron
