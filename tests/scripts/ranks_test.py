@@ -34,15 +34,15 @@ RUNS = {
     "standard": ("height_field.yaml", "target.samples=16", "samples.primal=4", "samples.interior=4", "optimizer.iterations=2",
                  "estimator.sampling=standard"),
     "letter": ("letter.yaml", "target.samples=16", "samples.primal=4", "samples.interior=4", "optimizer.iterations=1",
-               "optimizer.inner_iterations=2"),
+               "optimizer.inner_iterations=2", "output.histogram_samples=16"),
 }
 # Ranks and threads of each.
 EVERY_SHARING = [(ranks, threads) for ranks in (1, 2, 3, 4) for threads in (1, 2)]
 SHARINGS = {"cube": EVERY_SHARING, "height_field": EVERY_SHARING, "letter": EVERY_SHARING, "cube_lm": [(2, 1), (3, 2)],
             "standard": [(2, 2), (4, 1)]}
 # Ranks before and after one of them dies, by which signal; 0: without mpirun. Iterations of the whole run.
-DEATHS = [("cube", 3, 2, signal.SIGKILL, "1", 25), ("cube", 2, 0, signal.SIGTERM, "0", 25),
-          ("height_field", 2, 4, signal.SIGKILL, "1", 20), ("letter", 4, 3, signal.SIGKILL, "2", 12)]
+DEATHS = [("cube", 3, 2, signal.SIGKILL, "1", 10), ("cube", 2, 0, signal.SIGTERM, "0", 10),
+          ("height_field", 2, 4, signal.SIGKILL, "1", 30), ("letter", 4, 3, signal.SIGKILL, "2", 10)]
 
 
 def command(ranks, *arguments):
