@@ -16,6 +16,7 @@ import sys
 import tempfile
 
 import numpy as np
+import use_package
 from mitsuba_scenes.document import SceneError
 from mitsuba_scenes.report import Report
 from mitsuba_scenes.turning import turned

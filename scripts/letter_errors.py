@@ -21,7 +21,7 @@ import yaml
 
 import use_package
 from isochron import exr
-from isochron.pictures.mesh_files import read_mesh
+from isochron.mesh_files import read_mesh
 
 WALL_NORMAL = np.array([0.0, 0.0, 1.0])
 

@@ -1,6 +1,7 @@
 # The Debian package, made by scripts/package.
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/isochron)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE COMPONENT program DESTINATION ${documents} RENAME copyright)
+set(CPACK_PACKAGE_CONTACT "the isochron project" CACHE STRING "Maintainer of the Debian package")
 string(TIMESTAMP changed "%a, %d %b %Y %H:%M:%S +0000" UTC)
 configure_file(changelog.in changelog)
 add_custom_command(OUTPUT changelog.gz COMMAND gzip -9nkf changelog DEPENDS changelog VERBATIM)
@@ -9,7 +10,6 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/changelog.gz COMPONENT program DESTINA
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME isochron)
-set(CPACK_PACKAGE_CONTACT "the isochron authors" CACHE STRING "Maintainer of the Debian package")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
@@ -38,8 +38,9 @@ if(TARGET isochron_python)  # compiled for one version of Python
   math(EXPR next "${Python3_VERSION_MINOR} + 1")
   list(APPEND CPACK_DEBIAN_PACKAGE_DEPENDS "python3 (>= 3.${Python3_VERSION_MINOR})" "python3 (<< 3.${next})")
 endif()
-# mpirun, and what find_package(isochron) asks for.
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS openmpi-bin
+# For mpirun, without which nothing of MPI is loaded, and what find_package(isochron) asks for.
+set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_CURRENT_SOURCE_DIR}/without_mpi.cmake)
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS libopenmpi3 openmpi-bin
     cmake g++ libceres-dev libembree-dev libfmt-dev libhdf5-dev libopenexr-dev libspdlog-dev libtbb-dev libyaml-cpp-dev)
 list(JOIN CPACK_DEBIAN_PACKAGE_DEPENDS ", " CPACK_DEBIAN_PACKAGE_DEPENDS)
 list(JOIN CPACK_DEBIAN_PACKAGE_SUGGESTS ", " CPACK_DEBIAN_PACKAGE_SUGGESTS)

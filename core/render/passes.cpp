@@ -162,6 +162,7 @@ void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partitio
 }
 
 void Passes::learn() const {
+  const PassTimes::Timed timed(times(), PassKind::edges);
   using Guide = BoundaryGuide;
   if (ready->edges)
     ready->edges->update(scene, options.boundary.wedge);

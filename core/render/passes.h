@@ -82,6 +82,9 @@ class Passes {
   /// Work done so far, in rays, by all ranks, which meet here.
   double work() const { return isochron::work(rays(), sum_over_ranks(arcs_.load())); }
 
+  /// Where the time of a pass counts; null: nowhere.
+  PassTimes* times() const { return cache_ ? &cache_->times() : nullptr; }
+
   /// Runs f(pixel) for the pixels of one partition, in a fixed order.
   template <class F>
   static void for_each_pixel(Partition partition, int pixels, F&& f) {

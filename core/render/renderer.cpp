@@ -128,6 +128,7 @@ GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
 }
 
 void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange range) const {
+  const PassTimes::Timed timed(impl_->times(), PassKind::primal);
   if (impl_->scene.emitters.empty()) return;  // no lamp, or one that the parameters have flattened
   const auto run = [&](const Film& film, Partition partition) {
     PrimalSink sink(impl_->gates, film);
@@ -153,6 +154,7 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
   if (term == Term::interior) impl_->add_background_derivative(images);
   if (!impl_->has(term) || columns == 0) return images;
   impl_->prepare(term);
+  const PassTimes::Timed timed(impl_->times(), pass_kind(term));
   const auto run = [&](const std::vector<Film>& films, Partition partition) {
     TangentSink sink(impl_->gates, impl_->scene.layout, *impl_->basis, films);
     impl_->run_term(term, {stream, range}, partition, impl_->every_gate, sink);
@@ -183,6 +185,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   if (term == Term::interior) impl_->add_background_gradient(adjoint, dof_gradient, parts);
   if (!impl_->has(term)) return;
   impl_->prepare(term);
+  const PassTimes::Timed timed(impl_->times(), pass_kind(term));
   const GatePick pick(impl_->gates, adjoint);
   const int partitions = impl_->partitions_for(range, basis.entries.size());  // at least as many as are touched
   std::vector<std::vector<double>> by_partition(parts ? partitions : 0, std::vector<double>(basis.columns, 0.0));

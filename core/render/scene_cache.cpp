@@ -6,6 +6,7 @@ namespace isochron {
 
 std::shared_ptr<ReadyScene> SceneCache::take(const Scene& scene, const TangentBasis* basis,
                                              const FollowOptions& follow) {
+  const PassTimes::Timed timed(&times_, PassKind::scene);
   std::unique_ptr<ReadyScene> ready;
   {
     const std::lock_guard lock(mutex_);

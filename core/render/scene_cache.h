@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/paths/prepared_scene.h"
+#include "core/render/pass_times.h"
 #include "core/techniques/boundary_edges.h"
 
 namespace isochron {
@@ -31,6 +32,8 @@ class SceneCache {
   /// Rays traced in its scenes so far.
   void count_rays(long long rays) { rays_ += rays; }
   long long rays() const { return rays_; }
+  /// What passes over its scenes took so far.
+  PassTimes& times() { return times_; }
 
  private:
   const Scene& at_first_;
@@ -40,6 +43,7 @@ class SceneCache {
   int made_ = 0;
   std::optional<CrossingEdges> crossing_;
   std::atomic<long long> rays_{0};
+  PassTimes times_;
 };
 
 }  // namespace isochron

@@ -120,6 +120,8 @@ class Problem {
 
   /// Rays traced so far, those of target and expected counts aside.
   long long rays() const { return cache_->rays(); }
+  /// What its renderers' passes took so far, likewise.
+  const PassTimes& times() const { return cache_->times(); }
 
   /// Which of a target's readings count.
   const Readings& readings() const { return readings_; }

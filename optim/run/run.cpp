@@ -86,9 +86,9 @@ class Run {
     }
     // Ranks that were told to stop do not wait for each other.
     const long long rays = result.status == RunStatus::interrupted ? problem_.rays() : sum_over_ranks(problem_.rays());
-    write_file_atomically(
-        path("summary.yaml"),
-        summary_yaml(result, state_, last_, parameters_, {first, seconds_since(start), rays, peak_memory()}, errors_));
+    RunCost cost{first, seconds_since(start), rays, peak_memory(), {{"target", target_seconds_}}};
+    for (PassKind kind : kPassKinds) cost.passes.emplace_back(name(kind), problem_.times().seconds(kind));
+    write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_, cost, errors_));
     if (options_.report)
       options_.report((had_ended && state_.iteration == first ? nothing_left(result, options_.folder) : "") +
                       run_report(result, state_, last_, parameters_));
@@ -104,8 +104,10 @@ class Run {
 
   void load_target() {
     const std::string file = path("target.exr");
+    const Clock::time_point start = Clock::now();
     if (!file_exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
     target_ = problem_.read_target(file);
+    target_seconds_ = seconds_since(start);
   }
 
   LoopResult optimise() {
@@ -209,6 +211,7 @@ class Run {
   const ExrNotes notes_ = exr_notes(problem_.experiment().gates);
   Checkpoint state_;
   GatedImage target_;
+  double target_seconds_ = 0;
   LogRow last_;
   ParameterErrors errors_;
 };

@@ -47,8 +47,11 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
       fmt::format_to(out, "  {}: {}\n", block.name, block.count == 1 ? list : "[" + list + "]");
     }
   }
-  fmt::format_to(out, "last_call: {{first_iteration: {}, seconds: {:.6g}, rays: {}, peak_memory_bytes: {}}}\n",
-                 cost.first_iteration, cost.seconds, cost.rays, cost.peak_memory);
+  std::vector<std::string> passes;
+  for (const auto& [name, seconds] : cost.passes) passes.push_back(fmt::format("{}: {:.6g}", name, seconds));
+  fmt::format_to(
+      out, "last_call: {{first_iteration: {}, seconds: {:.6g}, rays: {}, peak_memory_bytes: {}, passes: {{{}}}}}\n",
+      cost.first_iteration, cost.seconds, cost.rays, cost.peak_memory, fmt::join(passes, ", "));
   text += "parameters:\n";
   for (const Parameters::Block& block : parameters.blocks()) {
     const auto begin = state.theta.begin() + block.begin;

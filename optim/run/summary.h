@@ -1,5 +1,6 @@
 #pragma once
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "optim/run/log.h"
@@ -13,6 +14,8 @@ struct RunCost {
   double seconds = 0;         ///< target and closing images included
   long long rays = 0;         ///< of the iterations
   long long peak_memory = 0;  ///< of the process, bytes
+  /// Seconds by what they were for, in the order in which they are written.
+  std::vector<std::pair<std::string, double>> passes = {};
 };
 
 /// Standard errors of the unknowns, see standard_errors.h. `values` is empty where they are not known.

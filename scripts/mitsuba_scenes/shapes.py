@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from isochron.errors import InputError
 
 from . import matrices, meshes
 from .document import SceneError
@@ -103,9 +104,9 @@ class Shapes:
     def file(self, node):
         path = node.file()
         try:
-            mesh = meshes.read(path, meshes.read_obj if node.type == "obj" else meshes.read_ply)
-        except (meshes.MeshError, OSError) as error:
-            raise SceneError(node.values["filename"].place, f"{path}: {error}") from None
+            mesh = meshes.read(path, node.type)
+        except InputError as error:
+            raise SceneError(node.values["filename"].place, str(error)) from None
         return mesh if node.boolean("face_normals") else meshes.shaded_by_its_normals(mesh)
 
     def sphere(self, node):

@@ -158,6 +158,8 @@ TEST_F(Rendered, SizeOfTheJacobianIsLimited) {
 
 TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
   // Offsets and albedos by vertex with the same differences.
+  folder_.write("scene.yaml",
+                replaced(folder_.read("scene.yaml"), "block.obj, material: metal", "block.obj, material: white"));
   for (const std::string parameter :
        {"type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, ",
         "type: albedo, shape: block, per: vertex, initial: [0.3, 0.4, 0.5, 0.2], target: 0.6, "}) {

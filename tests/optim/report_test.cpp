@@ -71,10 +71,12 @@ TEST_F(Report, SummaryHasErrorsAndCost) {
   const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
   state_.theta = {0.6875, 0.375};
   const std::string summary =
-      summary_yaml({}, state_, last_, parameters, {3, 1.5, 700, 2048}, {"gauss_newton_diagonal", {0.25, INFINITY}});
+      summary_yaml({}, state_, last_, parameters, {3, 1.5, 700, 2048, {{"primal", 0.75}, {"visibility", 0.5}}},
+                   {"gauss_newton_diagonal", {0.25, INFINITY}});
   EXPECT_NE(summary.find("standard_errors_from: gauss_newton_diagonal\nstandard_errors:\n  wall: 0.25\n"
                          "  thing: .inf\n"
-                         "last_call: {first_iteration: 3, seconds: 1.5, rays: 700, peak_memory_bytes: 2048}\n"),
+                         "last_call: {first_iteration: 3, seconds: 1.5, rays: 700, peak_memory_bytes: 2048, "
+                         "passes: {primal: 0.75, visibility: 0.5}}\n"),
             std::string::npos)
       << summary;
 }

@@ -88,6 +88,27 @@ TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
   }
 }
 
+TEST(KeptScenes, TimesOfPassesGoToTheirKind) {
+  const auto [scene, all, basis, gates] = Setting();
+  SceneCache cache(scene, CasterUpdate::rebuild);
+  const auto seconds = [&](PassKind kind) { return cache.times().seconds(kind); };
+  const Renderer renderer(scene, gates, {.max_bounces = 2, .guiding_samples = 8}, &basis, &cache);
+  EXPECT_GT(seconds(PassKind::scene), 0);
+  EXPECT_EQ(seconds(PassKind::primal), 0);
+  const GatedImage image = renderer.render({1, 0, 0}, {0, 4});
+  EXPECT_GT(seconds(PassKind::primal), 0);
+  for (const Term term : kTerms) {
+    EXPECT_EQ(seconds(pass_kind(term)), 0);
+    EXPECT_EQ(seconds(PassKind::edges) > 0, term == Term::path_length);  // that of visibility has been
+    std::vector<double> gradient(DofLayout(scene).size(), 0.0);
+    renderer.add_gradient(term, image, {1, 0, 1}, {0, 4}, gradient);
+    const double once = seconds(pass_kind(term));
+    EXPECT_GT(once, 0);
+    renderer.derive(term, {1, 0, 1}, {0, 4});
+    EXPECT_GT(seconds(pass_kind(term)), once);
+  }
+}
+
 TEST(KeptScenes, TwoAtATimeDoNotMeet) {
   const auto [scene, all, basis, gates] = Setting();
   const EstimatorOptions options{.max_bounces = 2, .sampling = Sampling::standard};

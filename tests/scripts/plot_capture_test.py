@@ -210,7 +210,7 @@ class PlotCaptureTest(unittest.TestCase):
         self.edit("summary.yaml", ", 0.125, 1]", "]")
         self.assert_fails("final_the_board.ply: 6 vertices, but 4 albedos in paint")
         (self.folder / "geometry" / "final_the_board.ply").write_bytes(b"ply\n")
-        self.assert_fails("final_the_board.ply: cannot be read: ")
+        self.assert_fails("final_the_board.ply: is no PLY file")
         (self.folder / "final.h5").write_bytes(b"no HDF5")
         self.assert_fails("final.h5: cannot be read: ")
         (self.folder / "final.h5").unlink()

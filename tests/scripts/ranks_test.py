@@ -1,6 +1,9 @@
 #!/usr/bin/python3
 """Commands that several processes share through MPI: the same bits for any number of them, also after one died.
 
+Compared are all images (EXR), meshes and histograms byte by byte, log.csv and summary.yaml (with the final parameters) but for
+times and memory, each with those of one process without mpirun.
+
 usage: ranks_test.py PROGRAM
 """
 
@@ -13,6 +16,8 @@ import sys
 import tempfile
 import time
 import unittest
+
+import yaml
 
 PROGRAM = sys.argv.pop(1)
 EXPERIMENTS = pathlib.Path(__file__).resolve().parents[2] / "experiments"
@@ -31,7 +36,13 @@ RUNS = {
     "letter": ("letter.yaml", "target.samples=16", "samples.primal=4", "samples.interior=4", "optimizer.iterations=1",
                "optimizer.inner_iterations=2"),
 }
-SHARINGS = [(1, 2), (2, 1), (3, 2), (4, 1)]
+# Ranks and threads of each.
+EVERY_SHARING = [(ranks, threads) for ranks in (1, 2, 3, 4) for threads in (1, 2)]
+SHARINGS = {"cube": EVERY_SHARING, "height_field": EVERY_SHARING, "letter": EVERY_SHARING, "cube_lm": [(2, 1), (3, 2)],
+            "standard": [(2, 2), (4, 1)]}
+# Ranks before and after one of them dies, by which signal; 0: without mpirun. Iterations of the whole run.
+DEATHS = [("cube", 3, 2, signal.SIGKILL, "1", 25), ("cube", 2, 0, signal.SIGTERM, "0", 25),
+          ("height_field", 2, 4, signal.SIGKILL, "1", 20), ("letter", 4, 3, signal.SIGKILL, "2", 12)]
 
 
 def command(ranks, *arguments):
@@ -47,6 +58,9 @@ def results(folder):
         elif path.name in ("log.csv", "derive.csv", "gradient.csv"):
             with open(path, encoding="ascii", newline="") as lines:
                 found[path.name] = [{k: v for k, v in row.items() if k != "seconds"} for row in csv.DictReader(lines)]
+        elif path.name == "summary.yaml":
+            found[path.name] = yaml.load(path.read_text(), yaml.BaseLoader)
+            del found[path.name]["seconds"], found[path.name]["last_call"]
     return found
 
 
@@ -78,7 +92,7 @@ class RanksTest(unittest.TestCase):
             self.run_program(0, *self.arguments(name, alone), "--quiet")
             expected = results(alone)
             self.assertIn("log.csv", expected)
-            for ranks, threads in SHARINGS:
+            for ranks, threads in SHARINGS[name]:
                 with self.subTest(name=name, ranks=ranks, threads=threads):
                     shared = self.folder / f"{name}_{ranks}_{threads}"
                     said = self.run_program(ranks, *self.arguments(name, shared), "--threads", threads)
@@ -102,38 +116,57 @@ class RanksTest(unittest.TestCase):
             self.assertIn(words, said)
         self.assertFalse((self.folder / "none").exists())
 
-    def long_run(self, name):
-        return [*self.arguments("cube", self.folder / name), "--set", "optimizer.iterations=40", "--quiet"]
-
-    def wait_for_rows(self, name, count):
-        log = self.folder / name / "log.csv"
-        for _ in range(600):
-            if log.exists() and len(log.read_text().splitlines()) > count:
+    def wait_for_rows(self, folder, count):
+        for _ in range(3000):
+            if (folder / "log.csv").exists() and len((folder / "log.csv").read_text().splitlines()) > count:
                 return
-            time.sleep(0.1)
+            time.sleep(0.02)
         self.fail("no rows")
 
+    def kill(self, signal_number, rank, folder):
+        """One rank of the run in the folder."""
+        for entry in pathlib.Path("/proc").glob("[0-9]*"):
+            try:
+                of_ours = str(folder).encode() in (entry / "cmdline").read_bytes().split(b"\0")
+                if of_ours and f"\0OMPI_COMM_WORLD_RANK={rank}\0".encode() in (entry / "environ").read_bytes():
+                    os.kill(int(entry.name), signal_number)
+            except OSError:
+                pass  # it has gone
+
     def test_goes_on_with_another_number_after_one_died(self):
-        self.run_program(0, *self.long_run("alone"))
-        expected = results(self.folder / "alone")
-        for signal_number, victim in ((signal.SIGKILL, "1"), (signal.SIGTERM, "0")):
-            name = f"died_{victim}"
-            shared = subprocess.Popen(command(3, *self.long_run(name)), env=ENVIRONMENT, stderr=subprocess.PIPE,
-                                      stdout=subprocess.DEVNULL, text=True)
-            self.wait_for_rows(name, 4)
-            for entry in pathlib.Path("/proc").glob("[0-9]*"):
-                try:
-                    of_ours = str(self.folder / name).encode() in (entry / "cmdline").read_bytes().split(b"\0")
-                    if of_ours and f"\0OMPI_COMM_WORLD_RANK={victim}\0".encode() in (entry / "environ").read_bytes():
-                        os.kill(int(entry.name), signal_number)
-                except OSError:
-                    pass  # it has gone
-            complaint = shared.communicate(timeout=60)[1]
-            self.assertNotEqual(shared.returncode, 0)
-            self.assertTrue("rank 1" in complaint or "go on with" in complaint, complaint)
-            self.assertLess(len((self.folder / name / "log.csv").read_text().splitlines()), 42)
-            self.run_program(2, "resume", self.folder / name, "--no-plots", "--quiet")
-            self.same(expected, self.folder / name)
+        expected = {}
+        for name, before, after, signal_number, rank, iterations in DEATHS:
+            with self.subTest(name=name, before=before, after=after):
+                longer = ("--set", f"optimizer.iterations={iterations}", "--quiet")
+                if name == "letter":
+                    longer += ("--set", "optimizer.inner_iterations=1")
+                if name not in expected:
+                    self.run_program(0, *self.arguments(name, self.folder / f"{name}_alone"), *longer)
+                    expected[name] = results(self.folder / f"{name}_alone")
+                folder = self.folder / f"{name}_died_{rank}"
+                shared = subprocess.Popen(command(before, *self.arguments(name, folder), *longer, "--threads", 1),
+                                          env=ENVIRONMENT, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+                self.wait_for_rows(folder, 3)
+                self.kill(signal_number, rank, folder)
+                complaint = shared.communicate(timeout=60)[1]
+                self.assertNotEqual(shared.returncode, 0)
+                self.assertTrue(f"rank {rank}" in complaint or "go on with" in complaint, complaint)
+                self.assertLess(len((folder / "log.csv").read_text().splitlines()), iterations + 2)
+                self.run_program(after, "resume", folder, "--no-plots", "--quiet")
+                self.same(expected[name], folder)
+
+    def test_without_the_library(self):
+        """Of Open MPI: a module that asks for one of another name."""
+        for name in ("isochron", "isochron_mpi.so"):
+            data = (pathlib.Path(PROGRAM).parent / name).read_bytes()
+            (self.folder / name).write_bytes(data.replace(b"libmpi.so.", b"libnot.so."))
+            (self.folder / name).chmod(0o755)
+        done = subprocess.run([*MPIRUN, "3", self.folder / "isochron", "run", EXPERIMENTS / "cube.yaml", "-o", self.folder / "run"],
+                              env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual([line for line in done.stderr.splitlines() if line.startswith("isochron")],
+                         ["isochron: error: started by MPI, which needs Open MPI's library (allowed: to install libopenmpi3): "
+                          "libnot.so.40: cannot open shared object file: No such file or directory"])
 
 
 if __name__ == "__main__":

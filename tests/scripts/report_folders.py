@@ -43,7 +43,8 @@ loss_initial: 0.5
 loss_final: 0.01
 param_rmse_initial: 0.3
 param_rmse_final: 0.01
-last_call: {first_iteration: 0, seconds: 12.5, rays: 1000000, peak_memory_bytes: 25000000}
+last_call: {first_iteration: 0, seconds: 12.5, rays: 1000000, peak_memory_bytes: 25000000,
+            passes: {target: 1.5, scene: 0.5, primal: 2, interior: 4, edges: 0.25, visibility: 3, path_length: 0}}
 parameters:
   height: 0.01
   colour: [0.69, 0.31, 1e-05]

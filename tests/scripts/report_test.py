@@ -100,6 +100,39 @@ class ReportTest(unittest.TestCase):
         self.assertIn("Zero everywhere: path length", page.words)
         self.assertEqual(len([i for i in page.all("img") if i["alt"].startswith("derivative by height")]), 9)
 
+    def test_time_of_terms(self):
+        write_run(self.folder)
+        page = self.page()
+        rows = re.findall(r'<th scope="row">([^<]*)</th><td>([^<]*)</td><td>([^<]* %)</td>', self.text)
+        self.assertEqual(dict((name, (time, share)) for name, time, share in rows), {
+            "target images": ("1.5 s", "12.0 %"), "scene made ready": ("0.5 s", "4.0 %"), "images": ("2 s", "16.0 %"),
+            "interior term": ("4 s", "32.0 %"), "visibility: edges found and learned about": ("0.25 s", "2.0 %"),
+            "visibility term": ("3 s", "24.0 %"), "all else: optimiser, choice of techniques, files": ("1.25 s", "10.0 %")})
+        self.page(self.folder, self.folder, output=self.top / "c.html")
+        self.assertIn("time of the last call: interior term", self.text)
+        self.edit("summary.yaml", "passes: {", "passes: [] # {")
+        self.edit("summary.yaml", "            passes: [] #", "            passes: []} #")
+        self.page()
+
+    def test_shapes_that_stand_still(self):
+        write_run(self.folder)
+        scene = self.folder / "inputs/scene"
+        (scene / "ramp.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+        (scene / "wedge.stl").write_text("solid w\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+                                         "endloop\nendfacet\nendsolid w\n")
+        (scene / "plate.ply").write_text("ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                                         "property float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n"
+                                         "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+        self.edit("inputs/scene/scene.yaml", "lights:", "".join(
+            f"  - {{name: {name.split('.')[0]}, file: {name}}}\n" for name in ("ramp.off", "wedge.stl", "plate.ply", "gone.stl"))
+            + "lights:")
+        page = self.page()
+        view = json.loads(re.search(r'id="view-data">(.*?)</script>', self.text)[1])
+        self.assertEqual(len(view["lines"]), 4)  # the floor's, too
+        self.assertTrue(all(line["pairs"] for line in view["lines"]))
+        self.assertIn("gone is not drawn: ", page.words)
+        self.assertNotIn("ramp is not drawn", page.words)
+
     def test_going(self):
         write_run(self.folder, status=None)
         with open(self.folder / ".lock", "w") as lock:
@@ -140,7 +173,7 @@ class ReportTest(unittest.TestCase):
         (self.folder / "geometry/initial_box.ply").write_bytes(b"ply\n")
         self.edit("log.csv", "9,5.0,", "9,5.0\n10,")
         page = self.page()
-        for words in ("final.exr", "summary.yaml: cannot be read", "initial_box.ply: cannot be read", "000004.exr"):
+        for words in ("final.exr", "summary.yaml: cannot be read", "initial_box.ply: is no PLY file", "000004.exr"):
             self.assertIn(words, page.words)
         (self.folder / "experiment.yaml").write_text("name: [")
         self.assertIn("experiment.yaml: cannot be read", self.page().words)

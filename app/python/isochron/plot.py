@@ -20,8 +20,9 @@ import matplotlib
 
 matplotlib.use("Agg")
 from isochron import exr
+from isochron.errors import InputError
 from isochron.pictures.curves import plot_log, plot_pixel, plot_row
-from isochron.pictures.reading import Folder, PlotError, read_stack
+from isochron.pictures.reading import Folder, read_stack
 from isochron.pictures.scales import scale_of
 from isochron.pictures.sheets import plot_derivatives, plot_images, plot_signed
 
@@ -55,10 +56,10 @@ class Pictures:
     def attempt(self, action, path, *arguments):
         try:
             return action(*arguments)
-        except PlotError as error:
-            self.failures.append(str(error))
         except (exr.ExrError, OSError, UnicodeDecodeError, csv.Error) as error:
             self.failures.append(f"{path}: {error}")
+        except InputError as error:
+            self.failures.append(str(error))
         return None
 
     def title(self, what):

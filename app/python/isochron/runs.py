@@ -9,6 +9,7 @@ import numpy as np
 
 from isochron.errors import InputError
 from isochron.image import Coordinates, Image
+from isochron.mesh_files import read_mesh
 from isochron.pictures.reading import Folder, PlotError, numbers, read_log, read_stack, read_yaml
 
 
@@ -92,8 +93,6 @@ class Run:
     def meshes(self, when: str = "final") -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Shape -> vertices [vertex, xyz] and triangles [triangle, 3] of the shapes that parameters move.
         when: initial, final, target or the number of an iteration that the run wrote, such as 000010."""
-        from isochron.pictures.mesh_files import read_mesh  # as SciPy takes long to load
-
         start = f"{when}_"
         files = sorted((self.folder / "geometry").glob(f"{start}*.*"))
         return {path.stem.removeprefix(start): read_mesh(path) for path in files}

@@ -8,7 +8,7 @@ import numpy as np
 from isochron import exr
 from isochron.captures import read_capture
 from isochron.errors import InputError
-from isochron.pictures.mesh_files import name_in_files, read_mesh, read_scene_mesh
+from isochron.mesh_files import name_in_files, read_mesh, read_scene_mesh
 from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
 from isochron.runs import read_values
@@ -156,12 +156,12 @@ class CaptureRun:
                 self._add_surface(path, shape, read_scene_mesh(path, transform), paint)
 
     def _find_shape(self, name):
-        """File and transform of a shape of the scene; None where there is none, or its file is of another kind."""
+        """File and transform of a shape of the scene; None where there is none."""
         scene = self.directory / str(self.experiment.get("scene", ""))
         if scene.is_file():
             for entry in read_yaml(scene).get("shapes") or []:
                 path = scene.parent / str(entry.get("file", ""))
-                if str(entry.get("name")) == name and path.suffix in (".obj", ".ply"):
+                if str(entry.get("name")) == name:
                     return path, entry.get("transform") or {}
         return None, {}
 

@@ -9,7 +9,7 @@ from isochron.report.markup import element, join, number, section, seconds, tabl
 from isochron.report.page import document
 from isochron.report.png import ColourScale, Scale, shrunk
 from isochron.report.results import notes, rows_of, Uncertainty
-from isochron.report.settings import short
+from isochron.report.settings import passes_of, short
 
 MOST_GATES = 6
 CURVES = (("loss", "Loss", "loss"), ("image_rmse", "Images against the target", "RMSE"),
@@ -64,6 +64,9 @@ def results(runs, labels):
         values = [entry.get(key) if isinstance(entry, dict) else None for entry in last]
         if any(values):
             rows.append([name, *(number(v / unit if v else None, 3) for v in values)])
+    passes = [passes_of(run) for run in runs]
+    for name in dict.fromkeys(name for p in passes for name, time in p.items() if time > 0):
+        rows.append([f"time of the last call: {name}", *(seconds(p.get(name)) for p in passes)])
     cells = [parameter_cells(run) for run in runs]
     for name in dict.fromkeys(name for c in cells for name in c):
         rows.append([name, *(c.get(name, "–") for c in cells)])

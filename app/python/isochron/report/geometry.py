@@ -4,12 +4,13 @@ import base64
 
 import numpy as np
 
-from isochron.pictures.mesh_files import name_in_files, read_mesh, read_scene_mesh
-from isochron.pictures.reading import PlotError
+from isochron.errors import InputError
+from isochron.mesh_files import name_in_files, read_mesh, read_scene_mesh
 from isochron.report.markup import Markup, data_for_scripts, element, section
 
 MOST_TRIANGLES = 2500  # of a mesh; larger ones are shown coarser
 MOST_LINES = 1500  # of a shape's outline
+ROUND_TRIANGLES = 100  # of the net of a shape without sharp edges
 SHARP, FOLDED = np.cos(np.radians((30, 0.2)))  # angles of edges that are drawn, of what stands still and of what moves
 
 
@@ -32,18 +33,18 @@ def outline(points, triangles, sharp=SHARP):
     return lines
 
 
-def coarser(moments, triangles):
-    """Meshes of one topology with at most about MOST_TRIANGLES: vertices that share a cell of a grid become one."""
+def coarser(moments, triangles, most=MOST_TRIANGLES):
+    """Meshes of one topology with at most about so many triangles: vertices that share a cell of a grid become one."""
     points = moments[0]
     low, size = points.min(axis=0), np.ptp(points, axis=0).max() or 1.0
-    cells = int(np.sqrt(MOST_TRIANGLES))
-    while len(triangles) > MOST_TRIANGLES and cells > 4:
+    cells = int(np.sqrt(most))
+    while len(triangles) > most and cells > 4:
         keys = np.floor((points - low) / size * cells).astype(int)
         _, inverse = np.unique(keys, axis=0, return_inverse=True)
         inverse = inverse.ravel()
         few = inverse[triangles]
         few = few[(few != np.roll(few, 1, axis=1)).all(axis=1)]
-        if len(few) <= MOST_TRIANGLES:
+        if len(few) <= most:
             counts = np.bincount(inverse)
             merged = [np.stack([np.bincount(inverse, p[:, k]) / counts for k in range(3)], axis=1) for p in moments]
             return merged, few
@@ -137,15 +138,15 @@ class Geometry:
             self._add_wall(corners, normals.reshape(-1, 3).mean(axis=0))
 
     def _add_outline(self, name, path, transform):
-        if path.suffix not in (".obj", ".ply"):
-            self.notes.append(f"{name} is not drawn: {path.suffix or 'its file'} is not read here")
-            return
         try:
             points, triangles = read_scene_mesh(path, transform)
-        except PlotError as error:
+        except InputError as error:
             self.notes.append(f"{name} is not drawn: {error}")
             return
         lines = outline(points, triangles)
+        if not len(lines):  # round: a coarse net of it
+            (points,), triangles = coarser([points], triangles, ROUND_TRIANGLES)
+            lines = outline(points, triangles, 2)
         used, renumbered = np.unique(lines, return_inverse=True)
         self.lines.append((points[used], renumbered.reshape(-1, 2)))
 

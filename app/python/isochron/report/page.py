@@ -2,7 +2,7 @@
 
 import importlib.resources
 
-from isochron.pictures.reading import PlotError
+from isochron.errors import InputError
 from isochron.report.capture import capture_section
 from isochron.report.geometry import geometry_section
 from isochron.report.images import derivatives_section, images_section
@@ -44,7 +44,7 @@ def attempt(run, build):
     """A section; nothing but a note where the run's files hold what it cannot deal with, so that the others still come."""
     try:
         return build(run)
-    except (PlotError, ArithmeticError, AttributeError, IndexError, KeyError, OSError, TypeError, ValueError) as error:
+    except (InputError, ArithmeticError, AttributeError, IndexError, KeyError, OSError, TypeError, ValueError) as error:
         run.note(f"{build.__name__.replace('_section', '')}: left out: {type(error).__name__}: {error}")
         return ""
 

@@ -7,7 +7,8 @@ import time
 import numpy as np
 
 from isochron import exr
-from isochron.pictures.reading import Folder, PlotError, read_log, read_stack, read_yaml
+from isochron.errors import InputError
+from isochron.pictures.reading import Folder, read_log, read_stack, read_yaml
 
 ENDED = {"converged": "converged after {} iterations", "iterations_reached": "all {} iterations done",
          "diverged": "diverged after {} iterations"}
@@ -86,10 +87,9 @@ class Run:
             return None
         try:
             return action(path)
-        except PlotError as error:
-            self.note(str(error))
-        except (exr.ExrError, OSError, UnicodeDecodeError, csv.Error, ValueError) as error:
-            self.note(f"{path}: {error}")
+        except (OSError, csv.Error, ValueError) as error:
+            names_it = isinstance(error, InputError) and not isinstance(error, exr.ExrError)
+            self.note(str(error) if names_it else f"{path}: {error}")
         return None
 
     def note(self, text):

@@ -63,6 +63,34 @@ def text_of(title, text):
     return element("details", element("summary", title), element("pre", text[:MOST_TEXT] + left_out, tabindex="0"))
 
 
+PASSES = {"target": "target images", "scene": "scene made ready", "primal": "images", "interior": "interior term",
+          "edges": "visibility: edges found and learned about", "visibility": "visibility term",
+          "path_length": "path length term"}
+
+
+def passes_of(run):
+    """Seconds of the last call by what they were for; empty where summary.yaml does not say."""
+    last = run.summary.get("last_call")
+    passes = last.get("passes") if isinstance(last, dict) else None
+    if not isinstance(passes, dict) or not isinstance(last.get("seconds"), (int, float)):
+        return {}
+    known = {PASSES.get(str(key), str(key)): float(value) for key, value in passes.items() if isinstance(value, (int, float))}
+    known["all else: optimiser, choice of techniques, files"] = max(0.0, last["seconds"] - sum(known.values()))
+    return known
+
+
+def passes_table(run):
+    """Where the time went, with bars."""
+    passes = {name: time for name, time in passes_of(run).items() if time > 0}
+    if not passes:
+        return None
+    total, longest = sum(passes.values()), max(passes.values())
+    rows = [[name, seconds(time), f"{100 * time / total:.1f} %",
+             element("span", class_="length", style=f"width: {100 * time / longest:.1f}%", aria_hidden="true")]
+            for name, time in passes.items()]
+    return table(["what", "time", "share", ""], rows, "Where the time of the last call went", "numbers passes")
+
+
 def cost_section(run):
     last = run.summary.get("last_call")
     last = last if isinstance(last, dict) else {}
@@ -89,4 +117,5 @@ def cost_section(run):
     rows += [("version of the run", str(run.experiment.get("version", "not known"))),
              ("this page", f"written {datetime.datetime.now().astimezone():%Y-%m-%d %H:%M %Z} on {platform.system()} "
                            f"{platform.machine()}, Python {platform.python_version()}, NumPy {np.__version__}")]
-    return section("cost", "Cost and versions", table(["what", "value"], rows, "Cost and versions", "asked"))
+    return section("cost", "Cost and versions", table(["what", "value"], rows, "Cost and versions", "asked"),
+                   passes_table(run))
