@@ -21,15 +21,18 @@ struct LengthRange {
 template <class Visitor>
 class StandardWalk {
  public:
-  /// `pixel`: whose light a capture's path ends at.
-  StandardWalk(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Visitor visitor)
+  /// `pixel`: whose light a capture's path ends at. `hidden_share`: of the steps of a path that has not met hidden geometry,
+  /// those that hidden geometry sampling takes; in [0, 1).
+  StandardWalk(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Visitor visitor,
+               double hidden_share = 0)
       : worker_(worker),
         path_(path),
         max_bounces_(max_bounces),
         reach_(reach),
         visitor_(std::move(visitor)),
         light_(worker.scene.captures() ? worker.scene.spot_of(pixel) : -1),
-        light_is_given_(worker.scene.captures()) {}
+        light_is_given_(worker.scene.captures()),
+        hidden_share_(hidden_share) {}
 
   /// At the first surface point, the path's last vertex; next_event_and_sample() goes on.
   void begin(Rng& rng) {
@@ -61,28 +64,32 @@ class StandardWalk {
     const double u1 = rng.uniform(), u2 = rng.uniform();
     const SurfacePoint y = scene.point_on_emitter(light_, u1, u2);
     const Scattering s(x, w_o_, distance_o_, y.p);
+    const bool goes_on = bounce_ < max_bounces_;
+    const double hidden = goes_on && !scene.transparent(x.triangle) ? hidden_share_ : 0;
     const bool has_extent = !is_light(light_);
     const double cos_y = has_extent ? -dot(y.n, s.w_i) : 1;
     if (cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {
       const Bsdf& bsdf = scene.bsdf_of(x.triangle);
       if (const Rgb f = bsdf_value(scene, x, s); !f.is_black()) {
         const double to_area = cos_y / (s.distance_i * s.distance_i);
-        const double pdf_bsdf = has_extent ? bsdf.pdf(s) * to_area : 0;
+        const double pdf_walk = has_extent ? step_pdf(bsdf.pdf(s) * to_area, y.triangle, hidden) : 0;
         const bool retraces = path_.retraces(y);
         path_.push(scene, y, s.distance_i);
         if (visitor_.wants() && (retraces || worker_.visible(x, y)))
           visitor_.take(throughput_ * f * scene.emitted(y, -s.w_i) *
-                        (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_bsdf)));
+                        (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_walk)));
         path_.pop();
       }
     }
 
     // Rays meet no light without an extent.
-    if (bounce_ == max_bounces_ && !scene.emitters.have_extent) return false;
+    if (!goes_on && !scene.emitters.have_extent) return false;
+    hidden_ = hidden;
+    if (hidden > 0 && rng.uniform() < hidden) return sample_hidden(x, rng);
     const auto next = sample_bsdf(scene, x, w_o_, throughput_, rng);
     if (!next) return false;
     pdf_ = next->pdf;
-    const bool goes_on = bounce_ < max_bounces_;
+    by_area_ = false;
     if (goes_on) draw_light(rng);
     w_o_ = -next->direction;
     hit_triangle_ = worker_.closest_hit(x, next->direction);
@@ -98,10 +105,15 @@ class StandardWalk {
     distance_o_ = length(x->p - origin);
     if (!(distance_o_ > 0)) return false;  // a camera on a surface sees nothing
     path_.push(scene, *x, distance_o_);
-    if (scene.emits(x->triangle)) {
-      const double pdf_bsdf = pdf_ * std::abs(dot(x->n, w_o_)) / (distance_o_ * distance_o_);
-      take_emission(bounce_ == 0 ? 1 : pdf_bsdf / (pdf_bsdf + scene.emitter_pdf(x->triangle)));
+    const bool emits = scene.emits(x->triangle);
+    if (emits || hidden_ > 0) {
+      const double to_area = std::abs(dot(x->n, w_o_)) / (distance_o_ * distance_o_);
+      const double pdf_walk = step_pdf(pdf_ * to_area, x->triangle, hidden_);
+      if (hidden_ > 0) throughput_ *= (by_area_ ? 1 : pdf_) * to_area / pdf_walk;
+      if (emits) take_emission(bounce_ == 0 ? 1 : pdf_walk / (pdf_walk + scene.emitter_pdf(x->triangle)));
     }
+    if (hidden_share_ > 0 && scene.is_hidden(x->triangle)) hidden_share_ = 0;
+    hidden_ = 0;
     return bounce_++ < max_bounces_ && russian_roulette(throughput_, bounce_ - 1, rng);
   }
 
@@ -109,6 +121,35 @@ class StandardWalk {
   Vec3 direction() const { return -w_o_; }
 
  private:
+  /// Density per area of a step's end, which the vertex before sees: BSDF sampling, of that density, and hidden geometry
+  /// sampling, of that share.
+  double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
+    if (hidden == 0) return pdf_bsdf;
+    const PreparedScene& scene = worker_.scene;
+    return (1 - hidden) * pdf_bsdf + (scene.is_hidden(triangle) ? hidden * scene.hidden.pdf() : 0);
+  }
+  /// Takes the step by hidden geometry sampling; intersect() goes on. False where the walk ends.
+  bool sample_hidden(const SurfacePoint& x, Rng& rng) {
+    const PreparedScene& scene = worker_.scene;
+    double u0 = rng.uniform();
+    const double u1 = rng.uniform();
+    const SurfacePoint z = scene.sample_hidden(u0, u1);
+    draw_light(rng);
+    const Scattering s(x, w_o_, distance_o_, z.p);
+    if (!(s.distance_i > 0)) return false;
+    if (path_.length.back() + s.distance_i * scene.least_index() + scene.distance_to_emitters(z.p) > reach_.upper)
+      return false;
+    if (!(dot(z.n, s.w_i) < 0) && !scene.two_sided(z.triangle) && !scene.transparent(z.triangle)) return false;
+    const Rgb f = bsdf_value(scene, x, s);
+    if (f.is_black() || !worker_.visible(x, z)) return false;
+    throughput_ *= f * std::abs(s.cos_i);
+    pdf_ = scene.bsdf_of(x.triangle).pdf(s);
+    by_area_ = true;
+    w_o_ = -s.w_i;
+    hit_triangle_ = z.triangle;
+    pick_light();
+    return true;
+  }
   /// Chooses the emitter of the next estimation in two steps, so that memory is read meanwhile: the tables that choose it
   /// are prefetched during a ray, the emitter itself before the next vertex.
   void draw_light(Rng& rng) {
@@ -140,7 +181,10 @@ class StandardWalk {
   int light_;  ///< the emitter of the next estimation
   const bool light_is_given_;
   int hit_triangle_ = -1;  ///< of the last ray; -1: none
-  double pdf_ = 0;         ///< of the last ray's direction, per solid angle
+  double pdf_ = 0;         ///< of the last ray's direction by BSDF sampling, per solid angle
+  double hidden_share_;    ///< of the steps to come
+  double hidden_ = 0;      ///< of the last step
+  bool by_area_ = false;   ///< the last step was taken by hidden geometry sampling
 };
 
 /// A whole walk. Leaves the path as it was.

@@ -165,11 +165,11 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   const auto smoothing = [&](Keys& inner) {
     inner.value("diffusion", field::non_negative(spec.diffusion),
                 "adam alone: gradients diffuse over the mesh, over about the root of this many edges; 0: not");
-    inner.value("slopes", field::non_negative(spec.slopes), "weight of a penalty on uneven offsets; 0: none",
+    inner.value("slopes", field::non_negative(spec.slopes), "weight of a penalty on uneven offsets or albedos; 0: none",
                 {.unit = "mean square of the target"});
   };
-  keys.map("smoothing", smoothing, "so that vertices move in patches",
-           {.only = of({vertices}), .unset = spec.diffusion == 0 && spec.slopes == 0});
+  keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
+           {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0});
   keys.value("initial", folder.values(spec.initial),
              "where the optimisation starts; of what moves, offsets from the scene file",
              {.required = true, .unit = own});

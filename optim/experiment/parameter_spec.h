@@ -57,9 +57,9 @@ struct ParameterSpec {
 
   double scale = 0;  ///< in units of the parameter, see parameters.h; 0: the default of its type
 
-  /// Of type vertices, see smoothing.h; 0: none.
+  /// Of types vertices and texture, see smoothing.h; 0: none.
   double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
-  double slopes = 0;     ///< weight of the penalty on uneven offsets, in units of the target's mean square
+  double slopes = 0;     ///< weight of the penalty on uneven values, in units of the target's mean square
 
   /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
   std::map<std::string, YamlValue> where;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <numeric>
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
@@ -312,6 +313,15 @@ Parameters::VertexField Parameters::vertex_field(const Block& block) const {
       field.vertices.resize(block.count / field.stride);
       for (std::size_t v = 0; v < motion.slot.size(); ++v)
         if (motion.slot[v] >= 0) field.vertices[motion.slot[v]] = scene_.shapes[s].first_vertex + static_cast<int>(v);
+      return field;
+    }
+  const DofLayout layout(scene_);
+  for (const Value& value : values_)
+    for (const Shape& shape : scene_.shapes) {
+      if (!shape.textured || value.first_component != block.begin || value.dof != layout.texture(shape.first_vertex))
+        continue;
+      VertexField field{block.name, block.begin, 1, 1, std::vector<int>(shape.vertex_count)};
+      std::iota(field.vertices.begin(), field.vertices.end(), shape.first_vertex);
       return field;
     }
   throw std::logic_error("not a parameter of vertices: " + block.name);

@@ -50,13 +50,13 @@ class Parameters {
   };
   const std::vector<Block>& blocks() const { return blocks_; }
 
-  /// The vertices of one parameter of type `vertices`: component `axis` of vertices[i] is the unknown
-  /// begin + stride i + axis.
+  /// The vertices of one parameter of type `vertices`, or of albedos by vertex: component `axis` of vertices[i] is the
+  /// unknown begin + stride i + axis.
   struct VertexField {
     std::string name;
     int begin;
     int stride;                 ///< 3 for free vertices, else 1
-    double unit;                ///< length of the offset per unit of an unknown
+    double unit;                ///< length of the offset per unit of an unknown; albedos: 1
     std::vector<int> vertices;  ///< in Scene::positions
   };
   VertexField vertex_field(const Block& block) const;

@@ -1,4 +1,4 @@
-// For offsets of many vertices: a penalty on uneven offsets, and diffusion of gradients over the mesh.
+// For offsets or albedos of many vertices: a penalty on uneven ones, and diffusion of gradients over the mesh.
 #pragma once
 #include <memory>
 #include <vector>
@@ -34,7 +34,8 @@ class Preconditioner {
 class PairPenalty {
  public:
   /// Adds `weight` times the mean, over the mesh's edges between selected vertices, of (change of offset /
-  /// length)^2, with the lengths of the loaded mesh: the squared slope of the offsets, dimensionless.
+  /// length)^2, with the lengths of the loaded mesh: the squared slope of the offsets, dimensionless. Albedos likewise, per
+  /// squared scene unit.
   void add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight);
   bool empty() const { return pairs_.empty(); }
   double value(const std::vector<double>& theta) const;

@@ -157,32 +157,39 @@ TEST_F(Rendered, SizeOfTheJacobianIsLimited) {
 }
 
 TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
-  const std::string text =
-      replaced(tiny_experiment(), "type: translation, shape: block, direction: [0, 1, 0], initial: 0.2, target: 0}",
-               "type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, smoothing: "
-               "{slopes: 3}}");
-  const std::string file = folder_.write("dent.yaml", text);
-  // Standard sampling: connections would pick their gates otherwise for a gradient than for a Jacobian. Independent
-  // numbers: a Jacobian's samples come in halves.
-  const std::string standard = "estimator={sampling: standard, numbers: independent}";
-  const Problem with(load_experiment(file, {standard})),
-      without(load_experiment(file, {standard, "parameters[0].smoothing={slopes: 0}"}));
-  const GatedImage target = with.make_target(kGoOn);
-  const std::vector<double> theta = with.parameters().initial();
-  const Evaluation a = RenderedObjective(with, target, kGoOn).linearise(theta, 0),
-                   b = RenderedObjective(without, target, kGoOn).linearise(theta, 0);
-  // Edges of the block's two triangles: four sides of length 1 and one diagonal of sqrt(2), from vertex 0
-  // to 2.
-  const double unit = 3 * mean_square(target) / 5;
-  const double squares = 0.01 + 0.01 + 0.09 + 0.01 + 0.04 / 2;
-  EXPECT_NEAR(a.loss - b.loss, unit * squares, 1e-12 * a.loss);
-  EXPECT_NEAR(a.gradient[0] - b.gradient[0], unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
-  EXPECT_NEAR(a.curvature[2] - b.curvature[2], -unit * 2 / 2, 1e-12 * a.loss);
-  EXPECT_EQ(a.mean_squared_error, b.mean_squared_error);
-  const auto gradient = [&](const Problem& p) {
-    return RenderedObjective(p, target, kGoOn).evaluate(theta, 0).gradient[0];
-  };
-  EXPECT_NEAR(gradient(with) - gradient(without), unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
+  // Offsets and albedos by vertex with the same differences.
+  folder_.write("scene.yaml",
+                replaced(folder_.read("scene.yaml"), "block.obj, material: metal", "block.obj, material: white"));
+  for (const std::string parameter :
+       {"type: vertices, shape: block, direction: normal, initial: [0.1, 0.2, 0.3, 0], target: 0, ",
+        "type: albedo, shape: block, per: vertex, initial: [0.3, 0.4, 0.5, 0.2], target: 0.6, "}) {
+    SCOPED_TRACE(parameter);
+    const std::string file = folder_.write(
+        "uneven.yaml",
+        replaced(tiny_experiment(), "type: translation, shape: block, direction: [0, 1, 0], initial: 0.2, target: 0}",
+                 parameter + "smoothing: {slopes: 3}}"));
+    // Standard sampling: connections would pick their gates otherwise for a gradient than for a Jacobian. Independent
+    // numbers: a Jacobian's samples come in halves.
+    const std::string standard = "estimator={sampling: standard, numbers: independent}";
+    const Problem with(load_experiment(file, {standard})),
+        without(load_experiment(file, {standard, "parameters[0].smoothing={slopes: 0}"}));
+    const GatedImage target = with.make_target(kGoOn);
+    const std::vector<double> theta = with.parameters().initial();
+    const Evaluation a = RenderedObjective(with, target, kGoOn).linearise(theta, 0),
+                     b = RenderedObjective(without, target, kGoOn).linearise(theta, 0);
+    // Edges of the block's two triangles: four sides of length 1 and one diagonal of sqrt(2), from vertex 0
+    // to 2.
+    const double unit = 3 * mean_square(target) / 5;
+    const double squares = 0.01 + 0.01 + 0.09 + 0.01 + 0.04 / 2;
+    EXPECT_NEAR(a.loss - b.loss, unit * squares, 1e-12 * a.loss);
+    EXPECT_NEAR(a.gradient[0] - b.gradient[0], unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
+    EXPECT_NEAR(a.curvature[2] - b.curvature[2], -unit * 2 / 2, 1e-12 * a.loss);
+    EXPECT_EQ(a.mean_squared_error, b.mean_squared_error);
+    const auto gradient = [&](const Problem& p) {
+      return RenderedObjective(p, target, kGoOn).evaluate(theta, 0).gradient[0];
+    };
+    EXPECT_NEAR(gradient(with) - gradient(without), unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
+  }
 }
 
 TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
