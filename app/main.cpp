@@ -27,16 +27,44 @@
 
 namespace {
 
-/// A mistyped command, and the one that is probably meant.
-std::string suggestion(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-') return {};
-  std::vector<std::string> known;
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
-    known.push_back(command->get_name());
-  if (std::find(known.begin(), known.end(), argv[1]) != known.end()) return {};
-  const std::string near = isochron::nearest_word(argv[1], known);
-  return fmt::format("{} is not a command{}", isochron::quote(argv[1]),
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+std::string not_among(const std::string& word, const std::string& what, const std::vector<std::string>& known) {
+  const std::string near = isochron::nearest_word(word, known);
+  return fmt::format("{} is not {}{}", isochron::quote(word), what,
                      near.empty() ? "" : fmt::format(", did you mean '{}'?", near));
+}
+
+/// A mistyped command or option, and the one that is probably meant; empty where there is none.
+std::string mistyped(const CLI::App* command, const std::vector<std::string>& commands,
+                     const std::vector<std::string>& words) {
+  if (words.empty() || words[0][0] == '-') return {};
+  if (!command) return not_among(words[0], "a command", commands);
+  std::vector<std::string> options;
+  for (const CLI::Option* option : command->get_options())
+    for (const std::string& name : option->get_lnames()) options.push_back("--" + name);
+  for (const std::string& word : words) {
+    const std::string name = word.substr(0, word.find('='));
+    if (name.starts_with("--") && std::find(options.begin(), options.end(), name) == options.end())
+      return not_among(name, "an option of " + words[0], options);
+  }
+  return {};
+}
+
+/// What is wrong with a command line, in one line.
+std::string complaint(const CLI::App& app, const CLI::ParseError& error, const std::vector<std::string>& words) {
+  std::vector<std::string> commands;
+  const CLI::App* command = nullptr;
+  for (const CLI::App* each : app.get_subcommands([](const CLI::App*) { return true; })) {
+    commands.push_back(each->get_name());
+    if (!words.empty() && words[0] == each->get_name()) command = each;
+  }
+  const std::string known = mistyped(command, commands, words);
+  return fmt::format("{} (see isochron {}--help)", known.empty() ? one_line(error.what()) : known,
+                     command ? words[0] + " " : "");
 }
 
 /// Reports what of the standard output could not be written, as on a full disk; status 1 then.
@@ -45,11 +73,6 @@ int flushed(int status) {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good()) return status;
   spdlog::error("the standard output cannot be written");
   return status == 0 ? 1 : status;
-}
-
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
 }
 
 int run_program(int argc, char** argv) {
@@ -82,8 +105,7 @@ int run_program(int argc, char** argv) {
   } catch (const CLI::Success& request) {
     return flushed(app.exit(request));
   } catch (const CLI::ParseError& error) {
-    const std::string mistyped = suggestion(app, argc, argv);
-    spdlog::error("{} (see isochron --help)", mistyped.empty() ? one_line(error.what()) : mistyped);
+    spdlog::error("{}", complaint(app, error, {argv + 1, argv + argc}));
     return 2;
   } catch (const isochron::InputError& error) {
     spdlog::error("{}", one_line(error.what()));

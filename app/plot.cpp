@@ -1,9 +1,12 @@
+#include <fmt/format.h>
+
 #include <filesystem>
 #include <memory>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/plots.h"
+#include "core/base/error.h"
 
 namespace isochron {
 namespace {
@@ -11,6 +14,7 @@ namespace {
 int plot(const std::string& folder) {
   catch_interrupts();
   const std::filesystem::path path = folder;
+  if (!std::filesystem::is_directory(path)) throw InputError(fmt::format("plot: {}: no such folder", folder));
   for (const char* table : {"chart.csv", "chart_solvers.csv", "stability.csv"})
     if (std::filesystem::exists(path / table)) return draw_charts(folder) ? 0 : 1;
   return draw_plots(folder) ? 0 : 1;

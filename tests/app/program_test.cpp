@@ -123,10 +123,19 @@ TEST_F(Program, OutputThatCannotBeWrittenIsAFailure) {
   EXPECT_TRUE(folder_.has("out/check.csv"));
 }
 
-TEST_F(Program, MistypedCommandsAreCorrected) {
+TEST_F(Program, MistypedCommandsAndOptionsAreCorrected) {
   const Result result = run({"rendr", folder_.file("tiny.yaml")});
   EXPECT_EQ(result.status, 2);
   EXPECT_EQ(result.errors, "isochron: error: 'rendr' is not a command, did you mean 'render'? (see isochron --help)\n");
+  EXPECT_EQ(run({"render", folder_.file("tiny.yaml"), "--sample=3"}).errors,
+            "isochron: error: '--sample' is not an option of render, did you mean '--samples'? (see isochron render "
+            "--help)\n");
+}
+
+TEST_F(Program, PlotNeedsAFolder) {
+  const Result result = run({"plot", folder_.file("nowhere")});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_EQ(result.errors, "isochron: error: plot: " + folder_.file("nowhere") + ": no such folder\n");
 }
 
 TEST_F(Program, EveryCommandHasAFolderOfItsOwn) {

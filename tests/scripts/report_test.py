@@ -107,9 +107,9 @@ class ReportTest(unittest.TestCase):
         self.assertEqual(dict((name, (time, share)) for name, time, share in rows), {
             "target images": ("1.5 s", "12.0 %"), "scene made ready": ("0.5 s", "4.0 %"), "images": ("2 s", "16.0 %"),
             "interior term": ("4 s", "32.0 %"), "visibility: edges found and learned about": ("0.25 s", "2.0 %"),
-            "visibility term": ("3 s", "24.0 %"), "all else: optimiser, choice of techniques, files": ("1.25 s", "10.0 %")})
+            "visibility term": ("3 s", "24.0 %"), "all else (optimiser, files ...)": ("1.25 s", "10.0 %")})
         self.page(self.folder, self.folder, output=self.top / "c.html")
-        self.assertIn("time of the last call: interior term", self.text)
+        self.assertIn("time: interior term", self.text)
         self.edit("summary.yaml", "passes: {", "passes: [] # {")
         self.edit("summary.yaml", "            passes: [] #", "            passes: []} #")
         self.page()

@@ -66,7 +66,7 @@ def results(runs, labels):
             rows.append([name, *(number(v / unit if v else None, 3) for v in values)])
     passes = [passes_of(run) for run in runs]
     for name in dict.fromkeys(name for p in passes for name, time in p.items() if time > 0):
-        rows.append([f"time of the last call: {name}", *(seconds(p.get(name)) for p in passes)])
+        rows.append([f"time: {name}", *(seconds(p.get(name)) for p in passes)])
     cells = [parameter_cells(run) for run in runs]
     for name in dict.fromkeys(name for c in cells for name in c):
         rows.append([name, *(c.get(name, "–") for c in cells)])

@@ -75,7 +75,7 @@ def passes_of(run):
     if not isinstance(passes, dict) or not isinstance(last.get("seconds"), (int, float)):
         return {}
     known = {PASSES.get(str(key), str(key)): float(value) for key, value in passes.items() if isinstance(value, (int, float))}
-    known["all else: optimiser, choice of techniques, files"] = max(0.0, last["seconds"] - sum(known.values()))
+    known["all else (optimiser, files ...)"] = max(0.0, last["seconds"] - sum(known.values()))
     return known
 
 
