@@ -114,7 +114,7 @@ class MeshFilesTest(unittest.TestCase):
                 self.assertEqual(done.returncode, 0, done.stderr)
                 points, triangles = read_scene_mesh(path, TRANSFORM)
                 of_program = read_mesh(run / "geometry/initial_it.ply")
-                np.testing.assert_allclose(points, of_program[0], atol=1e-12)
+                np.testing.assert_allclose(points, of_program[0], rtol=0, atol=1e-12)
                 self.assertEqual(len(triangles), len(of_program[1]))
 
     def test_mistakes_are_one_line(self):
