@@ -4,11 +4,11 @@
     scripts/letter_photons.py measure CSV      twenty minutes on two cores
     scripts/letter_photons.py plot CSV PNG
 
-Gain and background of experiments/letter.yaml are multiplied by each of some factors, and so are their initial values. The penalty
-on slopes counts in mean squares of the target: it is divided by the factor's square, so that the same is expected of the relief.
+Gain and background of experiments/letter.yaml are multiplied by each of some factors, and so are their initial values. The
+penalties on slopes count in mean squares of the target: they are divided by the factor's square, so that the same is expected
+of relief and albedos.
 """
 
-import csv
 import pathlib
 import statistics
 import sys
@@ -22,6 +22,7 @@ import matplotlib.pyplot as plt
 
 import letter_errors
 from reproduction.measure import ROOT, program
+from reproduction.tables import read_rows, run_action, write_rows
 
 FACTORS = (0.1, 0.3, 1, 3, 10)
 DRAWS = 4
@@ -37,7 +38,7 @@ def settings(experiment, factor, draw):
             for key in ("initial", "target"):
                 yield f"parameters[{i}].{key}={factor * parameter[key]:.6g}"
         if "smoothing" in parameter:
-            yield f"parameters[{i}].smoothing.slopes={parameter['smoothing']['slopes'] / factor**2:.6g}"
+            yield f"parameters[{i}].smoothing.slopes={float(parameter['smoothing']['slopes']) / factor**2:.6g}"
 
 
 def measure(file):
@@ -53,13 +54,11 @@ def measure(file):
                 errors = letter_errors.errors(folder)
                 rows.append((factor, draw, *(f"{errors[c]:.4g}" for c in COLUMNS[2:])))
                 print(*rows[-1], flush=True)
-                with open(file, "w", encoding="ascii", newline="") as out:
-                    csv.writer(out, lineterminator="\n").writerows([COLUMNS, *rows])
+                write_rows(file, COLUMNS, rows)
 
 
 def plot(file, picture):
-    with open(file, encoding="ascii", newline="") as lines:
-        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(lines)]
+    rows = [{k: float(v) for k, v in row.items()} for row in read_rows(file)]
     counts = sorted({factor: statistics.mean(r["counts"] for r in rows if r["factor"] == factor)
                      for factor in {r["factor"] for r in rows}}.items())
     panels = (("depth_mm", "depth error (mm)"), ("tilt_degrees", "tilt error (degrees)"), ("albedo", "correlation of albedos"))
@@ -81,16 +80,5 @@ def plot(file, picture):
     figure.savefig(picture, dpi=100)
 
 
-def main(arguments):
-    if len(arguments) == 2 and arguments[0] == "measure":
-        measure(pathlib.Path(arguments[1]))
-    elif len(arguments) == 3 and arguments[0] == "plot":
-        plot(*map(pathlib.Path, arguments[1:]))
-    else:
-        print(__doc__.strip(), file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(run_action(__doc__, sys.argv[1:], measure, plot))

@@ -8,7 +8,6 @@ For every experiment, count and draw of the noise: a run shortened as `SHORT` sa
 initial one. Photons are counted per pixel and colour, on average over the brightest gate; 0 stands for no noise.
 """
 
-import csv
 import pathlib
 import statistics
 import sys
@@ -22,6 +21,7 @@ import matplotlib.pyplot as plt
 import use_package
 from isochron.pictures import sheets
 from reproduction.measure import ROOT, program, summary
+from reproduction.tables import Usage, read_rows, run_action, write_rows
 
 PHOTONS = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000, 0)
 DRAWS = 3
@@ -33,11 +33,13 @@ SHORT = {
 COLUMNS = ("experiment", "photons", "draw", "error_percent")
 
 
-def measure(file, names):
+def measure(file, *names):
+    if not set(names) <= set(SHORT):
+        raise Usage
+    names = names or tuple(SHORT)
     rows = []
-    if file.exists():
-        with open(file, encoding="ascii", newline="") as lines:
-            rows = [tuple(r[c] for c in COLUMNS) for r in csv.DictReader(lines) if r["experiment"] not in names]
+    if pathlib.Path(file).exists():
+        rows = [tuple(r[c] for c in COLUMNS) for r in read_rows(file) if r["experiment"] not in names]
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary) / "run"
         for name in names:
@@ -51,13 +53,11 @@ def measure(file, names):
                     error = 100 * end["param_rmse_final"] / end["param_rmse_initial"]
                     rows.append((name, photons, draw, f"{error:.4g}"))
                     print(*rows[-1], flush=True)
-                    with open(file, "w", encoding="ascii", newline="") as out:
-                        csv.writer(out, lineterminator="\n").writerows([COLUMNS, *sorted(rows, key=lambda r: r[0])])
+                    write_rows(file, COLUMNS, sorted(rows, key=lambda r: r[0]))
 
 
-def draw(file, picture):
-    with open(file, encoding="ascii", newline="") as lines:
-        rows = list(csv.DictReader(lines))
+def plot(file, picture):
+    rows = read_rows(file)
     figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
     for color, name in zip(("C0", "C3"), dict.fromkeys(r["experiment"] for r in rows)):
         points = [(int(r["photons"]), float(r["error_percent"])) for r in rows if r["experiment"] == name]
@@ -75,16 +75,5 @@ def draw(file, picture):
     sheets.save(figure, pathlib.Path(picture))
 
 
-def main(arguments):
-    if len(arguments) >= 2 and arguments[0] == "measure" and set(arguments[2:]) <= set(SHORT):
-        measure(pathlib.Path(arguments[1]), arguments[2:] or list(SHORT))
-    elif len(arguments) == 3 and arguments[0] == "plot":
-        draw(arguments[1], arguments[2])
-    else:
-        print(__doc__.strip(), file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(run_action(__doc__, sys.argv[1:], measure, plot))

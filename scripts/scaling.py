@@ -5,17 +5,16 @@
     scripts/scaling.py plot CSV PNG
     scripts/scaling.py page CSV PAGE.md   rewrites what stands between <!-- scaling --> and <!-- /scaling -->
 
-An iteration is one image with its gradient. Measured are its wall seconds with some multiples of the experiment's samples, on one
-core, as two threads and as two ranks, and the messages between two ranks, which Open MPI itself counts.
+An iteration is one image with its gradient. Measured are its wall seconds with some multiples of the experiment's samples, on
+one core, as two threads and as two ranks, and the messages between two ranks, which Open MPI itself counts.
 
-The model: T = S + W / c + M. A line through the times on one core, as a function of samples, gives S, which every core does for
-itself, and W, which they share. c is by how much the busiest core has less than all: of K partitions in a pass n cores
-take K / ceil(K / n). M is what messages take: partial sums go up a binary tree of ranks, one after the other on its
+The model: T = S + W / c + M. A line through the times on one core, as a function of samples, gives S, which every core does
+for itself, and W, which they share. With K partitions in a pass the busiest of n cores has ceil(K / n) of them, so
+c = K / ceil(K / n). M is what messages take: partial sums go up a binary tree of ranks, one after the other on its
 longest branch, and the whole sum comes back; both take log2 of the number of ranks in steps.
 """
 
 import collections
-import csv
 import math
 import os
 import pathlib
@@ -32,6 +31,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from reproduction.measure import PROGRAM, ROOT
+from reproduction.tables import read_rows, run_action, write_rows
 
 # Partitions: Passes::partitions_for of an image of so many pixels.
 PARTITIONS = {"corridor": 32, "letter": 128}
@@ -41,7 +41,7 @@ ITERATIONS = 6
 ROUNDS = 7
 COLUMNS = ("experiment", "sharing", "samples", "round", "seconds", "bytes", "messages")
 
-# Assumptions about the network, of the size that makers of InfiniBand and Omni-Path publish; of a sum: measured here.
+# Assumptions: a network as makers of InfiniBand and Omni-Path publish; sums cost what partition_count takes for them.
 LATENCY = 1.5e-6  # seconds of a message
 BANDWIDTH = 1e10  # bytes per second
 ADDING = 1e-9 / 8  # seconds per byte: a nanosecond for a double
@@ -64,9 +64,7 @@ def run(folder, name, sharing, multiple, iterations, *mca):
 
 def iteration_seconds(folder):
     """Median, without the first iteration, which makes what is made once."""
-    with open(folder / "log.csv", encoding="ascii", newline="") as lines:
-        times = [float(row["seconds"]) for row in csv.DictReader(lines)]
-    return statistics.median(np.diff(times))
+    return statistics.median(np.diff([float(row["seconds"]) for row in read_rows(folder / "log.csv")]))
 
 
 def messages(folder, name):
@@ -99,8 +97,7 @@ def measure(file):
                         rows.append((name, sharing, multiple, turn, f"{iteration_seconds(folder / 'run'):.5g}",
                                      *(f"{x:g}" for x in sent)))
             print(f"round {turn} of {ROUNDS}", flush=True)
-            with open(file, "w", encoding="ascii", newline="") as out:
-                csv.writer(out, lineterminator="\n").writerows([COLUMNS, *rows])
+            write_rows(file, COLUMNS, rows)
 
 
 class Measured:
@@ -119,8 +116,7 @@ class Measured:
 
 
 def read(file):
-    with open(file, encoding="ascii", newline="") as lines:
-        rows = list(csv.DictReader(lines))
+    rows = read_rows(file)
     return {name: Measured([r for r in rows if r["experiment"] == name]) for name in PARTITIONS}
 
 
@@ -139,8 +135,8 @@ class Model:
         return self.partitions / math.ceil(self.partitions / min(cores, self.partitions))
 
     def exchange(self, cores, rank_cores=RANK_CORES):
-        """Seconds of the messages of one iteration. What two ranks exchange is one step, there and back, whose bytes are added up
-        once on the way up. Ranks without partitions of their own take part in the way back alone."""
+        """Seconds of the messages of one iteration: what two ranks exchange is one step of the tree, there and back, and
+        every byte counts as added, which those on the way back are not."""
         steps = math.log2(max(1, math.ceil(cores / rank_cores)))
         return steps * (self.messages * LATENCY + self.bytes / BANDWIDTH + self.bytes * ADDING)
 
@@ -183,8 +179,8 @@ def table(measured):
     for name, model in models(measured).items():
         m = measured[name]
         times = " | ".join(f"{m.seconds[sharing][1]:.3g} s" for sharing in SHARINGS)
-        out.append(f"| `{name}` | {times} | {m.ratio('2 ranks', '2 threads'):.2f} | {1000 * model.serial:.2g} ms | {model.messages:.0f} "
-                   f"| {model.bytes / 1000:.3g} kB |")
+        out.append(f"| `{name}` | {times} | {m.ratio('2 ranks', '2 threads'):.2f} | {1000 * model.serial:.2g} ms "
+                   f"| {model.messages:.0f} | {model.bytes / 1000:.3g} kB |")
     cores = (2, 8, 32, 128, 1024, 8192)
     out += ["", "Modelled speed-up over one core, with the experiment's samples and with 16 times as many:", "",
             "| cores | " + " | ".join(map(str, cores)) + " |", "|---" * (1 + len(cores)) + "|"]
@@ -196,6 +192,7 @@ def table(measured):
 
 
 def page(file, markdown):
+    markdown = pathlib.Path(markdown)
     before, rest = markdown.read_text(encoding="utf-8").split("<!-- scaling -->\n")
     after = rest.split("<!-- /scaling -->")[1]
     text = f"{before}<!-- scaling -->\n{table(read(file))}\n<!-- /scaling -->{after}"
@@ -204,16 +201,5 @@ def page(file, markdown):
     partial.replace(markdown)
 
 
-def main(arguments):
-    if len(arguments) == 2 and arguments[0] == "measure":
-        measure(pathlib.Path(arguments[1]))
-    elif len(arguments) == 3 and arguments[0] in ("plot", "page"):
-        {"plot": plot, "page": page}[arguments[0]](*map(pathlib.Path, arguments[1:]))
-    else:
-        print(__doc__.strip(), file=sys.stderr)
-        return 2
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(run_action(__doc__, sys.argv[1:], measure, plot, page))

@@ -54,6 +54,24 @@ class ModelTest(unittest.TestCase):
         self.assertIn("| `letter` | 8.25 s | 4.25 s | 4.25 s | 1.00 | 2.5e+02 ms | 10 | 1e+03 kB |", text)
 
 
+class CommandTest(unittest.TestCase):
+    def test_page_is_rewritten_between_its_marks(self):
+        with tempfile.TemporaryDirectory() as folder:
+            csv, page = pathlib.Path(folder) / "scaling.csv", pathlib.Path(folder) / "page.md"
+            each = [[name, *(row[c] for c in scaling.COLUMNS[1:])] for name in scaling.PARTITIONS for row in rows(0.25, 8)]
+            scaling.write_rows(csv, scaling.COLUMNS, each)
+            page.write_text("before\n<!-- scaling -->\nold\n<!-- /scaling -->\nafter\n")
+            self.assertEqual(scaling.run_action("", ["page", str(csv), str(page)], scaling.page), 0)
+            self.assertEqual(page.read_text(), "before\n<!-- scaling -->\n" + scaling.table(scaling.read(csv))
+                             + "\n<!-- /scaling -->\nafter\n")
+            self.assertEqual(sorted(p.name for p in pathlib.Path(folder).iterdir()), ["page.md", "scaling.csv"])
+
+    def test_wrong_arguments_get_the_usage(self):
+        for words in ([], ["draw", "a"], ["plot", "a"], ["measure"]):
+            done = subprocess.run([ROOT / "scripts/scaling.py", *words], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr), (2, scaling.__doc__.strip() + "\n"))
+
+
 class PageTest(unittest.TestCase):
     """What the page tells a user to submit, run with programs that note how they were called."""
 
@@ -72,7 +90,8 @@ class PageTest(unittest.TestCase):
         (self.folder / "calls").unlink(missing_ok=True)
         environment = {"PATH": f"{self.folder}:{os.environ['PATH']}", "SLURM_NTASKS": "4", "SLURM_CPUS_PER_TASK": "16",
                        "SLURM_ARRAY_TASK_ID": "3"}
-        process = subprocess.run(["bash", "-eu", "-c", script], cwd=self.folder, env=environment, capture_output=True, text=True)
+        process = subprocess.run(["bash", "-eu", "-c", script], cwd=self.folder, env=environment, capture_output=True,
+                                 text=True)
         calls = self.folder / "calls"
         return process, calls.read_text().splitlines() if calls.exists() else []
 
