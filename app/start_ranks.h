@@ -4,8 +4,7 @@
 namespace isochron {
 
 /// Where mpirun (or srun) started the program: joins the other ranks (core/base/ranks.h) and keeps all but the first from
-/// printing. Throws InputError where the program was built without MPI, or
-/// its library is missing.
+/// printing. Throws InputError where the program was built without MPI, or its library is missing.
 void start_ranks();
 /// Reports what happened to this rank, and to others perhaps not. Where there are others, ends them all; else returns the
 /// exit status.

@@ -52,8 +52,8 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// Of standard sampling, for derivatives: the share of the steps of a camera's path that has not met what parameters change
-  /// which are drawn on it (see HiddenGeometry), combined with BSDF sampling by multiple importance sampling; in [0, 1).
+  /// In [0, 1): while a camera's path by standard sampling has not met what parameters change, the probability that its next
+  /// vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF. Derivatives alone.
   double hidden = 0;
   /// How far path vertices follow what is close to them and moves otherwise, see VertexFlows; 0: not at all. Any values
   /// give the same derivative, with other variances, divided otherwise between the interior and the visibility term.

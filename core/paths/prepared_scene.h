@@ -86,9 +86,6 @@ class PreparedScene {
   }
   /// The part of a capture's first vertices that hidden geometry sampling finds.
   double hidden_share() const { return hidden.empty() ? 0 : hidden_is_all ? 1 : kHiddenShare; }
-  /// The same part of the steps of a camera's walks, of those that options ask for: none where hidden geometry is all that
-  /// there is.
-  double walk_hidden_share(double asked) const { return captures() || hidden.empty() || hidden_is_all ? 0 : asked; }
   /// Density per area of x1, which the sensor point sees, where Worker::start_path draws it; `received`: what the wall makes
   /// of light from there, importance per area, which is the density of the wall's own reflection.
   double first_vertex_pdf(const SurfacePoint& x1, double received) const {

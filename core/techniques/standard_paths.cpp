@@ -6,16 +6,12 @@ namespace {
 /// Scenes of more triangles are larger than the caches: their records take a megabyte.
 constexpr std::size_t kCachedTriangles = 1 << 13;
 
-double hidden_share(const Worker& worker) {
-  return worker.differential_sink ? worker.scene.walk_hidden_share(worker.options.hidden) : 0;
-}
-
 }  // namespace
 
 StandardPaths::StandardPaths(Worker& worker, bool pairs)
     : worker_(worker),
       large_(worker.scene.scene.triangles.size() > kCachedTriangles),
-      slots_{Slot(worker, pairs, hidden_share(worker)), Slot(worker, pairs, hidden_share(worker))} {}
+      slots_{Slot(worker, pairs), Slot(worker, pairs)} {}
 
 void StandardPaths::start(int pixel, double scale, Rng& rng) {
   if (worker_.scene.captures()) {
@@ -65,7 +61,7 @@ StandardPaths::Slot::Walk StandardPaths::Slot::begin(int pixel, double scale, Rn
   pixel_ = pixel;
   scale_ = scale;
   Walk walk(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()},
-            Visitor{*this}, hidden_share_);
+            Visitor{*this}, worker_.hidden_share_of_walks());
   walk.begin_at_camera(pixel, rng);
   return walk;
 }

@@ -23,8 +23,7 @@ class StandardPaths {
   /// Holds the path under way, if any.
   class Slot {
    public:
-    Slot(Worker& worker, bool pairs, double hidden_share)
-        : worker_(worker), path_(worker.options.max_bounces), pairs_(pairs), hidden_share_(hidden_share) {}
+    Slot(Worker& worker, bool pairs) : worker_(worker), path_(worker.options.max_bounces), pairs_(pairs) {}
     Slot(const Slot&) = delete;
     Slot& operator=(const Slot&) = delete;
 
@@ -50,7 +49,6 @@ class StandardPaths {
     Worker& worker_;
     Path path_;
     const bool pairs_;
-    const double hidden_share_;
     int pixel_ = -1;
     double scale_ = 0;
     Rng rng_{Stream{}, 0, 0};

@@ -85,7 +85,7 @@ class StandardWalk {
     // Rays meet no light without an extent.
     if (!goes_on && !scene.emitters.have_extent) return false;
     hidden_ = hidden;
-    if (hidden > 0 && rng.uniform() < hidden) return sample_hidden(x, rng);
+    if (hidden > 0 && rng.uniform() < hidden) return step_to_hidden(x, rng);
     const auto next = sample_bsdf(scene, x, w_o_, throughput_, rng);
     if (!next) return false;
     pdf_ = next->pdf;
@@ -129,7 +129,7 @@ class StandardWalk {
     return (1 - hidden) * pdf_bsdf + (scene.is_hidden(triangle) ? hidden * scene.hidden.pdf() : 0);
   }
   /// Takes the step by hidden geometry sampling; intersect() goes on. False where the walk ends.
-  bool sample_hidden(const SurfacePoint& x, Rng& rng) {
+  bool step_to_hidden(const SurfacePoint& x, Rng& rng) {
     const PreparedScene& scene = worker_.scene;
     double u0 = rng.uniform();
     const double u1 = rng.uniform();

@@ -74,6 +74,13 @@ struct Worker {
   /// makes of radiance from x1, over density; 0: there is no x1.
   double start_path(int pixel, Rng& rng);
 
+  /// EstimatorOptions::hidden where it is of use: for derivatives, to which paths that miss hidden geometry add nothing, by
+  /// cameras' walks, and where there is something else to miss it for.
+  double hidden_share_of_walks() const {
+    const bool of_use = differential_sink && !scene.captures() && !scene.hidden.empty() && !scene.hidden_is_all;
+    return of_use ? options.hidden : 0;
+  }
+
   /// Whether the complete path p (last vertex on an emitter) contributes: to images always, to derivatives where it can
   /// have a gradient.
   bool contributes(const Path& p) const {

@@ -101,10 +101,10 @@ void describe_estimator(Keys& keys, EstimatorOptions& options, bool& guiding) {
              "coupled pairs for the gates' slopes, under ellipsoidal sampling");
   keys.value("pick", field::choice(options.pick), "which arc of an ellipsoid a connection takes");
   keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
-  keys.value(
-      "hidden", field::number(options.hidden, {.low = 0, .high = 1, .high_open = true}),
-      "standard sampling, derivatives: the share of a path's steps that are drawn on what parameters change, until it "
-      "gets there");
+  keys.value("hidden", field::number(options.hidden, {.low = 0, .high = 1, .high_open = true}),
+             "cameras, standard sampling, derivatives: the share of a path's steps that are drawn on what parameters "
+             "change, until it "
+             "gets there");
   keys.value("guiding", field::boolean(guiding),
              "visibility: learn where boundaries matter from a small share of the samples");
   keys.value("follow", field::non_negative(options.follow),
