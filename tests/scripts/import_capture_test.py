@@ -66,7 +66,8 @@ class ImportTest(unittest.TestCase):
         counts = numbered(4, 3, 8)
         self.save("five.mat", rect_data=counts, width=0.35)
         write_matlab_73(self.folder / "seven.mat", {"rect_data": counts, "width": [[0.35]]})
-        for name in ("five.mat", "seven.mat"):
+        (self.folder / "plain.mat").write_bytes((self.folder / "seven.mat").read_bytes()[512:])  # as of h5py and Octave
+        for name in ("five.mat", "seven.mat", "plain.mat"):
             file = self.imported(name)
             np.testing.assert_array_equal(file["H"], counts.transpose(2, 0, 1))
             self.assertEqual(file["H"].dtype, np.float32)
@@ -198,6 +199,8 @@ class ImportTest(unittest.TestCase):
         self.assert_fails(r"not a file of MATLAB or NumPy \(.mat, .npy, .npz\)", "a.txt")
         for name in ("bad.mat", "bad.npy", "bad.npz"):
             (self.folder / name).write_bytes(b"neither of them" * 50)
+            self.assert_fails(f"{name}: cannot be read: ", name)
+            (self.folder / name).write_bytes(b"short")
             self.assert_fails(f"{name}: cannot be read: ", name)
             (self.folder / name).write_bytes(b"")
             self.assert_fails(f"{name}: cannot be read: ", name)
