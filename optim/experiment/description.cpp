@@ -207,7 +207,7 @@ Field file_name(std::string& variable) {
   return name;
 }
 
-void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
+void describe(Keys& keys, Experiment& e, ExperimentFolder& folder, bool target_values) {
   keys.value("name", file_name(e.name), "names the default output folder, `runs/NAME`", {.required = true});
   keys.value("scene", folder.file(e.scene), "the scene", {.required = true});
   keys.value("resolution", resolution(e.resolution),
@@ -218,9 +218,10 @@ void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
              "scattering vertices on a path, at most");
   keys.map(
       "target", [&](Keys& inner) { describe(inner, e.target, folder); }, "the images to be matched");
-  keys.list("parameters", e.parameters,
-            [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, !e.target.measured()); },
-            "the unknowns; those of one shape act in this order", {.otherwise = "none"});
+  keys.list(
+      "parameters", e.parameters,
+      [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, target_values && !e.target.measured()); },
+      "the unknowns; those of one shape act in this order", {.otherwise = "none"});
   keys.map(
       "samples", [&](Keys& inner) { describe(inner, e.samples); }, "per pixel and iteration");
   keys.map(
