@@ -63,8 +63,8 @@ class GateShape {
   /// Standard deviation of the gate as a density (the width that `auto` sampling goes by); unbounded gates:
   /// infinity.
   double width() const { return width_; }
-  /// A length over which the gate changes little: its width, but of a bin that without its response, and of a modulated gate
-  /// what turns it by a radian. Steady: infinity.
+  /// A length over which the gate changes little: its width; of a bin, the width without the response; of a modulated gate,
+  /// the length that shifts its phase by one radian. Steady: infinity.
   double detail() const { return detail_; }
   /// Integral over the real line: 1, less what truncation took away. Unbounded gates: 1 by convention.
   double mass() const { return mass_; }
