@@ -94,8 +94,8 @@ class GateShape {
         return {peak_, 0};
     }
   }
-  /// Offset with density value / mass; u, v in (0, 1). A bin takes its response's delay from u and the place in itself
-  /// from v; other kinds take all from u. Not for unbounded gates, which are no densities.
+  /// Offset with density value / mass; u, v in (0, 1). A bin takes its response's delay from u and the position within
+  /// the bin from v; other kinds take all from u. Not for unbounded gates, which are no densities.
   double sample(double u, double v) const;
   /// Mass of dW+ and of dW- that a pair of the given part stands for; zero for unbounded gates. Where a side is absent from
   /// some pairs, its part of dW has less. All kinds but bins with a response split dW into its positive and its negative part;

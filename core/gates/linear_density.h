@@ -14,7 +14,7 @@ class LinearDensity {
     double slope = 0;  ///< of the interval after the knot; zero at a jump
     double below = 0;  ///< integral up to the knot
   };
-  /// Value and integral up to a place.
+  /// Value at x and integral up to x.
   struct Cumulated {
     double value = 0, below = 0;
   };
@@ -71,7 +71,7 @@ class LinearDensity {
     int next_, stride_;
     double along_, half_square_;
   };
-  /// The place up to which the integral is u; u in (0, 1).
+  /// The x up to which the integral is u; u in (0, 1).
   double quantile(double u) const;
 
  private:

@@ -56,7 +56,7 @@ struct Detector {
 };
 
 struct Scene {
-  /// Of a capture only its size, in pixels, and its place, amid the sensor points, count.
+  /// Where there is a capture only its size, in pixels, and its position, the mean of the sensor points, are used.
   Camera camera;
   std::optional<Capture> capture;  ///< in place of the camera
   Detector detector;

@@ -42,8 +42,8 @@ class BoundaryEdges {
   struct Pick {
     const BoundaryEdge* edge = nullptr;
     double s = 0;                 ///< fraction along the edge
-    double begin = 0, share = 0;  ///< the edge takes the numbers from `begin` to `begin` + `share`
-    /// The number that gives this point.
+    double begin = 0, share = 0;  ///< u from `begin` to `begin` + `share` draw this edge
+    /// The u that draws this point.
     double x() const { return begin + s * share; }
   };
   struct Sample : Pick {

@@ -14,8 +14,8 @@ struct LengthRange {
   bool holds(double length) const { return length >= lower && length <= upper; }
 };
 
-/// Extends `path`, whose vertex 0 is what looks and vertex 1 the first surface point, by up to `max_bounces`
-/// scattering vertices, a vertex at a time. Visits every complete path whose length is in `reach`: visitor.wants() is
+/// Extends `path`, whose vertex 0 is the point that light is gathered for and vertex 1 the first surface point, by up to
+/// `max_bounces` scattering vertices, a vertex at a time. Visits every complete path whose length is in `reach`: visitor.wants() is
 /// asked first, while the path ends on the emitter; then visitor.take(value) gets contribution over density from vertex 1
 /// on (seen from vertex 0, without the gate).
 template <class Visitor>
@@ -150,8 +150,8 @@ class StandardWalk {
     pick_light();
     return true;
   }
-  /// Chooses the emitter of the following next-event estimation in two steps, so that memory is read meanwhile: the tables that choose it
-  /// are prefetched during a ray, the emitter itself before the next vertex.
+  /// Chooses the emitter of the following next-event estimation in two steps, so that memory is read meanwhile: the tables that
+  /// choose it are prefetched during a ray, the emitter itself before the next vertex.
   void draw_light(Rng& rng) {
     if (light_is_given_) return;
     light_draw_ = rng.uniform();

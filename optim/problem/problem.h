@@ -142,8 +142,8 @@ class Problem {
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
 
-  /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. What of theta cannot
-  /// be rendered must not be asked for.
+  /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. theta must be one
+  /// that can_render() accepts.
   std::vector<double> transpose_apply(const std::vector<double>& theta, const GatedImage& image,
                                       std::uint32_t iteration, const Poll& poll) const;
 
