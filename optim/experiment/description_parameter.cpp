@@ -178,8 +178,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
       {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
   keys.value("lower", folder.values(spec.lower),
              "bound. Besides, ior stays on its side of 1, emission, intensity and gain above 0, background at 0 or "
-             "above, what "
-             "else materials have between 0 and 1",
+             "above, what else materials have between 0 and 1",
              {.unit = own, .unset = spec.lower.empty()});
   keys.value("upper", folder.values(spec.upper), "bound. An ior above 1 has none of its own: give one",
              {.unit = own, .unset = spec.upper.empty()});
