@@ -76,10 +76,10 @@ class MethodRun {
   /// Derivative images by one unknown, of all gates.
   GatedImage derivative(const std::vector<double>& theta, int component, std::uint32_t iteration,
                         const Poll& poll) const;
-  /// `render(renderer, stream)` of every gate by itself, put together.
+  /// Calls `render(renderer, iteration, gate)` for every gate, with a renderer and an iteration number of its own.
   template <class F>
-  GatedImage gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
-                          F&& render) const;
+  void gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
+                    F&& render) const;
 
   Method::Gradient kind_;
   Problem problem_;
