@@ -1,4 +1,5 @@
-// CPU seconds of this process so far, all threads; of all ranks (ranks.h), which meet here: what they decide by it is the same.
+// CPU seconds so far of all threads of all ranks (ranks.h). Collective: every rank gets the same sum, so that all decide alike
+// by it.
 #pragma once
 #include <time.h>
 

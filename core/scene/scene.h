@@ -56,7 +56,7 @@ struct Detector {
 };
 
 struct Scene {
-  /// Of a capture only its size, in pixels, and its place, amid the sensor points, count.
+  /// Where there is a capture only its size, in pixels, and its position, the mean of the sensor points, are used.
   Camera camera;
   std::optional<Capture> capture;  ///< in place of the camera
   Detector detector;
@@ -116,7 +116,8 @@ struct TangentBasis {
   bool differentiates(int dof) const { return row_begin[dof] != row_begin[dof + 1]; }
   /// Transpose product: gradient over dofs -> gradient over columns.
   std::vector<double> transpose_apply(const std::vector<double>& dof_gradient) const;
-  /// One column: the sum of all, each times its coefficient. What only columns with the coefficient 0 change, it does not.
+  /// One column: the sum of all, each times its coefficient. Degrees of freedom that only columns of coefficient 0 change are
+  /// static in it.
   TangentBasis combined(const std::vector<double>& coefficients) const;
 };
 

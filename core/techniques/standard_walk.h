@@ -14,8 +14,8 @@ struct LengthRange {
   bool holds(double length) const { return length >= lower && length <= upper; }
 };
 
-/// Extends `path`, whose vertex 0 is what looks and vertex 1 the first surface point, by up to `max_bounces`
-/// scattering vertices, a vertex at a time. Visits every complete path whose length is in `reach`: visitor.wants() is
+/// Extends `path`, whose vertex 0 is the point that light is gathered for and vertex 1 the first surface point, by up to
+/// `max_bounces` scattering vertices, a vertex at a time. Visits every complete path whose length is in `reach`: visitor.wants() is
 /// asked first, while the path ends on the emitter; then visitor.take(value) gets contribution over density from vertex 1
 /// on (seen from vertex 0, without the gate).
 template <class Visitor>
@@ -121,8 +121,8 @@ class StandardWalk {
   Vec3 direction() const { return -w_o_; }
 
  private:
-  /// Density per area of a step's end, which the vertex before sees: BSDF sampling, of that density, and hidden geometry
-  /// sampling, of that share.
+  /// Density per area of the next vertex, which the last one sees: hidden geometry sampling with probability `hidden`, else BSDF
+  /// sampling, of density `pdf_bsdf`.
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
     if (hidden == 0) return pdf_bsdf;
     const PreparedScene& scene = worker_.scene;
@@ -150,8 +150,8 @@ class StandardWalk {
     pick_light();
     return true;
   }
-  /// Chooses the emitter of the next estimation in two steps, so that memory is read meanwhile: the tables that choose it
-  /// are prefetched during a ray, the emitter itself before the next vertex.
+  /// Chooses the emitter of the following next-event estimation in two steps, so that memory is read meanwhile: the tables that
+  /// choose it are prefetched during a ray, the emitter itself before the next vertex.
   void draw_light(Rng& rng) {
     if (light_is_given_) return;
     light_draw_ = rng.uniform();
@@ -178,7 +178,7 @@ class StandardWalk {
   Vec3 w_o_;        ///< unit, back along the last ray
   double distance_o_ = 0;
   double light_draw_ = 0;
-  int light_;  ///< the emitter of the next estimation
+  int light_;  ///< the emitter of the following next-event estimation
   const bool light_is_given_;
   int hit_triangle_ = -1;  ///< of the last ray; -1: none
   double pdf_ = 0;         ///< of the last ray's direction by BSDF sampling, per solid angle

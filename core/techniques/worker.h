@@ -20,14 +20,14 @@ struct Worker {
   const GatePick& pick;
   double ellipsoidal_share = 0;  ///< of the samples; the others are standard
   ConnectionRates rates = {};    ///< of ellipsoidal connections
-  double antithetic_factor = 1;  ///< by how much pairs count for more than their density
+  double antithetic_factor = 1;  ///< on the density of pairs in multiple importance sampling
   Techniques techniques;
   Sink& sink;
   const bool differential_sink;  ///< sink.differential()
   Path path;
   LocalDifferential differential;
   std::vector<int> candidates;              ///< triangles that may hold an arc
-  std::vector<double> inverse_probability;  ///< of each candidate to be one, for the pick by contribution
+  std::vector<double> inverse_probability;  ///< of each candidate: 1 / probability that it is listed
   long long rays = 0;
   long long arcs = 0;  ///< triangles tested for arcs, and the queries that found them
 
