@@ -55,7 +55,7 @@ TEST_F(Program, TargetValuesAreForThoseWhoRenderTheTarget) {
   const auto status = [&](std::vector<std::string> command) {
     command.insert(command.end(), common.begin(), common.end());
     const Result result = run(command);
-    if (result.status == 2) EXPECT_NE(result.errors.find("target"), std::string::npos) << result.errors;
+    EXPECT_EQ(result.errors.find("target") != std::string::npos, result.status == 2) << result.errors;
     return result.status;
   };
   EXPECT_EQ(status({"render", file}), 0);
