@@ -39,8 +39,7 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
 
 }  // namespace
 
-BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const CrossingEdges* crossing)
-    : crossing_(crossing) {
+BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Scene* at_first) : at_first_(at_first) {
   update(scene, wedge);
 }
 
@@ -103,9 +102,12 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
 }
 
 void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {
-  const auto all =
-      crossing_ ? crossing_->find(scene.scene, scene.caster) : find_mesh_intersections(scene.scene, scene.caster);
-  for (const MeshIntersection& p : all) {
+  if (!intersections_) {
+    const Scene& first = at_first_ ? *at_first_ : scene.scene;
+    intersections_.emplace(first, ray_offset(first));
+  }
+  intersections_->update(scene.scene, scene.caster.offset());
+  for (const MeshIntersection& p : intersections_->segments()) {
     BoundaryEdge b;
     b.origin = p.end[0];
     b.end = p.end[1];
