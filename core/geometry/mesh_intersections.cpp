@@ -17,11 +17,15 @@ bool has_vertex(const Scene& scene, int triangle, int vertex) {
 
 }  // namespace
 
-struct MeshIntersections::EdgeBoxes {
-  static constexpr int kMost = 3 * TriangleCluster::kWidth;
-  int count = 0;
-  std::array<int, kMost> number;
-  std::array<FloatBox, kMost> box;
+struct MeshIntersections::ClusterEdges {
+  ClusterEdges(const FloatBox& around, int of_cluster, bool piercing_alone)
+      : box(around), cluster(of_cluster), only_piercing(piercing_alone) {}
+  const FloatBox box;  ///< holds those of all
+  const int cluster;
+  const bool only_piercing;  ///< not those that went through nothing of their own shape at first
+  int count = -1;            ///< not filled yet
+  std::array<int, 3 * TriangleCluster::kWidth> number;
+  std::array<FloatBox, 3 * TriangleCluster::kWidth> box_of;
 };
 
 MeshIntersections::MeshIntersections(const Scene& at_first, double touching)
@@ -100,8 +104,9 @@ void MeshIntersections::find_hits(const Scene& scene, const std::vector<char>& m
     parallel(static_cast<int>(found.size()), [&](int chunk) {
       for (int i = begin + chunk * kChunk; i < std::min(begin + (chunk + 1) * kChunk, end); ++i)
         for (const int other : partners_of[s]) {
-          const bool some = other == s && !all_edges && !scene.shapes[s].deforms;
-          meet(scene, i, clusters_.root(other), some, found[chunk]);
+          const bool only_piercing = other == s && !all_edges && !scene.shapes[s].deforms;
+          ClusterEdges edges(clusters_.box_of_cluster(i).grown(static_cast<float>(touching_)), i, only_piercing);
+          meet(scene, edges, clusters_.root(other), found[chunk]);
         }
     });
     for (const auto& each : found) hits_.insert(hits_.end(), each.begin(), each.end());
@@ -109,40 +114,43 @@ void MeshIntersections::find_hits(const Scene& scene, const std::vector<char>& m
   join(scene);
 }
 
-void MeshIntersections::meet(const Scene& scene, int cluster, const TriangleClusters::Node& node, bool only_piercing,
-                             std::vector<EdgeHit>& hits) const {
-  const auto margin = static_cast<float>(touching_);
-  if (!clusters_.box_of_cluster(cluster).grown(margin).overlaps(clusters_.box(node))) return;
-  EdgeBoxes edges;
-  FloatBox box;
-  for (int i = first_edge_[cluster]; i < first_edge_[cluster + 1]; ++i) {
-    if (only_piercing && !through_own_shape_[edges_[i]]) continue;
-    FloatBox& own = edges.box[edges.count] = {};
-    edges.number[edges.count++] = edges_[i];
-    for (const int v : scene.edges[edges_[i]].vertex) own.add(scene.positions[v]);
-    own = own.grown(margin);
-    box.add(own);
+void MeshIntersections::fill(const Scene& scene, ClusterEdges& edges) const {
+  edges.count = 0;
+  for (int i = first_edge_[edges.cluster]; i < first_edge_[edges.cluster + 1]; ++i) {
+    const int number = edges_[i];
+    if (edges.only_piercing && !through_own_shape_[number]) continue;
+    FloatBox box;
+    for (const int v : scene.edges[number].vertex) box.add(scene.positions[v]);
+    edges.number[edges.count] = number;
+    edges.box_of[edges.count++] = box.grown(static_cast<float>(touching_));
   }
-  meet(scene, edges, 0, edges.count, box, node, hits);
 }
 
-void MeshIntersections::meet(const Scene& scene, const EdgeBoxes& edges, int begin, int end, const FloatBox& box,
-                             const TriangleClusters::Node& node, std::vector<EdgeHit>& hits) const {
+void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
+                             std::vector<EdgeHit>& hits) const {
   const FloatBox& of_node = clusters_.box(node);
-  if (!box.overlaps(of_node)) return;
-  if (node.is_cluster()) {
-    const TriangleCluster& cluster = clusters_.cluster(node.first);
-    for (int i = begin; i < end; ++i) {
-      if (!edges.box[i].overlaps(of_node)) continue;
-      const auto lanes = cluster.may_cross(edges.box[i], scene.edges[edges.number[i]].vertex);
-      for (int lane = 0; lane < TriangleCluster::kWidth; ++lane)
-        if (lanes[lane]) try_edge(scene, edges.number[i], cluster.triangle[lane], hits);
-    }
-  } else if (end - begin > 1 && box.size() > of_node.size()) {
-    for (int i = begin; i < end; ++i) meet(scene, edges, i, i + 1, edges.box[i], node, hits);
-  } else {
-    for (const auto& child : TriangleClusters::children(node)) meet(scene, edges, begin, end, box, child, hits);
+  if (!edges.box.overlaps(of_node)) return;
+  // Of large edges among small triangles each goes down by itself.
+  if (!node.is_cluster() && edges.box.size() <= of_node.size()) {
+    for (const auto& child : TriangleClusters::children(node)) meet(scene, edges, child, hits);
+    return;
   }
+  if (node.is_cluster() && !clusters_.cluster(node.first).may_meet(edges.box)) return;
+  if (edges.count < 0) fill(scene, edges);
+  for (int i = 0; i < edges.count; ++i) meet(scene, edges.number[i], edges.box_of[i], node, hits);
+}
+
+void MeshIntersections::meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,
+                             std::vector<EdgeHit>& hits) const {
+  if (!box.overlaps(clusters_.box(node))) return;
+  if (!node.is_cluster()) {
+    for (const auto& child : TriangleClusters::children(node)) meet(scene, edge, box, child, hits);
+    return;
+  }
+  const TriangleCluster& cluster = clusters_.cluster(node.first);
+  const auto lanes = cluster.may_cross(box, scene.edges[edge].vertex);
+  for (int lane = 0; lane < TriangleCluster::kWidth; ++lane)
+    if (lanes[lane]) try_edge(scene, edge, cluster.triangle[lane], hits);
 }
 
 void MeshIntersections::try_edge(const Scene& scene, int number, int triangle, std::vector<EdgeHit>& hits) const {
@@ -157,8 +165,11 @@ void MeshIntersections::try_edge(const Scene& scene, int number, int triangle, s
   const double all = length(d), distance = height / rate * all;
   if (!(std::abs(rate) > kCoplanarAngle * length(normal) * all)) return;
   if (!(distance > touching_ && distance < all - touching_)) return;
-  // Which way round the line passes the triangle's sides.
-  const double side[] = {dot(d, cross(a, b)), dot(d, cross(b, c)), dot(d, cross(c, a))};
+  // Which way round the line passes the triangle's sides; the triangle beyond a side comes to the same number.
+  const auto passes = [&](int i, int j, const Vec3& p, const Vec3& q) {
+    return i < j ? dot(d, cross(p, q)) : -dot(d, cross(q, p));
+  };
+  const double side[] = {passes(v[0], v[1], a, b), passes(v[1], v[2], b, c), passes(v[2], v[0], c, a)};
   if (!(side[0] >= 0 && side[1] >= 0 && side[2] >= 0) && !(side[0] <= 0 && side[1] <= 0 && side[2] <= 0)) return;
   const Vec3 point = d * (height / rate);
   // Of a triangle that is nearly a line rounding errors may decide the above.

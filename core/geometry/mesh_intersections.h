@@ -33,18 +33,19 @@ class MeshIntersections {
     int edge;
     Vec3 point;
   };
-  /// Some edges of one cluster and the boxes that what they cross overlaps.
-  struct EdgeBoxes;
+  /// Edges whose first face is in one cluster, with boxes that overlap those of the triangles that they go through.
+  struct ClusterEdges;
 
   /// Those of shapes that have moved; `all_edges`: also within shapes that do not deform.
   void find_hits(const Scene& scene, const std::vector<char>& moved, bool all_edges);
   /// For each shape, those that its edges are to be tried against.
   std::vector<std::vector<int>> partners(const Scene& scene, const std::vector<char>& moved, bool all_edges) const;
-  /// The cluster's edges against the triangles below the node.
-  void meet(const Scene& scene, int cluster, const TriangleClusters::Node& node, bool only_piercing,
+  void fill(const Scene& scene, ClusterEdges& edges) const;
+  /// Against the triangles below the node: all of them, then one.
+  void meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
             std::vector<EdgeHit>& hits) const;
-  void meet(const Scene& scene, const EdgeBoxes& edges, int begin, int end, const FloatBox& box,
-            const TriangleClusters::Node& node, std::vector<EdgeHit>& hits) const;
+  void meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,
+            std::vector<EdgeHit>& hits) const;
   void try_edge(const Scene& scene, int number, int triangle, std::vector<EdgeHit>& hits) const;
   void join(const Scene& scene);
 

@@ -51,10 +51,21 @@ struct TriangleCluster {
   std::array<int, kWidth> triangle;
   int used = 0;
 
-  /// Of each lane: -1 if the triangle's box overlaps the given one and the edge shares no vertex with the triangle, else 0.
-  Ints may_cross(const FloatBox& box, const std::array<int, 2>& edge) const {
+  /// Of each lane: -1 if the triangle's box overlaps the given one, else 0.
+  Ints overlapping(const FloatBox& box) const {
     Ints lanes = (low[0] <= box.high[0]) & (high[0] >= box.low[0]);
     for (int axis = 1; axis < 3; ++axis) lanes &= (low[axis] <= box.high[axis]) & (high[axis] >= box.low[axis]);
+    return lanes;
+  }
+  bool may_meet(const FloatBox& box) const {
+    const Ints lanes = overlapping(box);
+    int any = 0;
+    for (int lane = 0; lane < kWidth; ++lane) any |= lanes[lane];
+    return any != 0;
+  }
+  /// The same for triangles that share no vertex with the edge.
+  Ints may_cross(const FloatBox& box, const std::array<int, 2>& edge) const {
+    Ints lanes = overlapping(box);
     for (const Ints& v : vertex) lanes &= (v != edge[0]) & (v != edge[1]);
     return lanes;
   }
