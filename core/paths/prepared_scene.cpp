@@ -102,10 +102,10 @@ void PreparedScene::update_record(int t) {
   TriangleRecord& record = records_[t];
   const auto& v = record.vertex;
   const Vec3 &a = scene.positions[v[0]], &b = scene.positions[v[1]], &c = scene.positions[v[2]];
+  const Vec3 edge[] = {b - a, c - a}, normal = cross(edge[0], edge[1]);
   record.origin = a;
-  record.edge[0] = b - a;
-  record.edge[1] = c - a;
-  const Vec3 normal = cross(record.edge[0], record.edge[1]);
+  record.edge[0] = edge[0];
+  record.edge[1] = edge[1];
   const double doubled = length(normal);
   record.area = 0.5 * doubled;
   // A triangle that the parameters have flattened to nothing has a zero normal: no ray or ellipse meets it.
