@@ -127,10 +127,11 @@ Vec3 PreparedScene::texture_gradient(const SurfacePoint& x) const {
 
 void PreparedScene::update_hidden() {
   if (revision_ == 1) {
+    const bool any = std::any_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.hidden; });
     std::vector<int> triangles;
     std::vector<Vec3> centers;
     for (int t = 0; t < static_cast<int>(records_.size()); ++t) {
-      if (!scene.shapes[records_[t].shape].hidden) continue;
+      if (any ? !scene.shapes[records_[t].shape].hidden : !captures()) continue;
       triangles.push_back(t);
       centers.push_back(records_[t].origin + (records_[t].edge[0] + records_[t].edge[1]) / 3);
     }
@@ -159,6 +160,17 @@ void PreparedScene::update_hidden() {
   }
   hidden = HiddenGeometry(std::move(triangles), areas);
   hidden_is_all = hidden_order_.size() == records_.size();
+  const auto changes = [](const std::vector<std::uint8_t>& which) {
+    return std::ranges::count(which, 0) < std::ssize(which);
+  };
+  gradients_are_hidden = first_gradients_are_hidden = !hidden.empty() && !differentiable.every_path &&
+                                                      !changes(differentiable.light) &&
+                                                      !changes(differentiable.emission);
+  for (int t = 0; first_gradients_are_hidden && t < static_cast<int>(records_.size()); ++t) {
+    if (!records_[t].has_gradient || records_[t].hidden || records_[t].area == 0) continue;
+    gradients_are_hidden = false;
+    first_gradients_are_hidden = captures() && !seen(t);
+  }
 }
 
 void PreparedScene::update_lights() {

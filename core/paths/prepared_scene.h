@@ -23,9 +23,6 @@
 
 namespace isochron {
 
-/// The part of a capture's first vertices that hidden geometry sampling finds, where it does not find them all.
-inline constexpr double kHiddenShare = 0.5;
-
 /// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
 class PreparedScene {
  public:
@@ -58,6 +55,8 @@ class PreparedScene {
   HiddenGeometry hidden;
   /// Whether hidden geometry sampling finds whatever a sensor point sees.
   bool hidden_is_all = false;
+  /// Whether it finds every vertex, or every first vertex of a capture's paths, that gives its path a derivative.
+  bool gradients_are_hidden = false, first_gradients_are_hidden = false;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -84,13 +83,10 @@ class PreparedScene {
     if (!captures()) return camera.image_area_per_solid_angle(w);
     return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
   }
-  /// The part of a capture's first vertices that hidden geometry sampling finds.
-  double hidden_share() const { return hidden.empty() ? 0 : hidden_is_all ? 1 : kHiddenShare; }
-  /// Density per area of x1, which the sensor point sees, where Worker::start_path draws it; `received`: what the wall makes
-  /// of light from there, importance per area, which is the density of the wall's own reflection.
-  double first_vertex_pdf(const SurfacePoint& x1, double received) const {
-    const double share = hidden_share();
-    return share * (is_hidden(x1.triangle) ? hidden.pdf() : 0) + (1 - share) * received;
+  /// Density per area of a path's next vertex on `triangle`, which the one before sees: hidden geometry sampling of that share, and else
+  /// `pdf` per area.
+  double next_vertex_pdf(int triangle, double share, double pdf) const {
+    return (1 - share) * pdf + (is_hidden(triangle) ? share * hidden.pdf() : 0);
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
