@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/paths/path.h"
 
 namespace isochron {
 
@@ -160,6 +162,7 @@ void PreparedScene::update_hidden() {
   }
   hidden = HiddenGeometry(std::move(triangles), areas);
   hidden_is_all = hidden_order_.size() == records_.size();
+  if (revision_ == 1) hidden_suffices = hidden_is_all && captures() && area_suits_first_vertices();
   const auto changes = [](const std::vector<std::uint8_t>& which) {
     return std::ranges::count(which, 0) < std::ssize(which);
   };
@@ -171,6 +174,25 @@ void PreparedScene::update_hidden() {
     gradients_are_hidden = false;
     first_gradients_are_hidden = captures() && !seen(t);
   }
+}
+
+bool PreparedScene::area_suits_first_vertices() const {
+  constexpr int kPoints = 1024;
+  double sum = 0, squares = 0;
+  for (int i = 0; i < kPoints && !hidden.empty(); ++i) {
+    Rng rng(Stream{}, static_cast<std::uint64_t>(i), 0);
+    const int pixel = std::min(static_cast<int>(rng.uniform() * pixels()), pixels() - 1);
+    double u0 = rng.uniform();
+    const double u1 = rng.uniform();
+    const SurfacePoint s = sensor_point(pixel), x = sample_hidden(u0, u1);
+    const Vec3 d = x.p - s.p;
+    const double r = length(d);
+    if (!(r > 0) || (!(dot(x.n, d) < 0) && !two_sided(x.triangle) && !transparent(x.triangle))) continue;
+    const double weight = importance(pixel, d / r) * solid_angle_to_area(s.p, x) / hidden.pdf();
+    sum += weight;
+    squares += weight * weight;
+  }
+  return squares <= sum;
 }
 
 void PreparedScene::update_lights() {

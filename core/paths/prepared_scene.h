@@ -55,6 +55,8 @@ class PreparedScene {
   HiddenGeometry hidden;
   /// Whether hidden geometry sampling finds whatever a sensor point sees.
   bool hidden_is_all = false;
+  /// And whether it does so better by itself than along with the wall's reflection; decided by the scene at first.
+  bool hidden_suffices = false;
   /// Whether it finds every vertex, or every first vertex of a capture's paths, that gives its path a derivative.
   bool gradients_are_hidden = false, first_gradients_are_hidden = false;
 
@@ -83,10 +85,14 @@ class PreparedScene {
     if (!captures()) return camera.image_area_per_solid_angle(w);
     return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
   }
-  /// Density per area of a path's next vertex on `triangle`, which the one before sees: hidden geometry sampling of that share, and else
-  /// `pdf` per area.
+  /// Density per area of a path's next vertex on `triangle`, which the one before sees: hidden geometry sampling of that share,
+  /// or another way, of density `pdf`, takes it, whichever finds it the more often.
   double next_vertex_pdf(int triangle, double share, double pdf) const {
-    return (1 - share) * pdf + (is_hidden(triangle) ? share * hidden.pdf() : 0);
+    return std::max(hidden_pdf(triangle, share), (1 - share) * pdf);
+  }
+  /// Whether it is hidden geometry sampling.
+  bool hidden_takes(int triangle, double share, double pdf) const {
+    return hidden_pdf(triangle, share) >= (1 - share) * pdf;
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
@@ -149,6 +155,8 @@ class PreparedScene {
     return i < differentiable.light.size() && differentiable.light[i];
   }
   bool is_hidden(int triangle) const { return records_[triangle].hidden; }
+  /// Of hidden geometry sampling of that share, per area.
+  double hidden_pdf(int triangle, double share) const { return is_hidden(triangle) ? share * hidden.pdf() : 0; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
   void for_each_moving_corner(int triangle, F&& f) const {
@@ -278,6 +286,9 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_hidden();
+  /// Whether what the wall makes of unit radiance from points drawn by area on hidden geometry has, over their density, no larger
+  /// mean square than from points drawn by the wall's reflection, each of which counts as one.
+  bool area_suits_first_vertices() const;
   double texture_at(const SurfacePoint& x) const {
     const auto b = barycentrics(x);
     const auto& v = records_[x.triangle].vertex;

@@ -110,6 +110,7 @@ class StandardWalk {
     const bool emits = scene.emits(x->triangle);
     if (emits || hidden_ > 0) {
       const double to_area = std::abs(dot(x->n, w_o_)) / (distance_o_ * distance_o_);
+      if (hidden_ > 0 && by_area_ != scene.hidden_takes(x->triangle, hidden_, pdf_ * to_area)) return false;
       const double pdf_walk = step_pdf(pdf_ * to_area, x->triangle, hidden_);
       if (hidden_ > 0) throughput_ *= (by_area_ ? 1 : pdf_) * to_area / pdf_walk;
       if (emits) take_emission(bounce_ == 0 ? 1 : pdf_walk / (pdf_walk + scene.emitter_pdf(x->triangle)));
@@ -127,8 +128,7 @@ class StandardWalk {
   double hidden_share() const {
     return bounce_ + 1 == max_bounces_ && worker_.scene.gradients_are_hidden ? std::ceil(hidden_share_) : hidden_share_;
   }
-  /// Density per area of a step's end, which the vertex before sees: BSDF sampling, of that density, and hidden geometry
-  /// sampling, of that share.
+  /// Density per area of a step's end, which the vertex before sees, with hidden geometry sampling of that share.
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
     return hidden == 0 ? pdf_bsdf : worker_.scene.next_vertex_pdf(triangle, hidden, pdf_bsdf);
   }

@@ -27,8 +27,11 @@ double Worker::start_path(int pixel, Rng& rng, double hidden) {
 
 double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
   const SurfacePoint s = path.back();
-  const bool by_area = hidden == 1 || (hidden > 0 && rng.uniform() < hidden);
-  const double u0 = rng.uniform(), u1 = rng.uniform();
+  // One number for the choice and for what is chosen: so the points of each way remain as evenly spread.
+  double u0 = rng.uniform();
+  const double u1 = rng.uniform();
+  const bool by_area = u0 < hidden;
+  u0 = by_area ? u0 / hidden : (u0 - hidden) / (1 - hidden);
   SurfacePoint x;
   if (by_area) {
     x = scene.sample_hidden(u0, u1);
@@ -44,7 +47,8 @@ double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
   const double shortest = r + length(x.p - scene.scene.capture->spot_of(pixel).p) * scene.least_index();
   if (path.length.back() + shortest > gates.upper()) return 0;
   const double received = scene.importance(pixel, d / r) * solid_angle_to_area(s.p, x);
-  if (!(received > 0) || (by_area && !visible(s, x))) return 0;
+  if (!(received > 0) || by_area != scene.hidden_takes(x.triangle, hidden, received)) return 0;
+  if (by_area && !visible(s, x)) return 0;
   path.push(scene, x, r);
   return received / scene.next_vertex_pdf(x.triangle, hidden, received);
 }

@@ -12,8 +12,9 @@
 
 namespace isochron {
 
-/// EstimatorOptions::hidden of captures with other shapes.
-inline constexpr double kHiddenShare = 0.5;
+/// EstimatorOptions::hidden of captures with other shapes: of images, of derivatives (isochron_hidden_share: the least loss against
+/// the best share of each scene and number of bounces).
+inline constexpr double kHiddenShareOfImages = 0.5, kHiddenShareOfDerivatives = 0.75;
 
 /// The state of one partition; not shared between threads. What it refers to must outlive it.
 struct Worker {
@@ -80,7 +81,9 @@ struct Worker {
 
   /// The part of a capture's first vertices that hidden geometry sampling finds.
   double hidden_share_at_wall() const {
-    return scene.hidden.empty() ? 0 : options.hidden.value_or(scene.hidden_is_all ? 1 : kHiddenShare);
+    if (scene.hidden.empty()) return 0;
+    const double share = differential_sink ? kHiddenShareOfDerivatives : kHiddenShareOfImages;
+    return options.hidden.value_or(scene.hidden_suffices ? 1 : share);
   }
   /// Of a capture's paths that contribute themselves, not by what covers them: if their one bounce must be on what changes, all.
   double hidden_share_of_paths() const {
@@ -91,7 +94,7 @@ struct Worker {
   /// where there is something else to miss it for.
   double hidden_share_of_walks() const {
     const bool of_use = differential_sink && !scene.hidden.empty() && !scene.hidden_is_all;
-    return of_use ? options.hidden.value_or(scene.captures() ? kHiddenShare : 0) : 0;
+    return of_use ? options.hidden.value_or(scene.captures() ? kHiddenShareOfDerivatives : 0) : 0;
   }
 
   /// Whether the complete path p (last vertex on an emitter) contributes: to images always, to derivatives where it can

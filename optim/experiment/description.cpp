@@ -113,7 +113,8 @@ void describe_estimator(Keys& keys, Experiment& e) {
       "hidden", hidden_share(options.hidden),
       "standard sampling: the share of a path's steps that are drawn on `hidden_shapes`, until it gets there; of "
       "derivatives, and of the first step from a capture's wall in images, too",
-      {.unset = !options.hidden, .otherwise = "cameras `0`, captures `0.5`, but all where there are no others"});
+      {.unset = !options.hidden,
+       .otherwise = "cameras `0`; captures `0.5`, derivatives `0.75`, all where no other could serve"});
   keys.value(
       "hidden_shapes", field::names(e.hidden_shapes),
       "the shapes that hidden geometry sampling draws points on, by area",

@@ -1,8 +1,8 @@
 // Which share of a path's steps hidden geometry sampling should take in a capture with other shapes: isochron_hidden_share CSV
 // [SEEDS]. Variance x CPU seconds over the mean square, summed over points and gates, of images and of the derivative (its
 // interior term) by the motion of a board towards the wall; SEEDS independent images each, by all shares in turns.
-#include <array>
 #include <cstdio>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -18,8 +18,6 @@ namespace isochron::benchmarks {
 namespace {
 
 using namespace testing;
-
-constexpr std::array kShares{0.0, 0.25, 0.5, 0.75, 0.9};
 
 /// Eight by eight points of a confocal scan of the wall z = 0, lengths in metres.
 Scene confocal_scan() {
@@ -66,11 +64,14 @@ std::vector<Case> cases() {
   return result;
 }
 
-TangentBasis towards_wall(const Scene& scene) {
-  std::vector<std::vector<TangentBasis::Entry>> rows(DofLayout(scene).size());
+/// The board's motion, and the gain, if it is unknown.
+TangentBasis towards_wall(const Scene& scene, bool gain) {
+  const DofLayout layout(scene);
+  std::vector<std::vector<TangentBasis::Entry>> rows(layout.size());
+  if (gain) rows[layout.gain()].push_back({1, 1.0});
   for (int v = 0; v < scene.shapes[0].vertex_count; ++v) rows[3 * v + 2].push_back({0, -1.0});
   TangentBasis basis;
-  basis.columns = 1;
+  basis.columns = gain ? 2 : 1;
   basis.row_begin.push_back(0);
   for (const auto& row : rows) {
     basis.entries.insert(basis.entries.end(), row.begin(), row.end());
@@ -79,27 +80,33 @@ TangentBasis towards_wall(const Scene& scene) {
   return basis;
 }
 
-void measure(const Case& c, int bounces, bool derivative, int seeds, std::FILE* csv) {
-  const TangentBasis basis = towards_wall(c.scene);
+enum class Of { image, derivative, derivative_beside_gain, any_shape };
+
+void measure(const Case& c, int bounces, Of of, const std::vector<double>& shares, int seeds, std::FILE* csv) {
+  const TangentBasis basis = towards_wall(c.scene, of == Of::derivative_beside_gain);
   std::vector<double> centers;
   for (int i = 0; i < 48; ++i) centers.push_back(0.6 + 0.04 * i);
   const GateSet gates(GateShape::gaussian(0.02), centers);
   constexpr SampleRange kSamples{0, 256};
-  std::array<PixelBatches, kShares.size()> images;
-  std::array<double, kShares.size()> seconds{};
+  constexpr const char* kNames[] = {"image", "derivative", "derivative beside gain", "image, no shape named"};
+  std::vector<PixelBatches> images(shares.size());
+  std::vector<double> seconds(shares.size());
   for (int seed = 0; seed < seeds; ++seed)
-    for (std::size_t i = 0; i < kShares.size(); ++i) {
-      const Renderer renderer(c.scene, gates, {.max_bounces = bounces, .hidden = kShares[i]}, &basis);
+    for (std::size_t i = 0; i < shares.size(); ++i) {
+      const EstimatorOptions options{.max_bounces = bounces,
+                                     .hidden = shares[i] < 1 ? std::optional(shares[i]) : std::nullopt};
+      const Renderer renderer(c.scene, gates, options, &basis);
       const Stream stream{static_cast<std::uint64_t>(81 + seed), 0, 1};
       const double start = cpu_seconds();
-      const GatedImage image =
-          derivative ? renderer.derive(Term::interior, stream, kSamples)[0] : renderer.render(stream, kSamples);
+      const GatedImage image = of == Of::image || of == Of::any_shape
+                                   ? renderer.render(stream, kSamples)
+                                   : renderer.derive(Term::interior, stream, kSamples)[0];
       seconds[i] += (cpu_seconds() - start) / seeds;
       images[i].add(image);
     }
   for (std::FILE* out : {csv, stdout}) {
-    std::fprintf(out, "%s,%d,%s", c.name, bounces, derivative ? "derivative" : "image");
-    for (std::size_t i = 0; i < kShares.size(); ++i) {
+    std::fprintf(out, "%s,%d,%s", c.name, bounces, kNames[static_cast<int>(of)]);
+    for (std::size_t i = 0; i < shares.size(); ++i) {
       double square = 0, variance = 0;
       for (std::size_t k = 0; k < images[i].mean().data.size(); ++k) {
         variance += images[i].variance(k);
@@ -119,13 +126,18 @@ int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
   const Arguments arguments = read_arguments(argc, argv, 1, "isochron_hidden_share CSV [SEEDS]", 32, 2);
   isochron::set_thread_count(1);
+  const std::vector<double> shares{0, 0.25, 0.5, 0.75, 0.9}, with_all{0, 0.25, 0.5, 0.75, 0.9, 1};
   for (std::FILE* out : {arguments.csv.get(), stdout}) {
     std::fprintf(out, "scene,bounces,of");
-    for (const double share : kShares) std::fprintf(out, ",%g", share);
+    for (const double share : with_all) std::fprintf(out, ",%g", share);
     std::fprintf(out, "\n");
   }
-  for (const Case& c : cases())
+  for (Case& c : cases()) {
     for (const int bounces : {1, 3})
-      for (const bool derivative : {false, true})
-        measure(c, bounces, derivative, arguments.number, arguments.csv.get());
+      for (const Of of : {Of::image, Of::derivative, Of::derivative_beside_gain})
+        measure(c, bounces, of, shares, arguments.number, arguments.csv.get());
+    c.scene.shapes[0].hidden = false;  // which makes all of a capture's
+    for (const int bounces : {1, 3})
+      measure(c, bounces, Of::any_shape, with_all, arguments.number, arguments.csv.get());
+  }
 }
