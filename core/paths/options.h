@@ -52,9 +52,10 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// In [0, 1): while a camera's path by standard sampling has not met what parameters change, the probability that its next
-  /// vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF. Derivatives alone.
-  double hidden = 0;
+  /// In [0, 1): while a path by standard sampling has not met hidden shapes (Shape::hidden), the probability that its next
+  /// vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the reflection of a capture's wall; none:
+  /// the default, see Worker. Of camera's paths and of what follows x1 in captures, derivatives alone.
+  std::optional<double> hidden = {};
   /// How far path vertices follow what is close to them and moves otherwise, see VertexFlows; 0: not at all. Any values
   /// give the same derivative, with other variances, divided otherwise between the interior and the visibility term.
   double follow = 1;         ///< all but what the camera sees: in radii of the smaller body
