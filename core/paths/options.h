@@ -9,8 +9,8 @@ namespace isochron {
 
 enum class Sampling { automatic, standard, ellipsoidal };
 
-/// How ellipsoidal connections pick one of the arcs on an ellipsoid: in proportion to what each would carry if nothing
-/// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
+/// How ellipsoidal connections choose among the arcs on an ellipsoid: several in proportion to what each would carry if
+/// nothing stood in the way, or (cheaper, far noisier; the paper's way) one uniformly.
 enum class ArcPick { contribution, uniform };
 
 /// The first numbers of each sample: together the samples of a technique cover evenly what they are taken from, in each
@@ -82,10 +82,12 @@ struct SampleRange {
   int count() const { return end - begin; }
 };
 
-/// Work of so many rays, and triangles tested for arcs, in rays: an arc takes 1.3 times as long, measured on the cube
-/// and the box.
+/// How many times as long as a ray a triangle takes that is tested for an arc, measured on the cube and the box.
+inline constexpr double kRaysPerArc = 1.3;
+
+/// Work of so many rays, and triangles tested for arcs, in rays.
 inline double work(long long rays, long long arcs) {
-  return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs);
+  return static_cast<double>(rays) + kRaysPerArc * static_cast<double>(arcs);
 }
 
 }  // namespace isochron
