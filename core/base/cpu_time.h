@@ -12,7 +12,7 @@ inline double cpu_seconds_of(clockid_t clock) {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// Of this process so far, all threads; of all ranks (ranks.h), which meet here: what they decide by it is the same.
+/// Of all threads of all ranks (ranks.h) so far. Collective: every rank gets the same sum, so that all decide alike by it.
 inline double cpu_seconds() {
   return sum_over_ranks(cpu_seconds_of(CLOCK_PROCESS_CPUTIME_ID));
 }

@@ -167,7 +167,7 @@ void Passes::learn() const {
   if (ready->edges)
     ready->edges->update(scene, options.boundary.wedge);
   else
-    ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->crossing() : nullptr);
+    ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->at_first() : nullptr);
   Guide::Each<bool> possible;
   const bool captures = scene.captures(), secondary_edges = edges().has_secondary();
   possible[Guide::primary] = edges().has_primary() && !captures;

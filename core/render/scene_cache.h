@@ -29,8 +29,7 @@ class SceneCache {
 
   /// The scene made ready, for the caller alone until the pointer is gone. The same bits whatever was taken before.
   std::shared_ptr<ReadyScene> take(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow);
-  /// The edges to search for intersections of meshes.
-  const CrossingEdges& crossing();
+  const Scene& at_first() const { return at_first_; }
 
   /// Rays traced in its scenes so far.
   void count_rays(long long rays) { rays_ += rays; }
@@ -46,7 +45,6 @@ class SceneCache {
   std::mutex mutex_;
   std::vector<std::unique_ptr<ReadyScene>> idle_;
   int made_ = 0;
-  std::optional<CrossingEdges> crossing_;
   std::atomic<long long> rays_{0};
   PassTimes times_;
   std::map<std::pair<PassKind, int>, PartitionCosts> partition_costs_;

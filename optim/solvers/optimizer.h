@@ -63,7 +63,7 @@ std::unique_ptr<Optimizer> make_levenberg_marquardt();
 std::unique_ptr<Optimizer> make_quasi_newton(int inner_iterations);
 
 /// `inner` works on u = theta / scale, one scale > 0 per unknown, so that its steps mean the same for unknowns of
-/// different units; everybody else deals with theta. With equal scales within each of a preconditioner's blocks, that
+/// different units; its callers see theta. With equal scales within each of a preconditioner's blocks, that
 /// acts on u as it would on theta. Scales of 1 change no bit.
 std::unique_ptr<Optimizer> make_scaled(std::unique_ptr<Optimizer> inner, const std::vector<double>& scales);
 
