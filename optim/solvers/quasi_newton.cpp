@@ -24,6 +24,8 @@ bool finite(const Evaluation& at) {
          std::all_of(at.gradient.begin(), at.gradient.end(), [](double g) { return std::isfinite(g); });
 }
 
+/// One iteration makes up to `inner_iterations` steps, all on its random numbers. Diagonal, which random signs estimate, and pairs
+/// are carried from one iteration to the next: each pair is a difference on common random numbers, whichever they were.
 class QuasiNewton : public Optimizer {
  public:
   explicit QuasiNewton(int inner_iterations) : inner_iterations_(inner_iterations) {}
@@ -201,8 +203,8 @@ class QuasiNewton : public Optimizer {
 
 }  // namespace
 
-std::unique_ptr<Optimizer> make_quasi_newton(int inner_iterations) {
-  return std::make_unique<QuasiNewton>(inner_iterations);
+std::unique_ptr<Optimizer> make_quasi_newton(const OptimizerSpec& spec) {
+  return std::make_unique<QuasiNewton>(spec.inner_iterations);
 }
 
 }  // namespace isochron

@@ -119,7 +119,8 @@ class Bumps : public Objective {
 };
 
 Checkpoint run(const Bumps& bumps, int iterations, Checkpoint state = {}) {
-  const auto optimizer = make_quasi_newton(10);
+  const auto optimizer =
+      make_optimizer({.method = OptimizerMethod::quasi_newton, .inner_iterations = 10}, Preconditioner());
   if (state.theta.empty()) state.theta = bumps.start();
   LoopOptions options;
   options.iterations = iterations;
@@ -177,7 +178,7 @@ TEST(QuasiNewton, WhatNothingDependsOnStays) {
       return {0, ExponentialFit::probe_curvature(theta, iteration, now, probe)[1]};
     }
   } fit;
-  const auto optimizer = make_quasi_newton(5);
+  const auto optimizer = make_optimizer({.method = OptimizerMethod::quasi_newton}, Preconditioner());
   const std::vector<double> theta = {2, 0.3};
   const std::vector<double> next = optimizer->step(fit, fit.evaluate(theta, 0), theta, 0, 1);
   EXPECT_EQ(next[0], 2);
