@@ -117,8 +117,10 @@ class Measured:
 
 
 def read(file):
+    """Of the experiments that the file has."""
     rows = read_rows(file)
-    return {name: Measured([r for r in rows if r["experiment"] == name]) for name in PARTITIONS}
+    names = dict.fromkeys(r["experiment"] for r in rows)
+    return {name: Measured([r for r in rows if r["experiment"] == name]) for name in names}
 
 
 class Model:
@@ -146,12 +148,12 @@ class Model:
 
 
 def models(measured):
-    return {name: Model(measured[name], PARTITIONS[name]) for name in PARTITIONS}
+    return {name: Model(each, PARTITIONS[name]) for name, each in measured.items()}
 
 
 def plot(file, picture):
     measured = read(file)
-    figure, all_axes = plt.subplots(1, len(PARTITIONS), figsize=(13, 3.9), layout="constrained", sharey=True)
+    figure, all_axes = plt.subplots(1, len(measured), figsize=(1 + 4.5 * len(measured), 3.9), layout="constrained", sharey=True)
     for axes, (name, model) in zip(all_axes, models(measured).items()):
         for multiple, colour in ((1, "C0"), (16, "C1")):
             alone = model.seconds(1, multiple)
