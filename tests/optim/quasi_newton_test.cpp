@@ -165,6 +165,23 @@ TEST(QuasiNewton, NoisyImagesLeadToTheSamePoint) {
   EXPECT_LT(many, 0.4);
 }
 
+/// Where values contradict the slope by less than their noise, no shorter steps are tried.
+TEST(QuasiNewton, EndsSearchesThatNoiseHides) {
+  const std::vector<double> theta = {2, 0.3};
+  const auto evaluations = [&](double noise) {
+    ExponentialFit fit;
+    fit.loss_noise = noise;
+    fit.inject = [&](const std::vector<double>& at, double loss) { return at == theta ? loss : loss + 0.1; };
+    const Evaluation now = fit.evaluate(theta, 0);
+    fit.gradients = 0;
+    const auto optimizer = make_quasi_newton(5);
+    EXPECT_EQ(optimizer->step(fit, now, theta, 0, 1), theta);
+    EXPECT_TRUE(optimizer->rejected());
+    return fit.gradients;
+  };
+  EXPECT_EQ(evaluations(0) - evaluations(1), 5);
+}
+
 TEST(QuasiNewton, WhatNothingDependsOnStays) {
   class Idle : public ExponentialFit {
    public:
