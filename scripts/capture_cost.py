@@ -32,7 +32,7 @@ capture:
   normal: [0, 0, 1]
   laser: confocal
 materials:
-  paper: {{type: diffuse, albedo: 0.5}}
+  paper: {{type: diffuse, albedo: 0.5, two_sided: true}}
 shapes:
   - {{name: board, file: {plane}, material: paper, transform: {{translate: [0, 0, 0.5]}}}}
 """

@@ -247,7 +247,8 @@ def parse(arguments):
     add("--rebin", metavar="N", type=at_least_one, default=1, help="add N bins up into one")
     add("--stride", metavar="N", type=at_least_one, default=1, help="every N-th point along either axis")
     add("--bins", metavar=("FIRST", "LAST"), type=int, nargs=2,
-        help="these bins alone, LAST excluded: bins of the file, where there is a tofgrid counted from time zero")
+        help="these bins alone, LAST excluded: bins of the file, where there is a tofgrid counted from time zero. Without the "
+        "wall's own light among them, what is said at the end is where the fit of a plane may begin")
     add("--bin-ps", metavar="PS", type=positive, help="length of a bin")
     add("--t-start-ps", metavar="PS", type=number, default=0.0,
         help="when the first bin begins, 0 being when light is at the wall (default: 0)")

@@ -1,6 +1,7 @@
 // A random choice in proportion to given weights.
 #pragma once
 #include <algorithm>
+#include <concepts>
 #include <vector>
 
 namespace isochron {
@@ -14,7 +15,7 @@ class DiscreteDistribution {
   explicit DiscreteDistribution(const std::vector<double>& weights)
       : DiscreteDistribution(weights.size(), [&](std::size_t i) { return weights[i]; }) {}
   /// Of `count` weights, each of which weight_of(i) gives.
-  template <class F>
+  template <std::invocable<std::size_t> F>
   DiscreteDistribution(std::size_t count, F&& weight_of) : below_(count + 1), first_(count + 1) {
     double sum = 0;
     for (std::size_t i = 0; i < count; ++i) below_[i + 1] = sum += weight_of(i);

@@ -1,6 +1,7 @@
 #include "core/geometry/mesh_intersections.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <tuple>
 
@@ -24,8 +25,8 @@ struct MeshIntersections::ClusterEdges {
   const int cluster;
   const bool only_piercing;  ///< not those that went through nothing of their own shape at first
   int count = -1;            ///< not filled yet
-  std::array<int, 3 * TriangleCluster::kWidth> number;
-  std::array<FloatBox, 3 * TriangleCluster::kWidth> box_of;
+  std::array<int, 3 * EightBoxes::kWidth> number;
+  std::array<EightBoxes, 3> boxes;
 };
 
 MeshIntersections::MeshIntersections(const Scene& at_first, double touching)
@@ -122,7 +123,9 @@ void MeshIntersections::fill(const Scene& scene, ClusterEdges& edges) const {
     FloatBox box;
     for (const int v : scene.edges[number].vertex) box.add(scene.positions[v]);
     edges.number[edges.count] = number;
-    edges.box_of[edges.count++] = box.grown(static_cast<float>(touching_));
+    edges.boxes[edges.count / EightBoxes::kWidth].set(edges.count % EightBoxes::kWidth,
+                                                      box.grown(static_cast<float>(touching_)));
+    ++edges.count;
   }
 }
 
@@ -137,20 +140,26 @@ void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const Tria
   }
   if (node.is_cluster() && !clusters_.cluster(node.first).may_meet(edges.box)) return;
   if (edges.count < 0) fill(scene, edges);
-  for (int i = 0; i < edges.count; ++i) meet(scene, edges.number[i], edges.box_of[i], node, hits);
+  for (int first = 0; first < edges.count; first += EightBoxes::kWidth) {
+    const EightBoxes& boxes = edges.boxes[first / EightBoxes::kWidth];
+    const unsigned used = (1u << std::min(edges.count - first, EightBoxes::kWidth)) - 1;
+    for (unsigned bits = EightBoxes::bits(boxes.overlapping(of_node)) & used; bits != 0; bits &= bits - 1) {
+      const int lane = std::countr_zero(bits);
+      meet(scene, edges.number[first + lane], boxes.get(lane), node, hits);
+    }
+  }
 }
 
 void MeshIntersections::meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,
                              std::vector<EdgeHit>& hits) const {
-  if (!box.overlaps(clusters_.box(node))) return;
   if (!node.is_cluster()) {
-    for (const auto& child : TriangleClusters::children(node)) meet(scene, edge, box, child, hits);
+    for (const auto& child : TriangleClusters::children(node))
+      if (box.overlaps(clusters_.box(child))) meet(scene, edge, box, child, hits);
     return;
   }
   const TriangleCluster& cluster = clusters_.cluster(node.first);
-  const auto lanes = cluster.may_cross(box, scene.edges[edge].vertex);
-  for (int lane = 0; lane < TriangleCluster::kWidth; ++lane)
-    if (lanes[lane]) try_edge(scene, edge, cluster.triangle[lane], hits);
+  for (unsigned bits = cluster.may_cross(box, scene.edges[edge].vertex); bits != 0; bits &= bits - 1)
+    try_edge(scene, edge, cluster.triangle[std::countr_zero(bits)], hits);
 }
 
 void MeshIntersections::try_edge(const Scene& scene, int number, int triangle, std::vector<EdgeHit>& hits) const {

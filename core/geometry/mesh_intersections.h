@@ -41,7 +41,7 @@ class MeshIntersections {
   /// For each shape, those that its edges are to be tried against.
   std::vector<std::vector<int>> partners(const Scene& scene, const std::vector<char>& moved, bool all_edges) const;
   void fill(const Scene& scene, ClusterEdges& edges) const;
-  /// Against the triangles below the node: all of them, then one.
+  /// Against the triangles below the node: all of them; one whose box overlaps the node's.
   void meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
             std::vector<EdgeHit>& hits) const;
   void meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,

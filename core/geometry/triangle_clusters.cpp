@@ -61,10 +61,7 @@ void TriangleClusters::fit_cluster(const Scene& scene, int i) {
   for (int lane = 0; lane < TriangleCluster::kWidth; ++lane) {
     FloatBox box;
     for (int k = 0; lane < cluster.used && k < 3; ++k) box.add(scene.positions[cluster.vertex[k][lane]]);
-    for (int axis = 0; axis < 3; ++axis) {
-      cluster.low[axis][lane] = box.low[axis];
-      cluster.high[axis][lane] = box.high[axis];
-    }
+    cluster.set(lane, box);
     all.add(box);
   }
 }

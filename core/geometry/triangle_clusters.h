@@ -10,64 +10,81 @@
 
 namespace isochron {
 
-/// In single precision, so that eight of them are tested at once.
+/// In single precision; the fourth lanes are unused.
 struct FloatBox {
+  using Floats [[gnu::vector_size(16)]] = float;
+  using Ints [[gnu::vector_size(16)]] = int;
+  using Longs [[gnu::vector_size(16)]] = long long;
   static constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  float low[3] = {kInfinity, kInfinity, kInfinity}, high[3] = {-kInfinity, -kInfinity, -kInfinity};
+  Floats low = {kInfinity, kInfinity, kInfinity, 0}, high = {-kInfinity, -kInfinity, -kInfinity, 0};
 
   void add(const FloatBox& b) {
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], b.low[axis]);
-      high[axis] = std::max(high[axis], b.high[axis]);
-    }
+    low = low < b.low ? low : b.low;
+    high = high > b.high ? high : b.high;
   }
   void add(const Vec3& p) {
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], static_cast<float>(p[axis]));
-      high[axis] = std::max(high[axis], static_cast<float>(p[axis]));
-    }
+    const Floats point = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z), 0};
+    add(FloatBox{point, point});
   }
-  FloatBox grown(float margin) const {
-    FloatBox b = *this;
-    for (int axis = 0; axis < 3; ++axis) b.low[axis] -= margin, b.high[axis] += margin;
-    return b;
-  }
+  FloatBox grown(float margin) const { return {low - margin, high + margin}; }
   bool overlaps(const FloatBox& b) const {
-    bool all = true;
-    for (int axis = 0; axis < 3; ++axis) all &= (low[axis] <= b.high[axis]) & (b.low[axis] <= high[axis]);
-    return all;
+    const Ints lanes = (low <= b.high) & (b.low <= high);
+    const auto pairs = reinterpret_cast<Longs>(lanes);
+    return (pairs[0] & pairs[1]) == -1;
   }
-  float size() const { return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}); }
+  float size() const {
+    const Floats d = high - low;
+    return std::max({d[0], d[1], d[2]});
+  }
 };
 
-/// Triangles of one shape that lay close together at first, side by side, with their boxes; unused lanes have empty ones.
-struct TriangleCluster {
+/// Eight boxes side by side. The bits of results are theirs.
+struct EightBoxes {
   static constexpr int kWidth = 8;
   using Floats [[gnu::vector_size(4 * kWidth)]] = float;
   using Ints [[gnu::vector_size(4 * kWidth)]] = int;
-
+  using Longs [[gnu::vector_size(4 * kWidth)]] = long long;
   Floats low[3], high[3];
-  Ints vertex[3];
-  std::array<int, kWidth> triangle;
-  int used = 0;
 
-  /// Of each lane: -1 if the triangle's box overlaps the given one, else 0.
+  void set(int lane, const FloatBox& box) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis][lane] = box.low[axis];
+      high[axis][lane] = box.high[axis];
+    }
+  }
+  FloatBox get(int lane) const {
+    FloatBox box;
+    for (int axis = 0; axis < 3; ++axis) {
+      box.low[axis] = low[axis][lane];
+      box.high[axis] = high[axis][lane];
+    }
+    return box;
+  }
+  /// -1 in the lanes of boxes that overlap the given one, else 0.
   Ints overlapping(const FloatBox& box) const {
     Ints lanes = (low[0] <= box.high[0]) & (high[0] >= box.low[0]);
     for (int axis = 1; axis < 3; ++axis) lanes &= (low[axis] <= box.high[axis]) & (high[axis] >= box.low[axis]);
     return lanes;
   }
-  bool may_meet(const FloatBox& box) const {
-    const Ints lanes = overlapping(box);
-    int any = 0;
-    for (int lane = 0; lane < kWidth; ++lane) any |= lanes[lane];
-    return any != 0;
+  static unsigned bits(const Ints& lanes) {
+    const auto pairs = reinterpret_cast<Longs>(lanes & Ints{1, 2, 4, 8, 16, 32, 64, 128});
+    const long long all = (pairs[0] | pairs[1]) | (pairs[2] | pairs[3]);
+    return static_cast<unsigned>(all | all >> 32) & 0xffu;
   }
-  /// The same for triangles that share no vertex with the edge.
-  Ints may_cross(const FloatBox& box, const std::array<int, 2>& edge) const {
+};
+
+/// Triangles of one shape that lay close together at first, with their boxes; unused lanes have empty ones.
+struct TriangleCluster : EightBoxes {
+  Ints vertex[3];
+  std::array<int, kWidth> triangle;
+  int used = 0;
+
+  bool may_meet(const FloatBox& box) const { return bits(overlapping(box)) != 0; }
+  /// Those whose boxes overlap the given one and that share no vertex with the edge.
+  unsigned may_cross(const FloatBox& box, const std::array<int, 2>& edge) const {
     Ints lanes = overlapping(box);
     for (const Ints& v : vertex) lanes &= (v != edge[0]) & (v != edge[1]);
-    return lanes;
+    return bits(lanes);
   }
 };
 

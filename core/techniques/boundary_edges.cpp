@@ -57,16 +57,19 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
   constexpr std::size_t kChunk = 4096, kAhead = 8;
   std::vector<char> changed((count + kChunk - 1) / kChunk, 0);
   parallel(static_cast<int>(changed.size()), [&](int chunk) {
-    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
-    const std::size_t end = std::min(begin + kChunk, count);
+    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk, end = std::min(begin + kChunk, count);
+    std::vector<std::size_t> edges;
     for (std::size_t i = begin; i < end; ++i) {
       const auto& face = scene.scene.edges[i].face;
-      if (i + kAhead < end)
-        for (const int t : scene.scene.edges[i + kAhead].face) scene.prefetch(std::max(t, 0));
-      if (!all && scene.changed(face[0]) <= revision_ && (face[1] < 0 || scene.changed(face[1]) <= revision_)) continue;
-      update_edge(scene, i, wedge);
-      changed[chunk] = 1;
+      if (all || scene.changed(face[0]) > revision_ || (face[1] >= 0 && scene.changed(face[1]) > revision_))
+        edges.push_back(i);
     }
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+      if (k + kAhead < edges.size())
+        for (const int t : scene.scene.edges[edges[k + kAhead]].face) scene.prefetch(std::max(t, 0));
+      update_edge(scene, edges[k], wedge);
+    }
+    changed[chunk] = !edges.empty();
   });
   if (std::find(changed.begin(), changed.end(), 1) != changed.end()) {
     keep_edges_of_scene();  // without the intersections of before

@@ -75,16 +75,20 @@ INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling:
 });
 
 TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
-  const auto [scene, all, basis, gates] = Setting();
+  const Setting rigid;
   const EstimatorOptions options{.max_bounces = 3, .sampling = Sampling::standard};
-  SceneCache cache(scene, CasterUpdate::refit);
-  for (const auto& theta : kPoints) {
-    const Scene moved = at(scene, all, theta);
-    SceneCache fresh(scene, CasterUpdate::refit);
-    const auto kept = everything(Renderer(moved, gates, options, &basis, &cache), moved, gates);
-    EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis, &fresh), moved, gates));
-    // Rays meet the same triangles as those of a hierarchy made anew.
-    EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis), moved, gates));
+  for (const bool deforms : {false, true}) {
+    auto [scene, all, basis, gates] = rigid;
+    scene.shapes[scene.find_shape("block")].deforms = deforms;
+    SceneCache cache(scene, CasterUpdate::refit);
+    for (const auto& theta : kPoints) {
+      const Scene moved = at(scene, all, theta);
+      SceneCache fresh(scene, CasterUpdate::refit);
+      const auto kept = everything(Renderer(moved, gates, options, &basis, &cache), moved, gates);
+      EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis, &fresh), moved, gates));
+      // Rays meet the same triangles as those of a hierarchy made anew.
+      EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis), moved, gates));
+    }
   }
 }
 
