@@ -8,7 +8,7 @@ namespace isochron {
 /// The folder that Python finds the package isochron in.
 std::string package_folder();
 
-/// The module with the ranks of MPI; where it was not built, no such file is there.
+/// Path of the module that joins ranks by MPI; there is no such file where it was not built.
 std::string mpi_module();
 
 }  // namespace isochron

@@ -6,7 +6,7 @@ namespace isochron {
 /// renderers within a sample. The second ends the program at once.
 void catch_interrupts();
 bool interrupted();
-/// Throws Interrupted once the flag is up. A Poll.
+/// Throws Interrupted once a stop was requested. Can be passed wherever a Poll is asked for.
 void poll_interrupt();
 
 }  // namespace isochron

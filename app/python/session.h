@@ -1,4 +1,4 @@
-// An experiment made ready, and what Python asks of it. All functions must hold the interpreter's lock, and give it away while
+// An experiment made ready, and what Python asks of it. All functions must hold the interpreter's lock, and release it while
 // they work.
 #pragma once
 #include <pybind11/pybind11.h>

@@ -18,8 +18,8 @@ class Work {
   virtual void call(const std::function<void()>& f) = 0;
 };
 
-/// Runs the task in a thread of its own while the calling one, which must hold the interpreter's lock and gives it away, looks
-/// after signals: where one of their handlers raises an exception, such as KeyboardInterrupt, the task is stopped and the
+/// Runs the task in a thread of its own while the calling one, which must hold the interpreter's lock and releases it,
+/// handles signals: where one of their handlers raises an exception, such as KeyboardInterrupt, the task is stopped and the
 /// exception raised. Tasks of several threads wait for each other: each uses all cores, and requests to stop, like progress,
 /// are the process's. What a task's call() calls may run tasks in its turn.
 void run_work(const std::function<void(Work&)>& task);

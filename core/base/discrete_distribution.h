@@ -34,7 +34,7 @@ class DiscreteDistribution {
   double below(int i) const { return below_[i] / total(); }
   double probability(int i) const { return (below_[i + 1] - below_[i]) / total(); }
 
-  /// Asks early for what sample(u) will read, if all weights are about alike; returns what it then gives.
+  /// Prefetches what sample(u) reads where all weights are about equal; returns the index that it then draws.
   int prefetch(double u) const {
     const int i = guess(u);
     __builtin_prefetch(&below_[i]);
@@ -44,7 +44,7 @@ class DiscreteDistribution {
   /// uniform number.
   int sample(double& u) const {
     const double target = u * total();
-    // Were all weights alike it would be this one: then a draw waits for memory once. Else a table tells about where it is.
+    // Right where all weights are equal, so that a draw waits for memory once; else the search starts from a table.
     int i = guess(u);
     if (!(below_[i] <= target && target < below_[i + 1])) i = search(target, first_[i]);
     u = std::clamp((target - below_[i]) / (below_[i + 1] - below_[i]), 0x1p-53, 1 - 0x1p-53);

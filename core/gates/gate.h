@@ -63,8 +63,8 @@ class GateShape {
   /// Standard deviation of the gate as a density (the width that `auto` sampling goes by); unbounded gates:
   /// infinity.
   double width() const { return width_; }
-  /// A length over which the gate changes little: its width, but of a bin that without its response, and of a modulated gate
-  /// what turns it by a radian. Steady: infinity.
+  /// A length over which the gate changes little: its width; of a bin, the width without the response; of a modulated gate,
+  /// the length that shifts its phase by one radian. Steady: infinity.
   double detail() const { return detail_; }
   /// Integral over the real line: 1, less what truncation took away. Unbounded gates: 1 by convention.
   double mass() const { return mass_; }
@@ -94,8 +94,8 @@ class GateShape {
         return {peak_, 0};
     }
   }
-  /// Offset with density value / mass; u, v in (0, 1). A bin takes its response's delay from u and the place in itself
-  /// from v; other kinds take all from u. Not for unbounded gates, which are no densities.
+  /// Offset with density value / mass; u, v in (0, 1). A bin takes its response's delay from u and the position within
+  /// the bin from v; other kinds take all from u. Not for unbounded gates, which are no densities.
   double sample(double u, double v) const;
   /// Mass of dW+ and of dW- that a pair of the given part stands for; zero for unbounded gates. Where a side is absent from
   /// some pairs, its part of dW has less. All kinds but bins with a response split dW into its positive and its negative part;

@@ -28,7 +28,7 @@ struct GateUnits {
   double scene_unit_m = 0;  ///< metres in a scene unit; 0 where the file does not say
 };
 
-/// A number for each gate, by which people know it: its centre, a phase. None where gates do not differ.
+/// The number that tables and pictures label each gate with: its centre, a phase. None where gates do not differ.
 struct GateMarks {
   std::vector<double> numbers;
   std::string unit;  ///< empty: the unit of the gates' lengths

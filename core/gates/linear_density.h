@@ -14,7 +14,7 @@ class LinearDensity {
     double slope = 0;  ///< of the interval after the knot; zero at a jump
     double below = 0;  ///< integral up to the knot
   };
-  /// Value and integral up to a place.
+  /// Value at x and integral up to x.
   struct Cumulated {
     double value = 0, below = 0;
   };
@@ -29,8 +29,8 @@ class LinearDensity {
   double deviation() const { return deviation_; }  ///< the standard deviation
   const std::vector<Knot>& knots() const { return knots_; }
 
-  /// The knot before x in [lower, upper], of an interval that is not of zero length. Evenly spaced knots count as one interval
-  /// with their neighbour where only rounding tells them apart.
+  /// The knot that begins the interval, of positive length, that holds x in [lower, upper]. Where knots are evenly spaced, x
+  /// within rounding of a knot may get the interval on either side.
   const Knot& before(double x) const {
     const int bucket = std::min(static_cast<int>((x - lower_) * bucket_scale_), last_bucket_);
     if (even_) return knots_[bucket];
@@ -47,9 +47,10 @@ class LinearDensity {
     const double along = x - knot.offset, value = knot.value + knot.slope * along;
     return {value, knot.below + 0.5 * along * (knot.value + value)};
   }
-  /// How many knots a place passes that moves on by so much; 0 where that is no whole number or depends on the place.
+  /// The number of knots between x and x + length; 0 where it is not whole or not the same for every x.
   int stride(double length) const;
-  /// `cumulated` of places one after the other, `stride` knots apart: all equally far behind a knot, which is found once.
+  /// `cumulated` at a row of points `stride` knots apart: their distance from the knot before them is the same, and only the
+  /// first point's knot has to be looked up.
   class Comb {
    public:
     /// `first` is at least lower().
@@ -70,7 +71,7 @@ class LinearDensity {
     int next_, stride_;
     double along_, half_square_;
   };
-  /// The place up to which the integral is u; u in (0, 1).
+  /// The x up to which the integral is u; u in (0, 1).
   double quantile(double u) const;
 
  private:

@@ -22,7 +22,7 @@ class Emitters {
 
   /// One of them, in proportion to its power; `u` in (0, 1).
   int pick(double u) const { return triangles_[distribution_.sample(u)]; }
-  /// Asks early for what pick(u) will read.
+  /// Prefetches what pick(u) will read.
   void prefetch(double u) const { __builtin_prefetch(&triangles_[distribution_.prefetch(u)]); }
 
   /// Lower bound of the distance from p to an emitter; infinite where there is none.

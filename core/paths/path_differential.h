@@ -1,5 +1,5 @@
 // The one local differential of a path, by hand in reverse (theory section 2): how ln F (contribution) and l (length)
-// change with everything the path touches. Tangent, adjoint and Jacobian are sinks of what this writes.
+// change with everything the path touches. TangentSink and AdjointSink (sinks.h) take what this writes.
 #pragma once
 #include <vector>
 
@@ -41,8 +41,8 @@ struct LocalDifferential {
 void differentiate_path(const PreparedScene& scene, const SurfacePoint* vertex, int count, bool length_only,
                         LocalDifferential& out);
 
-/// Adds g . (velocity of the material point x) to `out`: entries on the triangle's three vertices; or of the light x. What lies
-/// on no triangle else stands still.
+/// Adds g . (velocity of the material point x) to `out`: entries on the triangle's three vertices, or
+/// on the light that x is. Other points without a triangle (camera, sensor point, laser spot) are static.
 void add_material_flow(const PreparedScene& scene, const SurfacePoint& x, const Vec3& g, LocalDifferential& out);
 
 }  // namespace isochron

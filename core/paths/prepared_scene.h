@@ -23,9 +23,6 @@
 
 namespace isochron {
 
-/// The part of a capture's first vertices that hidden geometry sampling finds, where it does not find them all.
-inline constexpr double kHiddenShare = 0.5;
-
 /// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
 class PreparedScene {
  public:
@@ -36,10 +33,10 @@ class PreparedScene {
 
   /// For `source`, which has the topology of the scene at first. The result is the same whatever there was in between.
   void update(const Scene& source, const TangentBasis* basis, const FollowOptions& follow);
-  /// Whether the last update had a basis that moved the same.
+  /// Whether each degree of freedom has as many entries in the basis as in that of the last update.
   bool same_columns(const TangentBasis* basis) const;
-  /// Counts updates. changed(t): the last one that moved the triangle, or changed whether it, its vertices or its material
-  /// move.
+  /// The number of the last update. changed(t): that of the last one in which triangle t moved, or in which it, its vertices
+  /// or its material began or ceased to be differentiable.
   int revision() const { return revision_; }
   int changed(int triangle) const { return changed_[triangle]; }
 
@@ -56,8 +53,12 @@ class PreparedScene {
   /// Lights without an extent: the scene's, or the spots of a capture's laser.
   std::vector<PointLight> lights;
   HiddenGeometry hidden;
-  /// Whether hidden geometry sampling finds whatever a sensor point sees.
+  /// Whether hidden geometry sampling can draw every point that a sensor point sees.
   bool hidden_is_all = false;
+  /// And whether it does so better by itself than along with the wall's reflection; decided by the scene at first.
+  bool hidden_suffices = false;
+  /// Whether it finds every vertex, or every first vertex of a capture's paths, that gives its path a derivative.
+  bool gradients_are_hidden = false, first_gradients_are_hidden = false;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -84,24 +85,27 @@ class PreparedScene {
     if (!captures()) return camera.image_area_per_solid_angle(w);
     return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
   }
-  /// The part of a capture's first vertices that hidden geometry sampling finds.
-  double hidden_share() const { return hidden.empty() ? 0 : hidden_is_all ? 1 : kHiddenShare; }
-  /// Density per area of x1, which the sensor point sees, where Worker::start_path draws it; `received`: what the wall makes
-  /// of light from there, importance per area, which is the density of the wall's own reflection.
-  double first_vertex_pdf(const SurfacePoint& x1, double received) const {
-    const double share = hidden_share();
-    return share * (is_hidden(x1.triangle) ? hidden.pdf() : 0) + (1 - share) * received;
+  /// Density per area of a path's next vertex on `triangle`, which the one before sees: hidden geometry sampling of that share,
+  /// or another way, of density `pdf`, takes it, whichever finds it the more often.
+  double next_vertex_pdf(int triangle, double share, double pdf) const {
+    return std::max(hidden_pdf(triangle, share), (1 - share) * pdf);
+  }
+  /// Whether it is hidden geometry sampling.
+  bool hidden_takes(int triangle, double share, double pdf) const {
+    return hidden_pdf(triangle, share) >= (1 - share) * pdf;
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
-  /// What counts in the length of a pixel's paths beside the way from its sensor point to the light.
+  /// Length that every path of a pixel has besides the way from its sensor point to the laser's spot: from the laser to the
+  /// spot and from the sensor point to the detector. 0 of a camera.
   double extra_length(int pixel) const { return captures() ? scene.capture->extra_length(pixel) : 0; }
-  /// Whether every path of one bounce takes the way back that it came.
+  /// Whether light of one bounce returns along the way that it came.
   bool confocal() const { return captures() && scene.capture->confocal(); }
-  /// Which vertex of a camera's path x_k moves like: x1 that no pixel holds is a vertex like those after it.
+  /// The index k by which the rules for flows treat x_k. x1 of a camera keeps to its pixel's ray; x1 of a capture does not, so
+  /// it counts as x2, and so on.
   int flow_rank(int k) const { return captures() ? k + 1 : k; }
 
-  /// What multiplies the BSDF at x.
+  /// The texture at x, which multiplies the BSDF; 1 where there is none.
   double texture(const SurfacePoint& x) const { return shapes_[shape_index(x.triangle)].textured ? texture_at(x) : 1; }
   bool textured(int triangle) const { return shapes_[shape_index(triangle)].textured; }
   /// Its gradient along the surface.
@@ -153,6 +157,8 @@ class PreparedScene {
     return i < differentiable.light.size() && differentiable.light[i];
   }
   bool is_hidden(int triangle) const { return records_[triangle].hidden; }
+  /// Of hidden geometry sampling of that share, per area.
+  double hidden_pdf(int triangle, double share) const { return is_hidden(triangle) ? share * hidden.pdf() : 0; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
   void for_each_moving_corner(int triangle, F&& f) const {
@@ -282,6 +288,9 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_hidden();
+  /// Whether what the wall makes of unit radiance from points drawn by area on hidden geometry has, over their density, no larger
+  /// mean square than from points drawn by the wall's reflection, each of which counts as one.
+  bool area_suits_first_vertices() const;
   double texture_at(const SurfacePoint& x) const {
     const auto b = barycentrics(x);
     const auto& v = records_[x.triangle].vertex;

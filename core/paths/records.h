@@ -17,7 +17,7 @@ struct SurfacePoint {
   int triangle = -1;
 };
 
-/// What stands in the place of the triangle at point light number i, and the other way round.
+/// What takes the place of the triangle in a SurfacePoint on light number i, which has no extent, and the number back from it.
 inline int light_in_place_of_triangle(int i) {
   return -2 - i;
 }

@@ -30,7 +30,7 @@ class PassTimes {
  public:
   double seconds(PassKind kind) const { return 1e-9 * static_cast<double>(of(kind).load()); }
 
-  /// Adds its own life to a kind, where there are times to add to.
+  /// Adds the time from its construction to its destruction to a kind; without `times` to nothing.
   class Timed {
    public:
     Timed(PassTimes* times, PassKind kind) : times_(times), kind_(kind) {}

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 
+#include "core/base/partition_sum.h"
 #include "core/base/random.h"
 #include "core/base/ranks.h"
 #include "core/films/sinks.h"
@@ -23,13 +24,13 @@ namespace isochron {
 /// Pixels that a partition takes at a turn.
 inline constexpr int kPixelsPerBlock = 8;
 
-/// One of `count` partitions of the work of a pass, a power of two. They take turns at the blocks of pixels; where there are
-/// fewer blocks than partitions, several share a block, each with a part of its pixels' samples.
+/// One of `count` partitions of the work of a pass, a power of two. Blocks of pixels are dealt out to them in turn; where
+/// there are fewer blocks than partitions, several share a block, each with a part of its pixels' samples.
 struct Partition {
   int index, count;
 
   static int blocks(int pixels) { return (pixels + kPixelsPerBlock - 1) / kPixelsPerBlock; }
-  /// Parts of the image that the partitions have: powers of two, at most one of them for each.
+  /// How many parts, sets of blocks, the image is divided into: a power of two, not more than there are partitions.
   int pixel_parts(int pixels) const {
     return std::min(count, static_cast<int>(std::bit_ceil(static_cast<unsigned>(blocks(pixels)))));
   }
@@ -77,13 +78,18 @@ class Passes {
   const SamplingMix mix;      ///< what the options resolve to
   const GatePick every_gate;  ///< all gates and pixels alike
 
-  /// Rays traced so far, by all ranks, which meet here.
+  /// Rays traced so far by all ranks. Collective: every rank has to call it.
   long long rays() const { return sum_over_ranks(rays_.load()); }
-  /// Work done so far, in rays, by all ranks, which meet here.
+  /// Work done so far by all ranks, in rays. Collective.
   double work() const { return isochron::work(rays(), sum_over_ranks(arcs_.load())); }
 
   /// Where the time of a pass counts; null: nowhere.
   PassTimes* times() const { return cache_ ? &cache_->times() : nullptr; }
+
+  /// What the partitions of a pass took when it was last run with as many; null: not known.
+  PartitionCosts* partition_costs(PassKind kind, int partitions) const {
+    return cache_ && rank_count() > 1 ? &cache_->partition_costs(kind, partitions) : nullptr;
+  }
 
   /// Runs f(pixel) for the pixels of one partition, in a fixed order.
   template <class F>

@@ -1,11 +1,14 @@
 // Scenes made ready for rendering, kept from one evaluation to the next, so that each pays for what has changed alone.
 #pragma once
 #include <atomic>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "core/base/partition_sum.h"
 #include "core/paths/prepared_scene.h"
 #include "core/render/pass_times.h"
 #include "core/techniques/boundary_edges.h"
@@ -33,6 +36,8 @@ class SceneCache {
   long long rays() const { return rays_; }
   /// What passes over its scenes took so far.
   PassTimes& times() { return times_; }
+  /// What the partitions of a pass took when it was last run with so many. For ranks, whose passes come one by one.
+  PartitionCosts& partition_costs(PassKind kind, int partitions) { return partition_costs_[{kind, partitions}]; }
 
  private:
   const Scene& at_first_;
@@ -42,6 +47,7 @@ class SceneCache {
   int made_ = 0;
   std::atomic<long long> rays_{0};
   PassTimes times_;
+  std::map<std::pair<PassKind, int>, PartitionCosts> partition_costs_;
 };
 
 }  // namespace isochron

@@ -40,7 +40,7 @@ struct Shape {
   int first_triangle = 0, triangle_count = 0;
   bool deforms = false;   ///< parameters may move its vertices otherwise than as a rigid body
   bool textured = false;  ///< what Scene::texture says multiplies its material's BSDF
-  bool hidden = false;    ///< parameters change it: points of paths are drawn on it, see HiddenGeometry
+  bool hidden = false;    ///< points of paths are drawn on it, see HiddenGeometry
 };
 
 /// What becomes of the light that a pixel receives: a reading is gain x light + background.
@@ -56,7 +56,7 @@ struct Detector {
 };
 
 struct Scene {
-  /// Of a capture only its size, in pixels, and its place, amid the sensor points, count.
+  /// Where there is a capture only its size, in pixels, and its position, the mean of the sensor points, are used.
   Camera camera;
   std::optional<Capture> capture;  ///< in place of the camera
   Detector detector;
@@ -116,7 +116,8 @@ struct TangentBasis {
   bool differentiates(int dof) const { return row_begin[dof] != row_begin[dof + 1]; }
   /// Transpose product: gradient over dofs -> gradient over columns.
   std::vector<double> transpose_apply(const std::vector<double>& dof_gradient) const;
-  /// One column: the sum of all, each times its coefficient. What only columns with the coefficient 0 change, it does not.
+  /// One column: the sum of all, each times its coefficient. Degrees of freedom that only columns of coefficient 0 change are
+  /// static in it.
   TangentBasis combined(const std::vector<double>& coefficients) const;
 };
 

@@ -168,7 +168,7 @@ void describe(Keys& keys, ShapeKeys& entry, Scene& scene) {
     shape.file = (std::filesystem::path(value.file()).parent_path() / shape.file).lexically_normal().string();
   };
   keys.remember(entry.places);
-  keys.value("name", field::checked(field::text(shape.name), check_name), "of its own", {.required = true});
+  keys.value("name", field::checked(field::text(shape.name), check_name), "unique", {.required = true});
   keys.value("file", field::checked(field::text(shape.file), find_file),
              "mesh (OBJ, PLY, OFF, STL), relative to the scene file", {.required = true});
   keys.value("material", material_name(scene, shape.material), "of all its faces", {.required = true});

@@ -14,7 +14,7 @@ namespace isochron {
 /// many edges each is a wait for main memory.
 struct alignas(64) BoundaryEdge {
   Vec3 origin, end;
-  int vertex[2] = {-1, -1};  ///< none of the line between two triangles
+  int vertex[2] = {-1, -1};  ///< -1 of the line along which two triangles intersect
   int face[2];               ///< face[1] is -1 on an open border
   Vec3 inward[2];            ///< unit, in the plane of face i, perpendicular to the edge, pointing into the face
   /// Angle that directions are drawn from, on either side: that of the wedge of grazing directions, which is pi less the
@@ -23,7 +23,7 @@ struct alignas(64) BoundaryEdge {
   bool moves = false;
 
   int faces() const { return face[1] < 0 ? 1 : 2; }
-  /// Of two triangles that go on beyond it.
+  /// Whether it is no mesh edge but the line along which two triangles intersect, both of which go on beyond it.
   bool is_mesh_intersection() const { return vertex[0] < 0; }
   Vec3 point(double s) const { return origin + (end - origin) * s; }
 };
@@ -44,8 +44,8 @@ class BoundaryEdges {
   struct Pick {
     const BoundaryEdge* edge = nullptr;
     double s = 0;                 ///< fraction along the edge
-    double begin = 0, share = 0;  ///< the edge takes the numbers from `begin` to `begin` + `share`
-    /// The number that gives this point.
+    double begin = 0, share = 0;  ///< u from `begin` to `begin` + `share` draw this edge
+    /// The u that draws this point.
     double x() const { return begin + s * share; }
   };
   struct Sample : Pick {

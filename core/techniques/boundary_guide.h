@@ -44,7 +44,7 @@ struct GuideRecord {
 
 class BoundaryGuide {
  public:
-  /// The last one has further tables.
+  /// from_camera comes last, since it has several histograms.
   enum Technique { primary, pixel_border, from_edge, from_light, from_camera };
   static constexpr int kTechniques = 5;
 

@@ -13,7 +13,7 @@ namespace isochron {
 
 class GatePick {
  public:
-  /// Stands for the whole image where a pixel is asked for.
+  /// In place of a pixel: the whole image.
   static constexpr int kImage = -1;
 
   /// Every gate alike. `gates` must outlive this.

@@ -13,7 +13,7 @@ struct GatheredLight {
   Rgb value;               ///< contribution over density from vertex 1 on, without the gate
   double length;           ///< from vertex 1 to the emitter
   int bounces;             ///< scattering vertices
-  int target;              ///< which of the lengths before the path it is meant for; -1: all
+  int target;              ///< index of the CameraSide whose length it was drawn for; -1: it can be joined with any
   SurfacePoint next = {};  ///< vertex 2; none (triangle -1) where vertex 1 emits the light
 };
 

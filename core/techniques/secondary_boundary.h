@@ -63,7 +63,7 @@ class SecondaryBoundary {
   enum class Found { from_edge, from_camera, from_light };
 
   const Warp& edge_warp() const { return guide_.warp(BoundaryGuide::table(BoundaryGuide::from_edge)); }
-  /// Of D at vertex `bounces` of a path through the pixel.
+  /// For edge points drawn from D, vertex `bounces` of a path through the pixel.
   const Warp& camera_warp(int pixel, int bounces) const { return guide_.warp(camera_table(pixel, bounces)); }
   int camera_table(int pixel, int bounces) const {
     return BoundaryGuide::table_from_camera(scene_.camera, pixel, bounces);
@@ -99,18 +99,20 @@ class SecondaryBoundary {
   /// The same on the path of connection c that goes on to `next` (none: triangle -1), with what D and S follow.
   const LocalDifferential& with_following(const Segment& g, const Connection& c, const SurfacePoint& next);
 
-  /// Of the vertices between x1 and D: densities per area of going on from one to the next by sampling the BSDF, multiplied.
+  /// Of the vertices from x1 to D: the product of the densities per area with which BSDF sampling draws each of them, walking
+  /// towards the light or towards the camera.
   struct WalkDensities {
     double towards_light = 1, towards_camera = 1;
   };
-  /// The factors of x between two neighbours, the one on the camera's side first: density of `after`, and of `before`.
+  /// The factors of these products that a vertex x gives, between `before` (camera side) and `after` (light side): density of
+  /// drawing `after`, and that of drawing `before`.
   double towards(const SurfacePoint& before, const SurfacePoint& x, const SurfacePoint& after) const;
   double back(const SurfacePoint& before, const SurfacePoint& x, const Vec3& after) const;
 
   /// Density of finding the segment from the camera, by a path on which D is vertex k, over that of finding it from the edge.
   double camera_over_edge(const Segment& g, const SurfacePoint& x1, int k, int pixel, const WalkDensities& walk) const;
 
-  /// Of `differentiate`, by what holds D.
+  /// What `differentiate` found for a D that is x1, or for one that moves with its material.
   const LocalDifferential& flow_of(const Connection& c) const {
     return scene_.flow_rank(c.bounces) == 1 ? camera_flow_ : material_flow_;
   }
@@ -119,7 +121,7 @@ class SecondaryBoundary {
   /// every vertex.
   void walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng);
 
-  /// Of an edge point for D at vertex `bounces` of a path through the pixel.
+  /// Draws an edge point for D, vertex `bounces` of a path through the pixel.
   BoundaryEdges::Pick pick_from_camera(int pixel, int bounces, Rng& rng) const;
 
   /// D is the last vertex of the worker's path: tries the edge point.

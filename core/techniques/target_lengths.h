@@ -11,10 +11,10 @@
 
 namespace isochron {
 
-/// What the gate's derivative asks of a pass.
+/// Which lengths a pass draws for its connections.
 struct GatePass {
   bool value = false;  ///< lengths drawn from W
-  GateWeights use;     ///< of those
+  GateWeights use;     ///< how the gate enters contributions of those
   bool pairs = false;  ///< lengths drawn in pairs from dW
   PairPart part = PairPart::smooth;
   bool coupled = true;

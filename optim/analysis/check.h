@@ -38,10 +38,10 @@ bool disagrees(const Comparison& row, int comparisons);
 enum class Finding {
   agrees,
   differs,
-  /// The two disagree, but none of the difference's samples changed by more than rounding: with common random numbers that
-  /// is what samples that missed all that changes look like, and their standard error knows nothing of what they missed.
+  /// The two disagree, but none of the difference's samples changed by more than rounding. With common random numbers that
+  /// happens where all samples missed what changes; their standard error is zero then, whatever they missed.
   difference_saw_nothing,
-  nothing,  ///< neither side has seen anything
+  nothing,  ///< both are zero
 };
 Finding finding(const Comparison& row, int comparisons);
 

@@ -114,7 +114,7 @@ std::array<int, kPasses> affordable_samples(const Problem& problem, const std::v
   const std::array<int, kPasses> all{spec.primal, spec.interior, spec.visibility, spec.path_length};
   const auto scaled = [&](double factor) {
     std::array<int, kPasses> n;
-    for (int i = 0; i < kPasses; ++i) n[i] = std::max(1, static_cast<int>(std::lround(factor * all[i])));
+    for (int i = 0; i < kPasses; ++i) n[i] = std::max(i == 0 ? 2 : 1, static_cast<int>(std::lround(factor * all[i])));
     return n;
   };
   const std::array<int, kPasses> few = scaled(0.125);

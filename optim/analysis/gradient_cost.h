@@ -19,7 +19,7 @@ struct GradientCost {
   double effective_count = std::numeric_limits<double>::infinity();
 };
 
-/// The experiment's numbers of samples, or fewer (at least one), with which measure_cost takes about so many
+/// The experiment's numbers of samples, or fewer (at least one, of images two), with which measure_cost takes about so many
 /// CPU seconds.
 std::array<int, kPasses> affordable_samples(const Problem& problem, const std::vector<double>& theta,
                                             const GatedImage& target, const std::array<bool, 3>& kept, double seconds,

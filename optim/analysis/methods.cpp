@@ -16,6 +16,12 @@ namespace {
 
 constexpr int kFewBounces = 3;
 
+/// Adds an image of one gate to gate g of `all`.
+void add_to_gate(GatedImage& all, int g, const GatedImage& image) {
+  for (int pixel = 0; pixel < all.pixels(); ++pixel)
+    for (int c = 0; c < all.channels; ++c) all.at(pixel, g, c) += image.at(pixel, 0, c);
+}
+
 void set_automatic(Experiment& experiment) {
   experiment.estimator.sampling = Sampling::automatic;
   experiment.estimator.antithetic = true;
@@ -151,28 +157,25 @@ double MethodRun::least_factor() const {
 }
 
 void MethodRun::set_factor(double factor) {
-  const auto scaled = [&](int n) {
-    return n == 0 ? 0 : static_cast<int>(std::clamp(std::round(factor * n), 1.0, std::ldexp(1.0, 30)));
+  const auto scaled = [&](int n, double least = 1) {
+    return n == 0 ? 0 : static_cast<int>(std::clamp(std::round(factor * n), least, std::ldexp(1.0, 30)));
   };
-  problem_.set_samples(
-      {scaled(samples_.primal), scaled(samples_.interior), scaled(samples_.visibility), scaled(samples_.path_length)});
+  const double halves = problem_.experiment().loss.kind == LossKind::poisson ? 2 : 1;  // its slope needs both
+  problem_.set_samples({scaled(samples_.primal, halves), scaled(samples_.interior), scaled(samples_.visibility),
+                        scaled(samples_.path_length)});
 }
 
 template <class F>
-GatedImage MethodRun::gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration,
-                                   const Poll& poll, F&& render) const {
+void MethodRun::gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
+                             F&& render) const {
   const GateSet& gates = problem_.gates();
   const auto count = static_cast<std::uint32_t>(gates.size());
-  GatedImage all(scene.camera.width, scene.camera.height, gates.size(), scene.grey ? 1 : 3);
   for (int g = 0; g < gates.size(); ++g) {
     const GateSet gate(gates.shape(), {gates.center(g)});
     const Renderer renderer(scene, gate, problem_.estimator(problem_.experiment().samples.visibility), basis);
-    const GatedImage image = render(renderer, iteration * count + static_cast<std::uint32_t>(g));
-    for (int pixel = 0; pixel < all.pixels(); ++pixel)
-      for (int c = 0; c < all.channels; ++c) all.data[all.index(pixel, g) + c] = image.data[image.index(pixel, 0) + c];
+    render(renderer, iteration * count + static_cast<std::uint32_t>(g), g);
     poll();
   }
-  return all;
 }
 
 GatedImage MethodRun::derivative(const std::vector<double>& theta, int component, std::uint32_t iteration,
@@ -183,16 +186,13 @@ GatedImage MethodRun::derivative(const std::vector<double>& theta, int component
                                       {0, samples.primal});
   const Scene scene = problem_.parameters().apply(theta);
   const TangentBasis basis = select_columns(problem_.parameters().tangent(theta), component, 1);
-  return gate_by_gate(scene, &basis, iteration, poll, [&](const Renderer& renderer, std::uint32_t number) {
-    GatedImage sum(scene.camera.width, scene.camera.height, 1, scene.grey ? 1 : 3);
-    for (Term term : kTerms) {
-      if (samples.term(term) == 0) continue;
-      const GatedImage image =
-          renderer.derive(term, problem_.stream(pass_of(term), number), {0, samples.term(term)})[0];
-      for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += image.data[i];
-    }
-    return sum;
+  GatedImage sum = problem_.blank();
+  gate_by_gate(scene, &basis, iteration, poll, [&](const Renderer& renderer, std::uint32_t number, int g) {
+    for (Term term : kTerms)
+      if (samples.term(term) > 0)
+        add_to_gate(sum, g, renderer.derive(term, problem_.stream(pass_of(term), number), {0, samples.term(term)})[0]);
   });
+  return sum;
 }
 
 MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const GatedImage& target,
@@ -212,8 +212,13 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
     image = render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, primal});
     poll();
   } else {
-    image.image = gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number) {
-      return renderer.render(problem_.stream(Pass::primal, number), {0, primal});
+    image.image = problem_.blank();
+    if (primal > 1) image.difference = image.image;
+    gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number, int g) {
+      const SplitImage gate = render_halves(renderer, problem_.stream(Pass::primal, number), {0, primal});
+      image.first = gate.first;
+      add_to_gate(image.image, g, gate.image);
+      if (gate.halved()) add_to_gate(image.difference, g, gate.difference);
     });
   }
   const GatedImage adjoint = loss_adjoint(image, target, problem_.reading_loss(target));

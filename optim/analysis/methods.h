@@ -54,7 +54,8 @@ class MethodRun {
   bool same_as(const MethodRun& other) const;
   /// The smallest factor at which every term that is not left out still has a sample.
   double least_factor() const;
-  /// From now on every term takes `factor` times the experiment's samples, rounded, 1 at least.
+  /// From now on every term takes `factor` times the experiment's samples, rounded, 1 at least; images 2 at least
+  /// where the loss is a likelihood, whose slope needs two halves.
   void set_factor(double factor);
   /// Unknowns whose derivative is computed; for methods whose cost grows with their number all but a few can
   /// be left out. All unless said.
@@ -75,10 +76,10 @@ class MethodRun {
   /// Derivative images by one unknown, of all gates.
   GatedImage derivative(const std::vector<double>& theta, int component, std::uint32_t iteration,
                         const Poll& poll) const;
-  /// `render(renderer, stream)` of every gate by itself, put together.
+  /// Calls `render(renderer, iteration, gate)` for every gate, with a renderer and an iteration number of its own.
   template <class F>
-  GatedImage gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
-                          F&& render) const;
+  void gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
+                    F&& render) const;
 
   Method::Gradient kind_;
   Problem problem_;
@@ -86,8 +87,8 @@ class MethodRun {
   std::vector<int> components_;
 };
 
-/// For each the first that is the same, itself where none is before it. Names those that are not themselves in `notes`,
-/// after `where`.
+/// For each run the first one that gives the same estimates, itself where no earlier one does. A line in `notes`, which begins
+/// with `where`, for each run that an earlier one stands for.
 std::vector<std::size_t> first_alike(const std::deque<MethodRun>& runs, const std::vector<Method>& methods,
                                      const std::string& where, std::vector<std::string>& notes);
 

@@ -103,16 +103,17 @@ std::array<int, kPasses> cheapest_split(const GradientVariance& variance, const 
 
   // Rounded up it is good enough; then one sample less here, or here for one more there, as long as that
   // saves time.
+  const auto least = [](int i) { return i == 0 ? 2.0 : 1.0; };  // images come in two halves
   PerPass chosen{};
   for (int i = 0; i < kPasses; ++i)
-    if (i == 0 || kept[i - 1]) chosen[i] = std::max(1.0, std::ceil(best[i]));
+    if (i == 0 || kept[i - 1]) chosen[i] = std::max(least(i), std::ceil(best[i]));
   for (bool improved = true; improved;) {
     improved = false;
     const PerPass from = chosen;
     for (int less = 0; less < kPasses; ++less)
       for (int more = 0; more < kPasses; ++more) {
         PerPass n = from;
-        if (!(n[less] > 1) || !(n[more] > 0)) continue;
+        if (!(n[less] > least(less)) || !(n[more] > 0)) continue;
         --n[less];
         if (more != less) ++n[more];
         if (variance(n) > wanted || !(total_cost(cost, n) < total_cost(cost, chosen))) continue;

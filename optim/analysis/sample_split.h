@@ -34,7 +34,7 @@ VarianceComponents variance_components(const std::vector<std::vector<double>>& t
 /// get none. For no cross terms, n_i is in proportion to sqrt(variance_i / cost_i).
 PerPass best_split(const GradientVariance& variance, const PerPass& cost, const std::array<bool, 3>& kept, double time);
 
-/// Whole numbers, at least one of each kept pass, whose variance is at most `wanted`, in the least time: the
+/// Whole numbers, at least two of the image and one of each kept term, whose variance is at most `wanted`, in the least time: the
 /// best split for it, rounded, and improved by single samples.
 std::array<int, kPasses> cheapest_split(const GradientVariance& variance, const PerPass& cost,
                                         const std::array<bool, 3>& kept, double wanted);

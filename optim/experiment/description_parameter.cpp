@@ -173,17 +173,20 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   keys.value("initial", folder.values(spec.initial),
              "where the optimisation starts; of what moves, offsets from the scene file",
              {.required = true, .unit = own});
-  keys.value(
-      "target", folder.values(spec.target), "where the target is rendered, or known to be",
-      {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
+  keys.value("target", folder.values(spec.target), "where the target is rendered, or known to be",
+             {.required = target_required,
+              .unit = own,
+              .unset = spec.target.empty(),
+              .otherwise = "required to render a target"});
   keys.value("lower", folder.values(spec.lower),
-             "bound. Besides, ior stays on its side of 1, emission above 0, what else materials have between 0 and 1",
+             "bound. Besides, ior stays on its side of 1, emission, intensity and gain above 0, background at 0 or "
+             "above, what else materials have between 0 and 1",
              {.unit = own, .unset = spec.lower.empty()});
   keys.value("upper", folder.values(spec.upper), "bound. An ior above 1 has none of its own: give one",
              {.unit = own, .unset = spec.upper.empty()});
   keys.value("scale", field::positive(spec.scale),
              "what counts as one unit where parameters are compared. Default: 1; of a "
-             "rotation 180 / pi; of an emission its largest initial component",
+             "rotation 180 / pi; of an emission, intensity or gain its largest initial component",
              {.unit = own, .unset = spec.scale == 0, .otherwise = "by `type`"});
 }
 

@@ -152,7 +152,16 @@ int gradient_repeats(const Problem& problem) {
   const SampleSpec& spec = problem.experiment().samples;
   const int pixels = pixels_of(problem);
   require_replicates("primal", spec.primal);
-  int repeats = replicate_count(spec.primal, pixels, false, kMostReplicates);
+  int samples = spec.primal;
+  if (problem.experiment().loss.kind == LossKind::poisson) {  // each replicate needs two halves of its own
+    if (samples < 4)
+      throw InputError(
+          fmt::format("samples.primal: {} is too few for a standard error under `loss: {{kind: poisson}}` "
+                      "(allowed: at least 4)",
+                      samples));
+    samples /= 2;
+  }
+  int repeats = replicate_count(samples, pixels, false, kMostReplicates);
   if (problem.experiment().gradient.method == GradientMethod::finite_difference) return repeats;
   for (Term term : kTerms) {
     if (spec.term(term) == 0) continue;

@@ -45,7 +45,8 @@ struct GradientEstimate {
   Statistics gradient;  ///< one entry per unknown; replicates of residual and derivative
 };
 
-/// Number of replicates that estimate_gradient makes. Throws InputError when a term has one sample.
+/// Number of replicates that estimate_gradient makes. Throws InputError when a term has one sample, or images have fewer than
+/// four under a Poisson likelihood, each replicate of which needs two halves.
 int gradient_repeats(const Problem& problem);
 
 /// The gradient of the loss at theta. All replicates together use the experiment's samples once. Throws as

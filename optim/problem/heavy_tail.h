@@ -5,9 +5,9 @@
 
 namespace isochron {
 
-/// A standard error is not to be trusted where so few deviations make it up (Statistics::effective_count). 31 normal ones of
-/// one size come below with a probability of 5e-4, more of them less often (by simulation); so do many of very different
-/// sizes, where all but a few count for nothing: then few samples are rare hits, and what was missed is anyone's guess.
+/// A standard error whose Statistics::effective_count is below this rests on a few rare samples and is not to be trusted, as
+/// others may have been missed. 31 normal deviations of one variance come out below with probability 5e-4, more of them less
+/// often (by simulation).
 inline constexpr double kFewestDeviations = 4;
 
 /// Collects what is heavy-tailed among many estimates, for one line of warning.

@@ -37,9 +37,9 @@ class Objective {
   virtual Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
   /// The same with curvatures.
   virtual Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
-  /// An estimate of the diagonal of the Gauss-Newton matrix at theta, >= 0, right on average but for noise of the Jacobian J,
-  /// which makes it too large: (J' W^(1/2) z)^2 with random signs z, one for each reading and number of the probe, and what W
-  /// the loss has by its image. `now` is evaluate(theta, iteration). Costs about as much as a gradient.
+  /// An estimate, >= 0, of the diagonal of the Gauss-Newton matrix J'WJ at theta: (J' W^(1/2) z)^2 with a random sign z for each
+  /// reading, others for each `probe`, and W from the image of `now`, which is evaluate(theta, iteration). Noise of the Jacobian
+  /// J makes it too large, on average; otherwise it has no bias. Costs about as much as a gradient.
   virtual std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
                                               const Evaluation& now, int probe) const = 0;
 };

@@ -65,21 +65,21 @@ class Problem {
   /// Of the offsets' slopes, to be multiplied by the target's mean square.
   const PairPenalty& penalty() const { return penalty_; }
 
-  /// The experiment's, with the mix of techniques that automatic sampling settles on, once for all values of the
-  /// parameters: by a trial at their initial values, in proportion to the work that it decides about. For gradients that is
-  /// an optimisation of the experiment's iterations with its target, so that it is the same for a resumed one; for
-  /// derivative images (Purpose::images) the experiment's samples once.
+  /// The experiment's options with the mix of techniques that automatic sampling chooses, once for all values of the parameters:
+  /// by a trial at their initial values, whose work is in proportion to the work that the choice is for. For gradients that is a
+  /// whole optimisation with the experiment's iterations and its target, so that a resumed run chooses alike; for derivative
+  /// images (Purpose::images) it is the experiment's samples once.
   const EstimatorOptions& estimator(Purpose purpose = Purpose::gradients) const;
   /// The same to render the experiment's images once, and nothing else.
   const EstimatorOptions& image_estimator() const;
-  /// Gradients at so many points are all that is asked for, not an optimisation. Before any of them.
+  /// That gradients at so many points are wanted, not an optimisation: for the work of that trial. To be called before any.
   void set_evaluations(int evaluations) { evaluations_ = evaluations; }
 
   /// Takes the place of the experiment's numbers of samples; what automatic sampling has settled on stays.
   void set_samples(const SampleSpec& samples) { experiment_.samples = samples; }
 
-  /// All is as if the experiment's file had these samples and this seed, and set_evaluations been called. Automatic sampling
-  /// settles for each such choice by itself, and remembers some.
+  /// From now on as if the experiment's file had these samples and this seed, and set_evaluations had been called. Automatic
+  /// sampling makes a trial for each such setting, and remembers the results of some.
   void choose(const SampleSpec& samples, std::uint64_t seed, int evaluations);
 
   /// Throws InputError when the experiment has no parameters: nothing to differentiate.
@@ -142,8 +142,8 @@ class Problem {
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
 
-  /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. What of theta cannot
-  /// be rendered must not be asked for.
+  /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. theta must be one
+  /// that can_render() accepts.
   std::vector<double> transpose_apply(const std::vector<double>& theta, const GatedImage& image,
                                       std::uint32_t iteration, const Poll& poll) const;
 

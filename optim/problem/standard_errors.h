@@ -7,9 +7,9 @@
 
 namespace isochron {
 
-/// Variance of the unknowns per inverse of the Gauss-Newton matrix H of a loss that is a mean over N readings. Counts: 1 / N, as
-/// N H is Fisher's information. Else 2 s^2 / N with s^2 the mean squared error that is left, as of independent errors of the
-/// readings; NaN where that is not above 0. Noise of the renderer is no part of it.
+/// What the inverse of the Gauss-Newton matrix H is multiplied with to get the covariance of the unknowns, the loss being a mean
+/// over N readings. Counts: 1 / N, as N H is Fisher's information. Else 2 s^2 / N with s^2 the mean squared error that is left,
+/// taken for independent errors of the readings; NaN where that is not above 0. Noise of the renderer is not included.
 double variance_scale(const Problem& problem, const Evaluation& at);
 
 /// Of each unknown: root of `scale` times the diagonal of the inverse of `matrix` (row after row, n x n). Empty where

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "core/base/error.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/loss.h"
 #include "tests/optim/tiny_scene.h"
@@ -98,6 +99,22 @@ TEST(Gradient, ResidualAndDerivativeAreIndependent) {
   const double bias_if_shared = 2 * result.mean[1] / theta[1];
   EXPECT_GT(bias_if_shared, 10 * result.standard_error[0]);
   EXPECT_LT(std::abs(result.mean[0]), 5 * result.standard_error[0]);  // false alarms: 6e-7
+}
+
+TEST(Gradient, ReplicatesOfALikelihoodHaveTwoHalvesEach) {
+  const TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const std::string file = folder.write("tiny.yaml", tiny_experiment());
+  const auto replicates = [&](int primal) {
+    const Problem problem(load_experiment(
+        file, {"loss={kind: poisson}", "samples={primal: " + std::to_string(primal) + ", interior: 16}"}));
+    const Poll go_on = [] {};
+    const auto theta = problem.parameters().initial();
+    return estimate_gradient(problem, theta, problem.make_target(go_on), go_on).gradient.replicates;
+  };
+  EXPECT_EQ(replicates(8), 4);
+  EXPECT_EQ(replicates(5), 2);
+  EXPECT_THROW(replicates(3), InputError);
 }
 
 TEST(ReplicateStatistics, WeightsReplicatesByTheirSamples) {

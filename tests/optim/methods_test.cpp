@@ -43,5 +43,22 @@ TEST(Methods, KnowsWhatAutomaticSamplingComesDownTo) {
   }
 }
 
+// The slope of a likelihood needs two halves of the image's samples, which the first of the charts' trials must leave.
+TEST(Methods, AllOfThemKnowTheSlopeOfALikelihood) {
+  TemporaryFolder folder;
+  write_tiny_scene(folder);
+  folder.write("tiny.yaml", tiny_experiment());
+  const Experiment experiment = load_experiment(folder.file("tiny.yaml"), {"loss={kind: poisson}"});
+  std::vector<std::string> notes;
+  const Poll poll = [] {};
+  for (const Method& method : methods_for(experiment, {0.05}, notes)) {
+    SCOPED_TRACE(method.name);
+    MethodRun run(experiment, method);
+    run.set_factor(run.least_factor());
+    const std::vector<double> theta = run.problem().parameters().initial();
+    EXPECT_NO_THROW(run.gradient(theta, run.problem().make_target(poll), 0, poll));
+  }
+}
+
 }  // namespace
 }  // namespace isochron

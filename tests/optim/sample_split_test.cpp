@@ -47,6 +47,11 @@ TEST(SampleSplit, BeatsEverySplitOnAGrid) {
   }
 }
 
+TEST(SampleSplit, ImagesKeepTwoHalves) {
+  const GradientVariance all_of_the_terms{0, {1, 1, 1}, {}};  // the image makes no noise
+  EXPECT_EQ(cheapest_split(all_of_the_terms, kCost, kAll, 0.5)[0], 2);
+}
+
 TEST(SampleSplit, WholeNumbersAreTheCheapestOfAll) {
   for (const double wanted : {8.0, 2.0, 0.7}) {
     const std::array<int, kPasses> n = cheapest_split(kVariance, kCost, kAll, wanted);

@@ -6,7 +6,7 @@ namespace isochron {
 
 void describe(Keys& keys, PointLight& light, bool& grey) {
   using Kind = PointLight::Kind;
-  keys.value("name", field::text(light.name), "of its own", {.required = true});
+  keys.value("name", field::text(light.name), "unique", {.required = true});
   const auto choose = [&](int i) { light.kind = i == 0 ? Kind::point : Kind::spot; };
   keys.value("type",
              field::choice({{"point", "shines in all directions"}, {"spot", "shines within a cone"}}, choose,

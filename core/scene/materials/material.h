@@ -55,7 +55,7 @@ class Material {
   std::string name;
 
  private:
-  /// Those of a look at a constant material are not changed.
+  /// They point at the numbers of the Bsdf, also of a constant Material, whose functions only read them.
   std::vector<Quantity> quantities() const { return bsdf_->quantities(); }
 
   const char* kind_;
