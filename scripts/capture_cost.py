@@ -3,7 +3,7 @@
 40 x 40 vertices and their board's depth and tilts, over numbers of points and of bins within the same 3.84 ns.
 
     scripts/capture_cost.py measure CSV   some minutes
-    scripts/capture_cost.py table CSV     prints it, in Markdown
+    scripts/capture_cost.py table CSV     prints CPU seconds, in Markdown
 """
 
 import pathlib
@@ -89,9 +89,7 @@ def table(file):
 
     def entry(points, bins):
         own = [row for row in rows if (int(row["points"]), int(row["bins"])) == (points, bins)]
-        wall = min(float(row["wall_seconds"]) for row in own)
-        cpu = statistics.median(float(row["cpu_seconds"]) for row in own)
-        return f"{wall:.2g} / {cpu:.2g}"
+        return f"{statistics.median(float(row['cpu_seconds']) for row in own):.2g}"
 
     print("| points | " + " | ".join(f"{bins} bins" for bins in BINS) + " |")
     print("|---" * (1 + len(BINS)) + "|")

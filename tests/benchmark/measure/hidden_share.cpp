@@ -19,6 +19,10 @@ namespace {
 
 using namespace testing;
 
+std::vector<std::optional<double>> shares() {
+  return {0.0, 0.25, 0.5, 0.75, 0.9, std::nullopt};
+}
+
 /// Eight by eight points of a confocal scan of the wall z = 0, lengths in metres.
 Scene confocal_scan() {
   constexpr int kPoints = 8;
@@ -80,25 +84,24 @@ TangentBasis towards_wall(const Scene& scene, bool gain) {
   return basis;
 }
 
-enum class Of { image, derivative, derivative_beside_gain, any_shape };
+enum class Of { image, derivative, derivative_beside_gain, image_without_names };
 
-void measure(const Case& c, int bounces, Of of, const std::vector<double>& shares, int seeds, std::FILE* csv) {
+void measure(const Case& c, int bounces, Of of, int seeds, std::FILE* csv) {
   const TangentBasis basis = towards_wall(c.scene, of == Of::derivative_beside_gain);
   std::vector<double> centers;
   for (int i = 0; i < 48; ++i) centers.push_back(0.6 + 0.04 * i);
   const GateSet gates(GateShape::gaussian(0.02), centers);
   constexpr SampleRange kSamples{0, 256};
-  constexpr const char* kNames[] = {"image", "derivative", "derivative beside gain", "image, no shape named"};
-  std::vector<PixelBatches> images(shares.size());
-  std::vector<double> seconds(shares.size());
+  constexpr const char* kNames[] = {"image", "derivative", "derivative beside gain", "image without names"};
+  std::vector<PixelBatches> images(shares().size());
+  std::vector<double> seconds(shares().size());
   for (int seed = 0; seed < seeds; ++seed)
-    for (std::size_t i = 0; i < shares.size(); ++i) {
-      const EstimatorOptions options{.max_bounces = bounces,
-                                     .hidden = shares[i] < 1 ? std::optional(shares[i]) : std::nullopt};
+    for (std::size_t i = 0; i < shares().size(); ++i) {
+      const EstimatorOptions options{.max_bounces = bounces, .hidden = shares()[i]};
       const Renderer renderer(c.scene, gates, options, &basis);
       const Stream stream{static_cast<std::uint64_t>(81 + seed), 0, 1};
       const double start = cpu_seconds();
-      const GatedImage image = of == Of::image || of == Of::any_shape
+      const GatedImage image = of == Of::image || of == Of::image_without_names
                                    ? renderer.render(stream, kSamples)
                                    : renderer.derive(Term::interior, stream, kSamples)[0];
       seconds[i] += (cpu_seconds() - start) / seeds;
@@ -106,7 +109,7 @@ void measure(const Case& c, int bounces, Of of, const std::vector<double>& share
     }
   for (std::FILE* out : {csv, stdout}) {
     std::fprintf(out, "%s,%d,%s", c.name, bounces, kNames[static_cast<int>(of)]);
-    for (std::size_t i = 0; i < shares.size(); ++i) {
+    for (std::size_t i = 0; i < shares().size(); ++i) {
       double square = 0, variance = 0;
       for (std::size_t k = 0; k < images[i].mean().data.size(); ++k) {
         variance += images[i].variance(k);
@@ -126,18 +129,22 @@ int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
   const Arguments arguments = read_arguments(argc, argv, 1, "isochron_hidden_share CSV [SEEDS]", 32, 2);
   isochron::set_thread_count(1);
-  const std::vector<double> shares{0, 0.25, 0.5, 0.75, 0.9}, with_all{0, 0.25, 0.5, 0.75, 0.9, 1};
   for (std::FILE* out : {arguments.csv.get(), stdout}) {
     std::fprintf(out, "scene,bounces,of");
-    for (const double share : with_all) std::fprintf(out, ",%g", share);
+    for (const auto& share : shares()) {
+      if (share)
+        std::fprintf(out, ",%g", *share);
+      else
+        std::fprintf(out, ",default");
+    }
     std::fprintf(out, "\n");
   }
   for (Case& c : cases()) {
     for (const int bounces : {1, 3})
       for (const Of of : {Of::image, Of::derivative, Of::derivative_beside_gain})
-        measure(c, bounces, of, shares, arguments.number, arguments.csv.get());
+        measure(c, bounces, of, arguments.number, arguments.csv.get());
     c.scene.shapes[0].hidden = false;  // which makes all of a capture's
     for (const int bounces : {1, 3})
-      measure(c, bounces, Of::any_shape, with_all, arguments.number, arguments.csv.get());
+      measure(c, bounces, Of::image_without_names, arguments.number, arguments.csv.get());
   }
 }
