@@ -214,10 +214,14 @@ class PreparedScene {
     const double b1 = dot(cross(d, r.edge[1]), n), b2 = dot(cross(r.edge[0], d), n);
     return {1 - b1 - b2, b1, b2};
   }
+  /// The triangle as clip_ellipse takes it.
+  FocalTriangle focal_triangle(const Foci& foci, int triangle) const {
+    const TriangleRecord& r = records_[triangle];
+    return FocalTriangle(foci, r.origin, r.edge);
+  }
   /// What the ellipsoid's surface leaves on the triangle; false for nothing.
   bool clip(const Ellipsoid& ellipsoid, int triangle, EllipseArcs& arcs) const {
-    const TriangleRecord& r = records_[triangle];
-    return clip_ellipse(ellipsoid, r.origin, r.origin + r.edge[0], r.origin + r.edge[1], arcs);
+    return clip_ellipse(ellipsoid, focal_triangle(ellipsoid, triangle), arcs);
   }
   /// Signed distance of p from the triangle's plane, positive on the normal's side.
   double height_over(int triangle, const Vec3& p) const {

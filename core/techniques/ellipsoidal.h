@@ -86,10 +86,12 @@ class EllipsoidalConnections {
   std::span<const Choice> choose(double pick, int rays, F&& sample);
 
   /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.
-  void surface_arc_point(const Ellipsoid& ellipsoid, int t, const SurfacePoint& y, double along, int pixel,
-                         const Rgb& factor, ArcPoint& out) const;
-  void emitter_arc_point(const Ellipsoid& sphere, int t, double along, int pixel, const Rgb& throughput,
-                         ArcPoint& out) const;
+  void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, const SurfacePoint& y,
+                         double along, int pixel, const Rgb& factor, ArcPoint& out) const;
+  void emitter_arc_point(const Ellipsoid& sphere, const FocalTriangle& triangle, int t, double along, int pixel,
+                         const Rgb& throughput, ArcPoint& out) const;
+  /// At the path's last vertex, which is not its first: from the one before, to the unit direction `w`.
+  Directions scattering_to(const Vec3& w) const;
 
   /// Share of a contribution found by `technique`, over the connections' share of the samples.
   double mis_weight(const TargetLength& target, int i, const ArcPoint& found, double ArcDensities::*technique) const;
@@ -104,6 +106,7 @@ class EllipsoidalConnections {
   LengthReceiver* const receiver_;
   std::vector<TargetLength> targets_;
   std::vector<ArcPair> arcs_;
+  Vec3 back_;  ///< unit direction from the path's last vertex to the one before
   std::vector<Choice> choices_;
 };
 
