@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/parallel.h"
+#include "core/geometry/mesh_intersections.h"
 
 namespace isochron {
 namespace {
@@ -42,6 +43,7 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
 BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Scene* at_first) : at_first_(at_first) {
   update(scene, wedge);
 }
+BoundaryEdges::~BoundaryEdges() = default;
 
 void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
   const std::size_t count = scene.scene.edges.size();
@@ -117,7 +119,7 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
 void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {
   if (!intersections_) {
     const Scene& first = at_first_ ? *at_first_ : scene.scene;
-    intersections_.emplace(first, ray_offset(first));
+    intersections_ = std::make_unique<MeshIntersections>(first, ray_offset(first));
   }
   intersections_->update(scene.scene, scene.caster.offset());
   for (const MeshIntersection& p : intersections_->segments()) {

@@ -1,14 +1,16 @@
 // Mesh edges as visibility boundaries: their geometry and how they are picked (theory section 5).
 #pragma once
-#include <optional>
+#include <memory>
+#include <vector>
 
 #include "core/base/discrete_distribution.h"
 #include "core/base/large_array.h"
-#include "core/geometry/mesh_intersections.h"
 #include "core/paths/path_differential.h"
 #include "core/paths/prepared_scene.h"
 
 namespace isochron {
+
+class MeshIntersections;
 
 /// An edge at the current parameters, or the line along which two triangles pass through each other. Two cache lines: of
 /// many edges each is a wait for main memory.
@@ -34,6 +36,7 @@ class BoundaryEdges {
   /// `wedge`: pick edges and azimuths by the wedge of grazing directions (see BoundaryTechniques).
   /// `at_first`: the same scene with the parameters' initial values, for MeshIntersections, outlives this; null: this one.
   explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true, const Scene* at_first = nullptr);
+  ~BoundaryEdges();
   BoundaryEdges(const BoundaryEdges&) = delete;
   BoundaryEdges& operator=(const BoundaryEdges&) = delete;
   /// Makes anew what PreparedScene::update has changed since; `scene` is the same object. The result is the same whatever there
@@ -91,7 +94,7 @@ class BoundaryEdges {
   std::vector<std::uint8_t> moves_;  ///< of each
   Choice primary_, secondary_;
   const Scene* at_first_;
-  std::optional<MeshIntersections> intersections_;
+  std::unique_ptr<MeshIntersections> intersections_;  ///< made when first asked for
   int revision_ = 0;  ///< of the scene
   bool wedge_ = true, camera_possible_ = false;
 };
