@@ -79,7 +79,7 @@ void print_table(const Problem& problem, const std::vector<Comparison>& table) {
 int check(const CheckCommand& command) {
   begin_session(command.common);
   std::vector<std::string> notes;
-  const Problem problem(check_experiment(read_experiment(command.common), notes), warn);
+  const Problem problem(check_experiment(read_experiment(command.common, false), notes), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);

@@ -36,7 +36,7 @@ std::vector<std::string> written(const Parameters& parameters, const Parameters:
 
 int derive(const DeriveCommand& command) {
   begin_session(command.common);
-  Problem problem(read_experiment(command.common), warn);
+  Problem problem(read_experiment(command.common, false), warn);
   problem.set_evaluations(1);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();

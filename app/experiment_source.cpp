@@ -2,8 +2,8 @@
 
 namespace isochron {
 
-Experiment read_experiment(const ExperimentSource& source) {
-  Experiment experiment = load_experiment(source.file, source.set);
+Experiment read_experiment(const ExperimentSource& source, bool target_values) {
+  Experiment experiment = load_experiment(source.file, source.set, target_values);
   if (source.samples) experiment.samples.set_all(*source.samples);
   if (source.seed) experiment.seed = *source.seed;
   return experiment;

@@ -17,8 +17,8 @@ struct ExperimentSource {
   std::optional<std::uint64_t> seed;
 };
 
-/// Reads the experiment and makes the changes. Throws InputError.
-Experiment read_experiment(const ExperimentSource& source);
+/// Reads the experiment and makes the changes. `target_values`: see load_experiment. Throws InputError.
+Experiment read_experiment(const ExperimentSource& source, bool target_values = true);
 
 /// `output`, or where that is empty runs/NAME followed by `suffix`.
 std::string output_folder(const std::string& output, const Experiment& experiment, const std::string& suffix = "");

@@ -19,7 +19,7 @@ namespace {
 
 int render(const CommonOptions& options) {
   begin_session(options);
-  const Problem problem(read_experiment(options), warn);
+  const Problem problem(read_experiment(options, false), warn);
   const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
   require_memory(problem, image_memory(problem));
   const std::string folder = output_folder(options, problem.experiment(), "-render");

@@ -29,6 +29,7 @@ from captures.reading import CaptureError, open_arrays
 from isochron.captures import write_capture, write_response
 
 METRES_PER_PS = 299792458e-12
+START_ALBEDO = 0.01  # small: what is hidden may be a small part of the plane that a fit begins with
 LEAD_PS = 500  # kept before time zero where bins are aligned: the pulse's rise belongs to the response
 
 
@@ -175,6 +176,17 @@ def measured_response(arrays, layout, options, counts, start_ps):
     return f"{options.response}: {offsets[0]:g} to {offsets[-1]:g} ps, {mean:.1f} ps on average"
 
 
+def start_of_fit(counts, bin_m):
+    """What a fit of a plane may begin with. In a plane at depth z the light of a confocal point, over all lengths, is
+    albedo / (3 pi^2 z^2); counts are gain times its density over length."""
+    level = response.background(counts)
+    light = counts.mean(axis=(1, 2), dtype=float).sum() - level * len(counts)
+    if light <= 0:
+        return []
+    gain = light * bin_m * 3 * np.pi**2 / START_ALBEDO
+    return [f"to begin a fit with: albedo {START_ALBEDO:g}, gain {gain:.2g} z^2 (z: depth, metres), background {level:.2g}"]
+
+
 def import_capture(options):
     """Returns what there is to say about the files written."""
     arrays = open_arrays(options.input)
@@ -197,7 +209,8 @@ def import_capture(options):
                   np.asarray(options.normal) / np.linalg.norm(options.normal), options.laser, layout.format)
     mean = counts.mean(dtype=float) * len(counts)
     return [f"{options.output}: {layout.format}, {counts.shape[1]} x {counts.shape[2]} points, {len(counts)} bins of "
-            f"{width:g} ps from {start:g} ps, {mean:.4g} counts a point"] + said
+            f"{width:g} ps from {start:g} ps, {mean:.4g} counts a point"] + said + (
+                start_of_fit(counts, width * METRES_PER_PS) if options.bins and not options.laser else [])
 
 
 class Parser(argparse.ArgumentParser):
@@ -234,7 +247,8 @@ def parse(arguments):
     add("--rebin", metavar="N", type=at_least_one, default=1, help="add N bins up into one")
     add("--stride", metavar="N", type=at_least_one, default=1, help="every N-th point along either axis")
     add("--bins", metavar=("FIRST", "LAST"), type=int, nargs=2,
-        help="these bins alone, LAST excluded: bins of the file, where there is a tofgrid counted from time zero")
+        help="these bins alone, LAST excluded: bins of the file, where there is a tofgrid counted from time zero. Without the "
+        "wall's own light among them, what is said at the end is where the fit of a plane may begin")
     add("--bin-ps", metavar="PS", type=positive, help="length of a bin")
     add("--t-start-ps", metavar="PS", type=number, default=0.0,
         help="when the first bin begins, 0 being when light is at the wall (default: 0)")

@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """How an iteration scales with cores: measured on two, modelled up to 10 000.
 
-    scripts/scaling.py measure CSV        a quarter of an hour on two idle cores
+    scripts/scaling.py measure CSV        half an hour on two idle cores
     scripts/scaling.py plot CSV PNG
     scripts/scaling.py page CSV PAGE.md   rewrites what stands between <!-- scaling --> and <!-- /scaling -->
 
 An iteration is one image with its gradient. Measured are its wall seconds with some multiples of the experiment's samples, on
-one core, as two threads and as two ranks, and the messages between two ranks, which Open MPI itself counts.
+one core, as two threads and as two ranks, and the messages between two ranks, which Open MPI itself counts. They depend on
+where ranks cut the row of partitions, which is where the work of both is even: a mean of four iterations.
 
 The model: T = S + W / c + M. A line through the times on one core, as a function of samples, gives S, which every core does
 for itself, and W, which they share. With K partitions in a pass the busiest of n cores has ceil(K / n) of them, so
@@ -34,7 +35,7 @@ from reproduction.measure import PROGRAM, ROOT
 from reproduction.tables import read_rows, run_action, write_rows
 
 # Partitions: Passes::partitions_for of an image of so many pixels.
-PARTITIONS = {"corridor": 32, "letter": 128}
+PARTITIONS = {"corridor": 32, "cube": 256, "letter": 128}
 MULTIPLES = (0.25, 0.5, 1, 2)
 SHARINGS = {"1 core": (0, 1), "2 threads": (0, 2), "2 ranks": (2, 1)}
 ITERATIONS = 6
@@ -72,7 +73,7 @@ def messages(folder, name):
     totals = []
     for iterations in (2, 6):
         counts = folder / f"messages{iterations}"
-        run(folder / "run", name, "2 ranks", MULTIPLES[0], iterations, "--mca", "pml_monitoring_enable", "2", "--mca",
+        run(folder / "run", name, "2 ranks", 1, iterations, "--mca", "pml_monitoring_enable", "2", "--mca",
             "pml_monitoring_enable_output", "3", "--mca", "pml_monitoring_filename", str(counts))
         total = np.zeros(2)
         for file in folder.glob(f"messages{iterations}.*.prof"):
@@ -116,8 +117,10 @@ class Measured:
 
 
 def read(file):
+    """Of the experiments that the file has."""
     rows = read_rows(file)
-    return {name: Measured([r for r in rows if r["experiment"] == name]) for name in PARTITIONS}
+    names = dict.fromkeys(r["experiment"] for r in rows)
+    return {name: Measured([r for r in rows if r["experiment"] == name]) for name in names}
 
 
 class Model:
@@ -145,12 +148,12 @@ class Model:
 
 
 def models(measured):
-    return {name: Model(measured[name], PARTITIONS[name]) for name in PARTITIONS}
+    return {name: Model(each, PARTITIONS[name]) for name, each in measured.items()}
 
 
 def plot(file, picture):
     measured = read(file)
-    figure, all_axes = plt.subplots(1, 2, figsize=(10, 3.9), layout="constrained", sharey=True)
+    figure, all_axes = plt.subplots(1, len(measured), figsize=(1 + 4.5 * len(measured), 3.9), layout="constrained", sharey=True)
     for axes, (name, model) in zip(all_axes, models(measured).items()):
         for multiple, colour in ((1, "C0"), (16, "C1")):
             alone = model.seconds(1, multiple)

@@ -1,7 +1,9 @@
 # The Debian package, made by scripts/package.
 set(documents ${CMAKE_INSTALL_DATADIR}/doc/isochron)
 install(FILES ${CMAKE_SOURCE_DIR}/LICENSE COMPONENT program DESTINATION ${documents} RENAME copyright)
-set(CPACK_PACKAGE_CONTACT "the isochron project" CACHE STRING "Maintainer of the Debian package")
+set(ISOCHRON_MAINTAINER "isochron developers <isochron@example.org>" CACHE STRING
+    "Maintainer of the Debian package: name <address>")
+set(CPACK_PACKAGE_CONTACT "${ISOCHRON_MAINTAINER}")
 string(TIMESTAMP changed "%a, %d %b %Y %H:%M:%S +0000" UTC)
 configure_file(changelog.in changelog)
 add_custom_command(OUTPUT changelog.gz COMMAND gzip -9nkf changelog DEPENDS changelog VERBATIM)

@@ -55,6 +55,20 @@ Field numbers(std::vector<double>& variable) {
           [&variable] { return yaml_list(variable); }};
 }
 
+Field names(std::vector<std::string>& variable) {
+  const auto read = [&variable](const YamlValue& value) {
+    variable.clear();
+    for (const YamlValue& each : value.list()) variable.push_back(each.text());
+    if (variable.empty()) value.fail("holds no name", "at least one");
+  };
+  const auto write = [&variable] {
+    std::vector<std::string> quoted;
+    for (const std::string& each : variable) quoted.push_back(yaml_text(each));
+    return fmt::format("[{}]", fmt::join(quoted, ", "));
+  };
+  return {"list of names", "", read, write};
+}
+
 Field color(Rgb& variable, const NumberRange& range, bool& grey) {
   const auto read = [&variable, &grey, range](const YamlValue& value) { variable = value.color(range, grey); };
   const auto write = [&variable] {

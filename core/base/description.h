@@ -79,6 +79,7 @@ Field text(std::string& variable);
 Field vec3(Vec3& variable);
 Field direction(Vec3& variable);  ///< see YamlValue::direction
 Field numbers(std::vector<double>& variable);
+Field names(std::vector<std::string>& variable);                   ///< a list of at least one
 Field color(Rgb& variable, const NumberRange& range, bool& grey);  ///< see YamlValue::color
 /// One of some words; `set` receives which.
 Field choice(const std::vector<std::pair<std::string, std::string>>& names_and_meanings, std::function<void(int)> set,

@@ -1,6 +1,7 @@
 // A random choice in proportion to given weights.
 #pragma once
 #include <algorithm>
+#include <concepts>
 #include <vector>
 
 namespace isochron {
@@ -11,16 +12,21 @@ class DiscreteDistribution {
  public:
   DiscreteDistribution() = default;
   /// Weights are finite and not negative.
-  explicit DiscreteDistribution(const std::vector<double>& weights) {
-    below_.reserve(weights.size() + 1);
-    for (double w : weights) below_.push_back(below_.back() + w);
-    first_.reserve(weights.size());
-    const double each = total() / size();
-    for (int part = 0, i = 0; part < size(); ++part) {
-      const double begin = each * part;
-      while (i + 1 < size() && below_[i + 1] <= begin) ++i;
-      first_.push_back(i);
+  explicit DiscreteDistribution(const std::vector<double>& weights)
+      : DiscreteDistribution(weights.size(), [&](std::size_t i) { return weights[i]; }) {}
+  /// Of `count` weights, each of which weight_of(i) gives.
+  template <std::invocable<std::size_t> F>
+  DiscreteDistribution(std::size_t count, F&& weight_of) : below_(count + 1), first_(count + 1) {
+    double sum = 0;
+    for (std::size_t i = 0; i < count; ++i) below_[i + 1] = sum += weight_of(i);
+    // Every index is noted at the first part that begins within or behind its share, the last of several stays, and parts
+    // without one take that of the part before.
+    const double parts = size(), per_weight = parts / sum;
+    for (int i = 1; i < size(); ++i) {
+      const double part = below_[i] * per_weight;
+      first_[part < parts ? static_cast<int>(part) + 1 : size()] = i;
     }
+    for (int part = 1; part < size(); ++part) first_[part] = std::max(first_[part], first_[part - 1]);
   }
   bool empty() const { return total() <= 0; }
   double total() const { return below_.back(); }
@@ -69,7 +75,7 @@ class DiscreteDistribution {
   }
 
   std::vector<double> below_{0.0};  ///< [i]: sum of the weights before index i; one more than weights
-  std::vector<int> first_;          ///< [k]: the index whose share holds k of size() equal parts of the sum
+  std::vector<int> first_;          ///< [k]: about the index whose share holds k of size() equal parts of the sum
 };
 
 }  // namespace isochron

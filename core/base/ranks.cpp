@@ -1,5 +1,8 @@
 #include "core/base/ranks.h"
 
+#include <algorithm>
+#include <numeric>
+
 #include "core/base/error.h"
 #include "core/base/progress.h"
 
@@ -115,13 +118,24 @@ void on_first_rank(const std::function<void()>& f) {
   });
 }
 
-RankPart part_of_rank(int rank, int count) {
-  const long long n = count, ranks = rank_count();
-  return {static_cast<int>(n * rank / ranks), static_cast<int>(n * (rank + 1) / ranks)};
+RankParts::RankParts(int count, const std::vector<double>& costs) {
+  std::vector<double> before(count + 1);  // cost of the things in front
+  std::iota(before.begin(), before.end(), 0.0);
+  if (static_cast<int>(costs.size()) == count &&
+      std::any_of(costs.begin(), costs.end(), [](double c) { return c > 0; }))
+    std::partial_sum(costs.begin(), costs.end(), before.begin() + 1);
+  const int ranks = rank_count();
+  begin_.assign(ranks + 1, count);
+  begin_[0] = 0;
+  for (int r = 1, i = std::min(1, count); r < ranks; ++r) {
+    const double cut = before[count] * r / ranks;
+    while (i < count && before[i] + before[i + 1] <= 2 * cut) ++i;  // the boundary that is closest
+    begin_[r] = i;
+  }
 }
 
-int rank_of_part(int i, int count) {
-  return static_cast<int>(((i + 1LL) * rank_count() - 1) / count);
+int RankParts::rank_of(int thing) const {
+  return static_cast<int>(std::upper_bound(begin_.begin(), begin_.end() - 1, thing) - begin_.begin()) - 1;
 }
 
 }  // namespace isochron

@@ -57,13 +57,23 @@ void on_first_rank(const std::function<void()>& f);
 /// The same, where f returns something for all.
 std::string from_first_rank(const std::function<std::string()>& f);
 
-/// Part of `count` things in a row that a rank takes.
+/// Things in a row that a rank takes.
 struct RankPart {
   int begin, end;
 };
-RankPart part_of_rank(int rank, int count);
-/// The rank that takes thing i.
-int rank_of_part(int i, int count);
+/// How ranks share things in a row: each takes a part, one after the other.
+class RankParts {
+ public:
+  /// Parts of even cost, as far as whole things make them. `costs`: one of each of the `count` things, the same on all ranks;
+  /// of another number of things, or zero in all: they count alike. A rank's part can be empty, but that of the first.
+  explicit RankParts(int count, const std::vector<double>& costs = {});
+  RankPart of(int rank) const { return {begin_[rank], begin_[rank + 1]}; }
+  RankPart own() const { return of(rank()); }
+  int rank_of(int thing) const;
+
+ private:
+  std::vector<int> begin_;  ///< of each rank's part, and behind the last
+};
 
 /// Bytes of plain values, put one behind the other and taken out in the same order.
 class Packer {
@@ -129,26 +139,25 @@ T sum_over_ranks(const T& own) {
   return sum;
 }
 
-/// Completes what was made for a rank's part of `items` alone: pack(packer, item) and unpack(unpacker, item) of each.
-template <class Item, class Pack, class Unpack>
-void complete(std::vector<Item>& items, Pack&& pack, Unpack&& unpack) {
-  if (rank_count() == 1 || items.empty()) return;
-  const int count = static_cast<int>(items.size());
+/// Completes what was made for a rank's part of things alone: pack(packer, thing) and unpack(unpacker, thing) of each.
+template <class Pack, class Unpack>
+void complete(const RankParts& parts, Pack&& pack, Unpack&& unpack) {
+  if (rank_count() == 1) return;
   Packer own;
-  for (int i = part_of_rank(rank(), count).begin; i < part_of_rank(rank(), count).end; ++i) pack(own, items[i]);
+  for (int i = parts.own().begin; i < parts.own().end; ++i) pack(own, i);
   const std::vector<std::string> all = gather(own.bytes);
   for (int r = 0; r < rank_count(); ++r) {
     if (r == rank()) continue;
     Unpacker other(all[r]);
-    for (int i = part_of_rank(r, count).begin; i < part_of_rank(r, count).end; ++i) unpack(other, items[i]);
+    for (int i = parts.of(r).begin; i < parts.of(r).end; ++i) unpack(other, i);
   }
 }
-/// The same for plain values, or vectors of them.
-template <class Item>
-void complete(std::vector<Item>& items) {
+/// The same for one or more vectors of plain values, or of vectors of them.
+template <class... Item>
+void complete(const RankParts& parts, std::vector<Item>&... items) {
   complete(
-      items, [](Packer& packer, const Item& item) { packer.put(item); },
-      [](Unpacker& unpacker, Item& item) { unpacker.get(item); });
+      parts, [&](Packer& packer, int i) { (packer.put(items[i]), ...); },
+      [&](Unpacker& unpacker, int i) { (unpacker.get(items[i]), ...); });
 }
 
 }  // namespace isochron

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/base/random.h"
+#include "core/base/systematic_sampling.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh_impl.h"
 
@@ -192,40 +193,6 @@ double exchange(const EllipsoidBvh::Focus& focus, const Vec3& center, double rad
   return cosine / max(squared, radius * radius);
 }
 
-/// Keeps about `kept` of the n entries (at most one more), each with a probability in proportion to its weight or
-/// certainly, by systematic sampling; returns their number.
-template <class Entry>
-int thin(Entry* entries, int n, int kept, double u) {
-  double threshold = 0;
-  for (int i = 0; i < n; ++i) threshold += entries[i].weight / kept;
-  for (int certain = 0;;) {
-    int above = 0;
-    double rest = 0;
-    for (int i = 0; i < n; ++i) {
-      if (entries[i].weight >= threshold)
-        ++above;
-      else
-        rest += entries[i].weight;
-    }
-    if (above == certain || above >= kept) break;
-    certain = above;
-    threshold = rest / (kept - certain);
-  }
-  int count = 0;
-  double sum = u;
-  for (int i = 0; i < n; ++i) {
-    const double probability = entries[i].weight >= threshold ? 1 : entries[i].weight / threshold;
-    sum += probability;
-    if (sum < 1) continue;
-    sum -= 1;
-    entries[count] = entries[i];
-    entries[count].weight /= probability;
-    entries[count].inverse_probability /= probability;
-    ++count;
-  }
-  return count;
-}
-
 }  // namespace
 
 template <bool kSurfaces>
@@ -257,7 +224,7 @@ void EllipsoidBvh::Impl::visit_some(const Shell& shell, const Focus& a, const Fo
         next[count++] = {child, weight * entry.inverse_probability, entry.inverse_probability};
       }
     }
-    size = count > kKept ? thin(next, count, kKept, rng.uniform()) : count;
+    size = count > kKept ? sample_systematically(next, count, kKept, rng.uniform()) : count;
     std::copy(next, next + size, entries);
   }
   for (int e = 0; e < size; ++e) {

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "core/geometry/ray_caster.h"
+#include "core/geometry/triangle_clusters.h"
 
 namespace isochron {
 
@@ -14,21 +14,50 @@ struct MeshIntersection {
   std::array<Vec3, 2> end;
 };
 
-/// All pairs that cross, by triangles. A segment ends where an edge of one triangle goes through the other, which a ray along
-/// each of the scene's edges finds. What merely touches is not found.
-std::vector<MeshIntersection> find_mesh_intersections(const Scene& scene, const RayCaster& caster);
-
-/// The same, again and again while vertices move, by the edges that may cross something: those near another shape, those of
-/// shapes that deform, and those that go through their own shape in the scene at first.
-class CrossingEdges {
+/// All pairs that cross, by triangles, kept while vertices move: what has moved is searched again. A segment ends where an
+/// edge of one triangle goes through the other. What merely touches is not found.
+class MeshIntersections {
  public:
-  explicit CrossingEdges(const Scene& at_first);
-  /// `scene` has the topology of the one at first.
-  std::vector<MeshIntersection> find(const Scene& scene, const RayCaster& caster) const;
+  /// Searches everywhere. `touching`: within this distance of its end an edge goes through nothing; at least 2^-20 of the
+  /// largest coordinate.
+  MeshIntersections(const Scene& at_first, double touching);
+  /// `scene` has the topology of the one at first. A shape that does not deform goes through itself where it did at first.
+  /// The result is the same whatever there was in between.
+  void update(const Scene& scene, double touching);
+  const std::vector<MeshIntersection>& segments() const { return segments_; }
 
  private:
-  std::vector<char> through_own_shape_;  ///< per edge
-  std::vector<int> shape_;               ///< per edge
+  /// An edge of the first triangle, or of the second, goes through the other here.
+  struct EdgeHit {
+    std::array<int, 2> triangle;
+    int edge;
+    Vec3 point;
+  };
+  /// Edges whose first face is in one cluster, with boxes that overlap those of the triangles that they go through.
+  struct ClusterEdges;
+
+  /// Those of shapes that have moved; `all_edges`: also within shapes that do not deform.
+  void find_hits(const Scene& scene, const std::vector<char>& moved, bool all_edges);
+  /// For each shape, those that its edges are to be tried against.
+  std::vector<std::vector<int>> partners(const Scene& scene, const std::vector<char>& moved, bool all_edges) const;
+  void fill(const Scene& scene, ClusterEdges& edges) const;
+  /// Against the triangles below the node: all of them; one whose box overlaps the node's.
+  void meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
+            std::vector<EdgeHit>& hits) const;
+  void meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,
+            std::vector<EdgeHit>& hits) const;
+  void try_edge(const Scene& scene, int number, int triangle, std::vector<EdgeHit>& hits) const;
+  void join(const Scene& scene);
+
+  TriangleClusters clusters_;
+  std::vector<int> edges_;                  ///< cluster by cluster
+  std::vector<int> first_edge_;             ///< of each cluster, and the end
+  std::vector<char> through_own_shape_;     ///< of each edge: in the scene at first
+  std::vector<char> shape_pierces_itself_;  ///< one of its edges does
+  std::vector<Vec3> positions_;             ///< at the last update
+  double touching_;
+  std::vector<EdgeHit> hits_;
+  std::vector<MeshIntersection> segments_;
 };
 
 }  // namespace isochron

@@ -19,8 +19,7 @@ RTCDevice device() {
 
 }  // namespace
 
-RayCaster::RayCaster(const Scene& scene, CasterUpdate update) : update_(update) {
-  set_offset(scene);
+RayCaster::RayCaster(const Scene& scene, CasterUpdate update) : update_(update), offset_(ray_offset(scene)) {
   build(scene);
 }
 
@@ -28,12 +27,12 @@ RayCaster::~RayCaster() {
   rtcReleaseScene(scene_);
 }
 
-void RayCaster::set_offset(const Scene& scene) {
+double ray_offset(const Scene& scene) {
   double largest = 0;
   for (const Vec3& p : scene.positions) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   const Vec3& c = scene.camera.position;
   largest = std::max({largest, std::abs(c.x), std::abs(c.y), std::abs(c.z)});
-  offset_ = largest * 0x1p-20;
+  return largest * 0x1p-20;
 }
 
 void RayCaster::build(const Scene& scene) {
@@ -82,7 +81,7 @@ void RayCaster::fill_vertices(const Scene& scene, unsigned geometry, int first_v
 }
 
 void RayCaster::update(const Scene& scene, const std::vector<char>& moved_shapes) {
-  set_offset(scene);
+  offset_ = ray_offset(scene);
   if (std::find(moved_shapes.begin(), moved_shapes.end(), 1) == moved_shapes.end()) return;
   if (update_ == CasterUpdate::rebuild) {
     rtcReleaseScene(scene_);

@@ -17,6 +17,9 @@ enum class CasterUpdate {
   refit  ///< boxes of shapes that moved are adapted in a thirtieth of the time, others stay; rays take a tenth longer
 };
 
+/// RayCaster::offset of the scene.
+double ray_offset(const Scene& scene);
+
 class RayCaster {
  public:
   explicit RayCaster(const Scene& scene, CasterUpdate update = CasterUpdate::rebuild);
@@ -75,7 +78,6 @@ class RayCaster {
   void build(const Scene& scene);
   void attach(const Scene& scene, int first_vertex, int vertices, int first_triangle, int triangles);
   void fill_vertices(const Scene& scene, unsigned geometry, int first_vertex, int vertices) const;
-  void set_offset(const Scene& scene);
 
   const CasterUpdate update_;
   RTCScene scene_ = nullptr;

@@ -45,10 +45,13 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
 }
 
 void Differentiable::find_bounds(const Scene& scene) {
-  bounds = {};
+  std::vector<std::uint8_t> counts(scene.positions.size(), 0);  // each vertex once
   for (std::size_t t = 0; t < triangle.size(); ++t)
     if (triangle[t])
-      for (int v : scene.triangles[t].vertex) bounds.add(scene.positions[v]);
+      for (const int v : scene.triangles[t].vertex) counts[v] = 1;
+  bounds = {};
+  for (std::size_t v = 0; v < counts.size(); ++v)
+    if (counts[v]) bounds.add(scene.positions[v]);
 }
 
 }  // namespace isochron

@@ -9,8 +9,8 @@ namespace isochron {
 
 enum class Sampling { automatic, standard, ellipsoidal };
 
-/// How ellipsoidal connections pick one of the arcs on an ellipsoid: in proportion to what each would carry if nothing
-/// stood in the way, or (cheaper, far noisier; the paper's way) uniformly.
+/// How ellipsoidal connections choose among the arcs on an ellipsoid: several in proportion to what each would carry if
+/// nothing stood in the way, or (cheaper, far noisier; the paper's way) one uniformly.
 enum class ArcPick { contribution, uniform };
 
 /// The first numbers of each sample: together the samples of a technique cover evenly what they are taken from, in each
@@ -52,9 +52,10 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// In [0, 1): while a camera's path by standard sampling has not met what parameters change, the probability that its next
-  /// vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF. Derivatives alone.
-  double hidden = 0;
+  /// In [0, 1): while a path by standard sampling has not met hidden shapes (Shape::hidden), the probability that its next
+  /// vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the reflection of a capture's wall; none:
+  /// the default, see Worker. Of camera's paths and of what follows x1 in captures, derivatives alone.
+  std::optional<double> hidden = {};
   /// How far path vertices follow what is close to them and moves otherwise, see VertexFlows; 0: not at all. Any values
   /// give the same derivative, with other variances, divided otherwise between the interior and the visibility term.
   double follow = 1;         ///< all but what the camera sees: in radii of the smaller body
@@ -81,10 +82,12 @@ struct SampleRange {
   int count() const { return end - begin; }
 };
 
-/// Work of so many rays, and triangles tested for arcs, in rays: an arc takes 1.3 times as long, measured on the cube
-/// and the box.
+/// How many times as long as a ray a triangle takes that is tested for an arc, measured on the cube and the box.
+inline constexpr double kRaysPerArc = 1.3;
+
+/// Work of so many rays, and triangles tested for arcs, in rays.
 inline double work(long long rays, long long arcs) {
-  return static_cast<double>(rays) + 1.3 * static_cast<double>(arcs);
+  return static_cast<double>(rays) + kRaysPerArc * static_cast<double>(arcs);
 }
 
 }  // namespace isochron

@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/base/random.h"
+#include "core/paths/path.h"
 
 namespace isochron {
 
@@ -102,10 +104,10 @@ void PreparedScene::update_record(int t) {
   TriangleRecord& record = records_[t];
   const auto& v = record.vertex;
   const Vec3 &a = scene.positions[v[0]], &b = scene.positions[v[1]], &c = scene.positions[v[2]];
+  const Vec3 edge[] = {b - a, c - a}, normal = cross(edge[0], edge[1]);
   record.origin = a;
-  record.edge[0] = b - a;
-  record.edge[1] = c - a;
-  const Vec3 normal = cross(record.edge[0], record.edge[1]);
+  record.edge[0] = edge[0];
+  record.edge[1] = edge[1];
   const double doubled = length(normal);
   record.area = 0.5 * doubled;
   // A triangle that the parameters have flattened to nothing has a zero normal: no ray or ellipse meets it.
@@ -127,10 +129,11 @@ Vec3 PreparedScene::texture_gradient(const SurfacePoint& x) const {
 
 void PreparedScene::update_hidden() {
   if (revision_ == 1) {
+    const bool any = std::any_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.hidden; });
     std::vector<int> triangles;
     std::vector<Vec3> centers;
     for (int t = 0; t < static_cast<int>(records_.size()); ++t) {
-      if (!scene.shapes[records_[t].shape].hidden) continue;
+      if (any ? !scene.shapes[records_[t].shape].hidden : !captures()) continue;
       triangles.push_back(t);
       centers.push_back(records_[t].origin + (records_[t].edge[0] + records_[t].edge[1]) / 3);
     }
@@ -159,6 +162,37 @@ void PreparedScene::update_hidden() {
   }
   hidden = HiddenGeometry(std::move(triangles), areas);
   hidden_is_all = hidden_order_.size() == records_.size();
+  if (revision_ == 1) hidden_suffices = hidden_is_all && captures() && area_suits_first_vertices();
+  const auto changes = [](const std::vector<std::uint8_t>& which) {
+    return std::ranges::count(which, 0) < std::ssize(which);
+  };
+  gradients_are_hidden = first_gradients_are_hidden = !hidden.empty() && !differentiable.every_path &&
+                                                      !changes(differentiable.light) &&
+                                                      !changes(differentiable.emission);
+  for (int t = 0; first_gradients_are_hidden && t < static_cast<int>(records_.size()); ++t) {
+    if (!records_[t].has_gradient || records_[t].hidden || records_[t].area == 0) continue;
+    gradients_are_hidden = false;
+    first_gradients_are_hidden = captures() && !seen(t);
+  }
+}
+
+bool PreparedScene::area_suits_first_vertices() const {
+  constexpr int kPoints = 1024;
+  double sum = 0, squares = 0;
+  for (int i = 0; i < kPoints && !hidden.empty(); ++i) {
+    Rng rng(Stream{}, static_cast<std::uint64_t>(i), 0);
+    const int pixel = std::min(static_cast<int>(rng.uniform() * pixels()), pixels() - 1);
+    double u0 = rng.uniform();
+    const double u1 = rng.uniform();
+    const SurfacePoint s = sensor_point(pixel), x = sample_hidden(u0, u1);
+    const Vec3 d = x.p - s.p;
+    const double r = length(d);
+    if (!(r > 0) || (!(dot(x.n, d) < 0) && !two_sided(x.triangle) && !transparent(x.triangle))) continue;
+    const double weight = importance(pixel, d / r) * solid_angle_to_area(s.p, x) / hidden.pdf();
+    sum += weight;
+    squares += weight * weight;
+  }
+  return squares <= sum;
 }
 
 void PreparedScene::update_lights() {

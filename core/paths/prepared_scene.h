@@ -23,9 +23,6 @@
 
 namespace isochron {
 
-/// Of the x1 of a capture's paths, the fraction drawn by hidden geometry sampling where the wall's reflection draws the others.
-inline constexpr double kHiddenShare = 0.5;
-
 /// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
 class PreparedScene {
  public:
@@ -58,6 +55,10 @@ class PreparedScene {
   HiddenGeometry hidden;
   /// Whether hidden geometry sampling can draw every point that a sensor point sees.
   bool hidden_is_all = false;
+  /// And whether it does so better by itself than along with the wall's reflection; decided by the scene at first.
+  bool hidden_suffices = false;
+  /// Whether it finds every vertex, or every first vertex of a capture's paths, that gives its path a derivative.
+  bool gradients_are_hidden = false, first_gradients_are_hidden = false;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -84,13 +85,14 @@ class PreparedScene {
     if (!captures()) return camera.image_area_per_solid_angle(w);
     return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
   }
-  /// The fraction of the x1 of a capture's paths that hidden geometry sampling draws.
-  double hidden_share() const { return hidden.empty() ? 0 : hidden_is_all ? 1 : kHiddenShare; }
-  /// Density per area of x1, which the sensor point sees, where Worker::start_path draws it; `received`: what the wall makes
-  /// of light from there, importance per area, which is the density of the wall's own reflection.
-  double first_vertex_pdf(const SurfacePoint& x1, double received) const {
-    const double share = hidden_share();
-    return share * (is_hidden(x1.triangle) ? hidden.pdf() : 0) + (1 - share) * received;
+  /// Density per area of a path's next vertex on `triangle`, which the one before sees: hidden geometry sampling of that share,
+  /// or another way, of density `pdf`, takes it, whichever finds it the more often.
+  double next_vertex_pdf(int triangle, double share, double pdf) const {
+    return std::max(hidden_pdf(triangle, share), (1 - share) * pdf);
+  }
+  /// Whether it is hidden geometry sampling.
+  bool hidden_takes(int triangle, double share, double pdf) const {
+    return hidden_pdf(triangle, share) >= (1 - share) * pdf;
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
@@ -155,6 +157,8 @@ class PreparedScene {
     return i < differentiable.light.size() && differentiable.light[i];
   }
   bool is_hidden(int triangle) const { return records_[triangle].hidden; }
+  /// Of hidden geometry sampling of that share, per area.
+  double hidden_pdf(int triangle, double share) const { return is_hidden(triangle) ? share * hidden.pdf() : 0; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
   void for_each_moving_corner(int triangle, F&& f) const {
@@ -210,10 +214,14 @@ class PreparedScene {
     const double b1 = dot(cross(d, r.edge[1]), n), b2 = dot(cross(r.edge[0], d), n);
     return {1 - b1 - b2, b1, b2};
   }
+  /// The triangle as clip_ellipse takes it.
+  FocalTriangle focal_triangle(const Foci& foci, int triangle) const {
+    const TriangleRecord& r = records_[triangle];
+    return FocalTriangle(foci, r.origin, r.edge);
+  }
   /// What the ellipsoid's surface leaves on the triangle; false for nothing.
   bool clip(const Ellipsoid& ellipsoid, int triangle, EllipseArcs& arcs) const {
-    const TriangleRecord& r = records_[triangle];
-    return clip_ellipse(ellipsoid, r.origin, r.origin + r.edge[0], r.origin + r.edge[1], arcs);
+    return clip_ellipse(ellipsoid, focal_triangle(ellipsoid, triangle), arcs);
   }
   /// Signed distance of p from the triangle's plane, positive on the normal's side.
   double height_over(int triangle, const Vec3& p) const {
@@ -284,6 +292,9 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_hidden();
+  /// Whether what the wall makes of unit radiance from points drawn by area on hidden geometry has, over their density, no larger
+  /// mean square than from points drawn by the wall's reflection, each of which counts as one.
+  bool area_suits_first_vertices() const;
   double texture_at(const SurfacePoint& x) const {
     const auto b = barycentrics(x);
     const auto& v = records_[x.triangle].vertex;

@@ -53,11 +53,13 @@ bool is_flat(const PreparedScene& scene, const Edge& edge) {
 bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int>& body_of_vertex) {
   const Scene& scene = prepared.scene;
   const Differentiable& differentiable = prepared.differentiable;
-  int body = -1;
+  int body = -1, shape = -1;
   for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
     if (!differentiable.triangle[t]) continue;
     const int i = static_cast<int>(t), own = body_of_vertex[scene.triangles[t].vertex[0]];
-    if (prepared.two_sided(i) || prepared.transparent(i)) return false;
+    if (std::exchange(shape, scene.triangles[t].shape) != scene.triangles[t].shape &&
+        (prepared.two_sided(i) || prepared.transparent(i)))
+      return false;
     if (body < 0) body = own;
     if (own != body) return false;
   }
@@ -149,12 +151,15 @@ void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies)
 void VertexFlows::find_patches(const PreparedScene& prepared, const std::vector<char>& near) {
   const Scene& scene = prepared.scene;
   const std::size_t edges = scene.edges.size();
-  constexpr std::size_t kChunk = 4096;
+  constexpr std::size_t kChunk = 4096, kAhead = 8;
   std::vector<char> joined(edges), near_triangle(scene.triangles.size());
   parallel(static_cast<int>((edges + kChunk - 1) / kChunk), [&](int chunk) {
     const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
-    for (std::size_t e = begin; e < std::min(begin + kChunk, edges); ++e) {
+    const std::size_t end = std::min(begin + kChunk, edges);
+    for (std::size_t e = begin; e < end; ++e) {
       const Edge& edge = scene.edges[e];
+      if (e + kAhead < end)
+        for (const int t : scene.edges[e + kAhead].face) prepared.prefetch(std::max(t, 0));
       joined[e] = near[body_of_vertex_[edge.vertex[0]]] && is_flat(prepared, edge);
     }
   });

@@ -167,7 +167,7 @@ void Passes::learn() const {
   if (ready->edges)
     ready->edges->update(scene, options.boundary.wedge);
   else
-    ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->crossing() : nullptr);
+    ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->at_first() : nullptr);
   Guide::Each<bool> possible;
   const bool captures = scene.captures(), secondary_edges = edges().has_secondary();
   possible[Guide::primary] = edges().has_primary() && !captures;
@@ -185,9 +185,8 @@ void Passes::learn() const {
   constexpr int kPartitions = kMostPartitions;  // their sums are few records
   std::vector<std::vector<GuideRecord>> records(kPartitions);
   std::vector<Guide::Each<double>> costs(kPartitions);
-  const RankPart own = part_of_rank(rank(), kPartitions);
-  parallel(own.end - own.begin, [&](int i) {
-    const int partition = own.begin + i;
+  SharedPartitions shared(kPartitions, partition_costs(PassKind::edges, kPartitions));
+  shared.run([&](int partition) {
     GuideSink sink(gates, scene.layout, *basis);
     Worker worker(scene, gates, options, every_gate, sink);
     auto& cost = costs[partition];
@@ -214,8 +213,8 @@ void Passes::learn() const {
     records[partition] = std::move(sink.records);
     count(worker);
   });
-  complete(records);
-  complete(costs);
+  complete(shared.parts, records, costs, shared.costs);
+  shared.keep_costs();
   std::vector<GuideRecord> all;
   Guide::Each<double> cost{};
   for (int partition = 0; partition < kPartitions; ++partition) {

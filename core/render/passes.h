@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 
+#include "core/base/partition_sum.h"
 #include "core/base/random.h"
 #include "core/base/ranks.h"
 #include "core/films/sinks.h"
@@ -84,6 +85,11 @@ class Passes {
 
   /// Where the time of a pass counts; null: nowhere.
   PassTimes* times() const { return cache_ ? &cache_->times() : nullptr; }
+
+  /// What the partitions of a pass took when it was last run with as many; null: not known.
+  PartitionCosts* partition_costs(PassKind kind, int partitions) const {
+    return cache_ && rank_count() > 1 ? &cache_->partition_costs(kind, partitions) : nullptr;
+  }
 
   /// Runs f(pixel) for the pixels of one partition, in a fixed order.
   template <class F>

@@ -29,12 +29,10 @@ struct Renderer::Impl : Passes {
 
   /// run(partition) of every partition, whose samples add to pixels of its own alone, and so need no sums.
   template <class Run>
-  void run_in_pixels(std::span<GatedImage> images, Run&& run) const {
+  void run_in_pixels(PassKind kind, std::span<GatedImage> images, Run&& run) const {
     const int count = Partition{0, kMostPartitions}.pixel_parts(scene.pixels());
-    const RankPart own = part_of_rank(rank(), count);
-    parallel(own.end - own.begin, [&](int i) { run(Partition{own.begin + i, count}); });
-    std::vector<int> partitions(count);
-    std::iota(partitions.begin(), partitions.end(), 0);
+    SharedPartitions shared(count, partition_costs(kind, count));
+    shared.run([&](int partition) { run(Partition{partition, count}); });
     const auto exchange = [&](int partition, auto&& values_of_pixel) {
       for_each_pixel({partition, count}, scene.pixels(), [&](int pixel) {
         for (GatedImage& image : images) {
@@ -44,13 +42,23 @@ struct Renderer::Impl : Passes {
       });
     };
     complete(
-        partitions,
+        shared.parts,
         [&](Packer& packer, int partition) {
+          packer.put(shared.costs[partition]);
           exchange(partition, [&](const double* values, std::size_t n) { packer.put(values, n); });
         },
         [&](Unpacker& unpacker, int partition) {
+          unpacker.get(shared.costs[partition]);
           exchange(partition, [&](double* values, std::size_t n) { unpacker.get(values, n); });
         });
+    shared.keep_costs();
+  }
+
+  /// The sum of what run(partition) makes of each.
+  template <class Sum, class Run>
+  Sum sum_of(PassKind kind, int partitions, Run&& run) const {
+    SharedPartitions shared(partitions, partition_costs(kind, partitions));
+    return sum_of_partitions<Sum>(shared, run);
   }
 
   /// Of a gradient. Partitions take turns at blocks of pixels.
@@ -135,11 +143,11 @@ void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange
     impl_->run_images({stream, range}, partition, sink);
   };
   if (pixels_are_independent() && impl_->has_many_pixels()) {
-    impl_->run_in_pixels({&image, 1}, [&](Partition partition) { run(image, partition); });
+    impl_->run_in_pixels(PassKind::primal, {&image, 1}, [&](Partition partition) { run(image, partition); });
     return;
   }
   const int partitions = impl_->partitions_for(range, image.data.size());
-  const auto sum = sum_of_partitions<SparseSum>(partitions, [&](int partition) {
+  const auto sum = impl_->sum_of<SparseSum>(PassKind::primal, partitions, [&](int partition) {
     SparseSum own(image.data.size());
     run({image, own, 0}, {partition, partitions});
     return own;
@@ -161,12 +169,12 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
   };
   if (pixels_are_independent(term) && impl_->has_many_pixels()) {
     const std::vector<Film> films(images.begin(), images.end());
-    impl_->run_in_pixels(images, [&](Partition partition) { run(films, partition); });
+    impl_->run_in_pixels(pass_kind(term), images, [&](Partition partition) { run(films, partition); });
     return images;
   }
   const std::size_t size = images[0].data.size(), values = size * columns;
   const int partitions = impl_->partitions_for(range, values);
-  const auto sum = sum_of_partitions<SparseSum>(partitions, [&](int partition) {
+  const auto sum = impl_->sum_of<SparseSum>(pass_kind(term), partitions, [&](int partition) {
     SparseSum own(values);
     std::vector<Film> films;
     for (int column = 0; column < columns; ++column) films.emplace_back(images[column], own, column * size);
@@ -189,7 +197,8 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   const GatePick pick(impl_->gates, adjoint);
   const int partitions = impl_->partitions_for(range, basis.entries.size());  // at least as many as are touched
   std::vector<std::vector<double>> by_partition(parts ? partitions : 0, std::vector<double>(basis.columns, 0.0));
-  const auto sum = sum_of_partitions<SparseSum>(partitions, [&](int partition) {
+  SharedPartitions shared(partitions, impl_->partition_costs(pass_kind(term), partitions));
+  const auto sum = sum_of_partitions<SparseSum>(shared, [&](int partition) {
     SparseSum own(dof_gradient.size());
     AdjointSink sink(impl_->gates, impl_->scene.layout, basis, adjoint, own);
     impl_->run_term(term, {stream, range}, {partition, partitions}, pick, sink);
@@ -200,7 +209,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
       });
     return own;
   });
-  complete(by_partition);
+  if (parts) complete(shared.parts, by_partition);
   sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
   // Whatever the number of partitions, each part is of the same pixels, see part_of.
   const int pixels = impl_->scene.pixels();
@@ -224,7 +233,7 @@ ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange rang
   blank.by_shape.assign(impl.scene.scene.shapes.size(), 0.0);
   if (impl.scene.emitters.empty()) return blank;
   const int partitions = impl.partitions_for(range, blank.image.data.size());
-  const Sum sum = sum_of_partitions<Sum>(partitions, [&](int partition) {
+  const Sum sum = impl.sum_of<Sum>(PassKind::primal, partitions, [&](int partition) {
     Sum own = blank;
     ImageBreakdownSink sink(impl.scene, impl.gates, own);
     impl.run_images({stream, range}, {partition, partitions}, sink);
@@ -270,7 +279,7 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
   }
   const GatePick pick(impl.gates, largest);
   const int partitions = impl.partitions_for(range, sum.by_bounces.size() + sum.by_gate.size() + sum.by_shape.size());
-  const Sum all = sum_of_partitions<Sum>(partitions, [&](int partition) {
+  const Sum all = impl.sum_of<Sum>(pass_kind(term), partitions, [&](int partition) {
     Sum own = sum;
     GradientBreakdownSink sink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own);
     impl.run_term(term, {stream, range}, {partition, partitions}, pick, sink);

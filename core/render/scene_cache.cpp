@@ -31,10 +31,4 @@ std::shared_ptr<ReadyScene> SceneCache::take(const Scene& scene, const TangentBa
           }};
 }
 
-const CrossingEdges& SceneCache::crossing() {
-  const std::lock_guard lock(mutex_);
-  if (!crossing_) crossing_.emplace(at_first_);
-  return *crossing_;
-}
-
 }  // namespace isochron

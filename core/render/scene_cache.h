@@ -1,11 +1,14 @@
 // Scenes made ready for rendering, kept from one evaluation to the next, so that each pays for what has changed alone.
 #pragma once
 #include <atomic>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
+#include "core/base/partition_sum.h"
 #include "core/paths/prepared_scene.h"
 #include "core/render/pass_times.h"
 #include "core/techniques/boundary_edges.h"
@@ -26,14 +29,15 @@ class SceneCache {
 
   /// The scene made ready, for the caller alone until the pointer is gone. The same bits whatever was taken before.
   std::shared_ptr<ReadyScene> take(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow);
-  /// The edges to search for intersections of meshes.
-  const CrossingEdges& crossing();
+  const Scene& at_first() const { return at_first_; }
 
   /// Rays traced in its scenes so far.
   void count_rays(long long rays) { rays_ += rays; }
   long long rays() const { return rays_; }
   /// What passes over its scenes took so far.
   PassTimes& times() { return times_; }
+  /// What the partitions of a pass took when it was last run with so many. For ranks, whose passes come one by one.
+  PartitionCosts& partition_costs(PassKind kind, int partitions) { return partition_costs_[{kind, partitions}]; }
 
  private:
   const Scene& at_first_;
@@ -41,9 +45,9 @@ class SceneCache {
   std::mutex mutex_;
   std::vector<std::unique_ptr<ReadyScene>> idle_;
   int made_ = 0;
-  std::optional<CrossingEdges> crossing_;
   std::atomic<long long> rays_{0};
   PassTimes times_;
+  std::map<std::pair<PassKind, int>, PartitionCosts> partition_costs_;
 };
 
 }  // namespace isochron

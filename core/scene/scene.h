@@ -40,7 +40,7 @@ struct Shape {
   int first_triangle = 0, triangle_count = 0;
   bool deforms = false;   ///< parameters may move its vertices otherwise than as a rigid body
   bool textured = false;  ///< what Scene::texture says multiplies its material's BSDF
-  bool hidden = false;    ///< parameters change it: points of paths are drawn on it, see HiddenGeometry
+  bool hidden = false;    ///< points of paths are drawn on it, see HiddenGeometry
 };
 
 /// What becomes of the light that a pixel receives: a reading is gain x light + background.

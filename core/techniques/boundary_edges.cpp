@@ -39,8 +39,7 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
 
 }  // namespace
 
-BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const CrossingEdges* crossing)
-    : crossing_(crossing) {
+BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Scene* at_first) : at_first_(at_first) {
   update(scene, wedge);
 }
 
@@ -55,16 +54,22 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
     secondary_.weights.resize(count);
   };
   if (revision_ == 0) keep_edges_of_scene();
-  constexpr std::size_t kChunk = 4096;
+  constexpr std::size_t kChunk = 4096, kAhead = 8;
   std::vector<char> changed((count + kChunk - 1) / kChunk, 0);
   parallel(static_cast<int>(changed.size()), [&](int chunk) {
-    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
-    for (std::size_t i = begin; i < std::min(begin + kChunk, count); ++i) {
+    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk, end = std::min(begin + kChunk, count);
+    std::vector<std::size_t> edges;
+    for (std::size_t i = begin; i < end; ++i) {
       const auto& face = scene.scene.edges[i].face;
-      if (!all && scene.changed(face[0]) <= revision_ && (face[1] < 0 || scene.changed(face[1]) <= revision_)) continue;
-      update_edge(scene, i, wedge);
-      changed[chunk] = 1;
+      if (all || scene.changed(face[0]) > revision_ || (face[1] >= 0 && scene.changed(face[1]) > revision_))
+        edges.push_back(i);
     }
+    for (std::size_t k = 0; k < edges.size(); ++k) {
+      if (k + kAhead < edges.size())
+        for (const int t : scene.scene.edges[edges[k + kAhead]].face) scene.prefetch(std::max(t, 0));
+      update_edge(scene, edges[k], wedge);
+    }
+    changed[chunk] = !edges.empty();
   });
   if (std::find(changed.begin(), changed.end(), 1) != changed.end()) {
     keep_edges_of_scene();  // without the intersections of before
@@ -80,32 +85,42 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
 void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool wedge) {
   primary_.weights[i] = secondary_.weights[i] = 0;
   const Edge& e = scene.scene.edges[i];
-  BoundaryEdge& b = edges_[i] = {};
-  for (int k = 0; k < 2; ++k) b.vertex[k] = e.vertex[k], b.face[k] = e.face[k];
-  b.origin = scene.scene.positions[e.vertex[0]];
-  b.end = scene.scene.positions[e.vertex[1]];
-  const double edge_length = length(b.end - b.origin);
+  const int faces = e.face[1] < 0 ? 1 : 2;
+  const Vec3 &origin = scene.scene.positions[e.vertex[0]], &end = scene.scene.positions[e.vertex[1]];
+  const Vec3 d = end - origin;
+  const double edge_length = length(d);
   bool degenerate = !(edge_length > 0);
-  for (int k = 0; k < b.faces(); ++k) degenerate |= !(scene.area(b.face[k]) > 0);
-  if (degenerate) return;
-  const Vec3 tangent = (b.end - b.origin) / edge_length;
-  for (int k = 0; k < b.faces(); ++k) b.inward[k] = inward_direction(scene, b.face[k], e, tangent);
-  double angle = kPi;
-  if (b.faces() == 2) {
-    angle -= std::atan2(length(cross(b.inward[0], b.inward[1])), dot(b.inward[0], b.inward[1]));
-    if (angle < kCoplanarAngle) return;
+  for (int k = 0; k < faces; ++k) degenerate |= !(scene.area(e.face[k]) > 0);
+  const Vec3 tangent = degenerate ? Vec3() : d / edge_length;
+  Vec3 inward[2];
+  for (int k = 0; k < faces; ++k) inward[k] = inward_direction(scene, e.face[k], e, tangent);
+  double angle = degenerate ? 0 : kPi;
+  if (faces == 2 && !degenerate) angle -= std::atan2(length(cross(inward[0], inward[1])), dot(inward[0], inward[1]));
+  const bool sharp = angle >= kCoplanarAngle;
+  // Field by field: a copy of a whole edge would wait for the memory of those before.
+  BoundaryEdge& b = edges_[i];
+  for (int k = 0; k < 2; ++k) {
+    b.vertex[k] = e.vertex[k];
+    b.face[k] = e.face[k];
+    b.inward[k] = inward[k];
   }
-  b.azimuths = wedge ? angle : kPi;
-  b.moves = scene.differentiable.vertex[e.vertex[0]] || scene.differentiable.vertex[e.vertex[1]];
+  b.origin = origin;
+  b.end = end;
+  b.azimuths = !sharp ? 0 : wedge ? angle : kPi;
+  b.moves = sharp && (scene.differentiable.vertex[e.vertex[0]] || scene.differentiable.vertex[e.vertex[1]]);
+  if (!sharp) return;
   moves_[i] = b.moves;
   if (b.moves || scene.flows.camera_possible()) primary_.weights[i] = primary_weight(scene, b, b.azimuths);
   secondary_.weights[i] = edge_length * b.azimuths;
 }
 
 void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {
-  const auto all =
-      crossing_ ? crossing_->find(scene.scene, scene.caster) : find_mesh_intersections(scene.scene, scene.caster);
-  for (const MeshIntersection& p : all) {
+  if (!intersections_) {
+    const Scene& first = at_first_ ? *at_first_ : scene.scene;
+    intersections_.emplace(first, ray_offset(first));
+  }
+  intersections_->update(scene.scene, scene.caster.offset());
+  for (const MeshIntersection& p : intersections_->segments()) {
     BoundaryEdge b;
     b.origin = p.end[0];
     b.end = p.end[1];
@@ -146,15 +161,14 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
 }
 
 void BoundaryEdges::finish(Choice& choice) const {
-  double sum[2] = {0, 0};
-  for (std::size_t i = 0; i < edges_.size(); ++i) sum[moves_[i]] += choice.weights[i];
-  if (sum[0] > 0 && sum[1] > 0) {
-    std::vector<double> shares = choice.weights;
-    for (std::size_t i = 0; i < edges_.size(); ++i) shares[i] /= sum[moves_[i]];
-    choice.distribution = DiscreteDistribution(shares);
-  } else {
-    choice.distribution = DiscreteDistribution(choice.weights);
-  }
+  const std::vector<double>& weights = choice.weights;
+  double still = 0, moving = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) (moves_[i] ? moving : still) += weights[i];
+  if (still > 0 && moving > 0)
+    choice.distribution =
+        DiscreteDistribution(weights.size(), [&](std::size_t i) { return weights[i] / (moves_[i] ? moving : still); });
+  else
+    choice.distribution = DiscreteDistribution(weights);
 }
 
 BoundaryEdges::Pick BoundaryEdges::pick(const Choice& choice, double u) const {

@@ -1,5 +1,7 @@
 // Mesh edges as visibility boundaries: their geometry and how they are picked (theory section 5).
 #pragma once
+#include <optional>
+
 #include "core/base/discrete_distribution.h"
 #include "core/base/large_array.h"
 #include "core/geometry/mesh_intersections.h"
@@ -30,8 +32,8 @@ static_assert(sizeof(BoundaryEdge) == 128);
 class BoundaryEdges {
  public:
   /// `wedge`: pick edges and azimuths by the wedge of grazing directions (see BoundaryTechniques).
-  /// `crossing`: tells where to look for intersections of meshes, and outlives this; null: everywhere.
-  explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true, const CrossingEdges* crossing = nullptr);
+  /// `at_first`: the same scene with the parameters' initial values, for MeshIntersections, outlives this; null: this one.
+  explicit BoundaryEdges(const PreparedScene& scene, bool wedge = true, const Scene* at_first = nullptr);
   BoundaryEdges(const BoundaryEdges&) = delete;
   BoundaryEdges& operator=(const BoundaryEdges&) = delete;
   /// Makes anew what PreparedScene::update has changed since; `scene` is the same object. The result is the same whatever there
@@ -88,7 +90,8 @@ class BoundaryEdges {
   LargeArray<BoundaryEdge> edges_;   ///< those of the scene, then intersections of meshes
   std::vector<std::uint8_t> moves_;  ///< of each
   Choice primary_, secondary_;
-  const CrossingEdges* crossing_;
+  const Scene* at_first_;
+  std::optional<MeshIntersections> intersections_;
   int revision_ = 0;  ///< of the scene
   bool wedge_ = true, camera_possible_ = false;
 };

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/systematic_sampling.h"
+
 namespace isochron {
 
 void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
@@ -84,29 +86,30 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
   find_candidates(bvh, {y.p, y.n, 0, 1, has_front}, low, high, thinning);
 
   const Rgb factor = throughput * (1 / pdf_y);
-  ArcPair chosen;
-  const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
+  const auto choices = choose(pick, 2, [&](int t, ArcPair& arcs) {
     const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
     const bool two_sided = scene_.two_sided(t);
     if (!((side_x > 0 && side_y > 0) || (two_sided && side_x < 0 && side_y < 0))) return;
+    const FocalTriangle triangle = scene_.focal_triangle(foci, t);
     for (int i = 0; i < 2; ++i)
       if (target.present[i] && ellipsoids[i].valid())
-        surface_arc_point(ellipsoids[i], t, y, along, pixel, factor, arcs.side[i]);
+        surface_arc_point(ellipsoids[i], triangle, t, y, along, pixel, factor, arcs.side[i]);
   });
-  if (inverse_probability == 0) return;
-  for (int i = 0; i < 2; ++i) {
-    const ArcPoint& q = chosen.side[i];
-    if (q.value.is_black()) continue;
-    if (!worker_.visible(x, q.point)) continue;
-    worker_.path.push(scene_, q.point);
-    if (!path.retraces(y) && !worker_.visible(q.point, y)) {
+  for (const Choice& choice : choices) {
+    for (int i = 0; i < 2; ++i) {
+      const ArcPoint& q = arcs_[choice.arc].side[i];
+      if (q.value.is_black()) continue;
+      if (!worker_.visible(x, q.point)) continue;
+      worker_.path.push(scene_, q.point);
+      if (!path.retraces(y) && !worker_.visible(q.point, y)) {
+        worker_.path.pop();
+        continue;
+      }
+      worker_.path.push(scene_, y);
+      deliver(target, i, q, choice.inverse_probability, &ArcDensities::surface);
       worker_.path.pop();
-      continue;
+      worker_.path.pop();
     }
-    worker_.path.push(scene_, y);
-    deliver(target, i, q, inverse_probability, &ArcDensities::surface);
-    worker_.path.pop();
-    worker_.path.pop();
   }
 }
 
@@ -119,7 +122,20 @@ void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const Elli
   else
     bvh.sample_surfaces(focus(), other, low, high, thinning, worker_.candidates, worker_.inverse_probability);
   for (const int t : worker_.candidates) scene_.prefetch(t);
+  const Path& path = worker_.path;
+  if (path.size() > 1) back_ = normalize(path.vertex[path.size() - 2].p - path.back().p);
   worker_.arcs += 1 + worker_.candidates.size();
+}
+
+Directions EllipsoidalConnections::scattering_to(const Vec3& w) const {
+  Directions d;
+  d.n = worker_.path.back().n;
+  d.w_o = back_;
+  d.w_i = w;
+  d.cos_o = dot(d.n, d.w_o);
+  d.cos_i = dot(d.n, d.w_i);
+  d.cos_io = dot(d.w_o, d.w_i);
+  return d;
 }
 
 EllipsoidBvh::Focus EllipsoidalConnections::focus() const {
@@ -148,56 +164,55 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
 
   const Foci foci(x.p, x.p);
   const Ellipsoid spheres[2] = {{foci, 2 * (target.tau[0] - before)}, {foci, 2 * (target.tau[1] - before)}};
-  ArcPair chosen;
-  const double inverse_probability = choose(pick, chosen, [&](int t, ArcPair& arcs) {
+  const auto choices = choose(pick, 1, [&](int t, ArcPair& arcs) {
     if (!(scene_.height_over(t, x.p) > 0) || !any_arc_contributes(t)) return;
+    const FocalTriangle triangle = scene_.focal_triangle(foci, t);
     for (int i = 0; i < 2; ++i)
       if (target.present[i] && spheres[i].valid())
-        emitter_arc_point(spheres[i], t, along, pixel, throughput, arcs.side[i]);
+        emitter_arc_point(spheres[i], triangle, t, along, pixel, throughput, arcs.side[i]);
   });
-  if (inverse_probability == 0) return;
-  for (int i = 0; i < 2; ++i) {
-    const ArcPoint& y = chosen.side[i];
-    if (y.value.is_black()) continue;
-    if (!worker_.visible(x, y.point)) continue;
-    worker_.path.push(scene_, y.point);
-    deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
-    worker_.path.pop();
+  for (const Choice& choice : choices) {
+    for (int i = 0; i < 2; ++i) {
+      const ArcPoint& y = arcs_[choice.arc].side[i];
+      if (y.value.is_black()) continue;
+      if (!worker_.visible(x, y.point)) continue;
+      worker_.path.push(scene_, y.point);
+      deliver(target, i, y, choice.inverse_probability, &ArcDensities::emitter);
+      worker_.path.pop();
+    }
   }
 }
 
 template <class F>
-double EllipsoidalConnections::choose(double pick, ArcPair& chosen, F&& sample) const {
+std::span<const EllipsoidalConnections::Choice> EllipsoidalConnections::choose(double pick, int rays, F&& sample) {
   const std::vector<int>& candidates = worker_.candidates;
-  if (candidates.empty()) return 0;
+  const int count = static_cast<int>(candidates.size());
+  arcs_.clear();
+  choices_.clear();
+  const auto evaluate = [&](int candidate, double inverse_probability) {
+    ArcPair& arcs = arcs_.emplace_back();
+    sample(candidates[candidate], arcs);
+    if (const double weight = arcs.weight(); weight > 0)
+      choices_.push_back({static_cast<int>(arcs_.size()) - 1, weight * inverse_probability, inverse_probability});
+    else
+      arcs_.pop_back();
+  };
   if (worker_.options.pick == ArcPick::uniform) {
-    const int count = static_cast<int>(candidates.size());
-    sample(candidates[std::min(static_cast<int>(pick * count), count - 1)], chosen);
-    return chosen.weight() > 0 ? count : 0;
+    if (count > 0) evaluate(std::min(static_cast<int>(pick * count), count - 1), count);
+    return choices_;
   }
-  double total = 0;
-  const std::vector<double>& inverse_probability = worker_.inverse_probability;
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    ArcPair arcs;
-    sample(candidates[i], arcs);
-    const double weight = arcs.weight() * inverse_probability[i];
-    if (!(weight > 0)) continue;
-    total += weight;
-    const double share = weight / total;
-    if (pick < share) {
-      chosen = arcs;
-      pick /= share;
-    } else {
-      pick = (pick - share) / (1 - share);
-    }
-  }
-  return total > 0 ? total / chosen.weight() : 0;
+  for (int i = 0; i < count; ++i) evaluate(i, worker_.inverse_probability[i]);
+  const int tested = std::max(1, static_cast<int>(count * kRaysPerArc / rays));
+  const int carrying = static_cast<int>(choices_.size());
+  if (carrying > tested) choices_.resize(sample_systematically(choices_.data(), carrying, tested, pick));
+  return choices_;
 }
 
-void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t, const SurfacePoint& y, double along,
-                                               int pixel, const Rgb& factor, ArcPoint& out) const {
+void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t,
+                                               const SurfacePoint& y, double along, int pixel, const Rgb& factor,
+                                               ArcPoint& out) const {
   EllipseArcs arcs;
-  if (!scene_.clip(ellipsoid, t, arcs)) return;
+  if (!clip_ellipse(ellipsoid, triangle, arcs)) return;
   const SurfacePoint q{arcs.point_at(along), scene_.normal(t), t};
   const Path& path = worker_.path;
   const SurfacePoint& x = path.back();
@@ -205,7 +220,8 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t
   const Scattering s(x.p, q, y.p);
   const double cos_y = is_light(y.triangle) ? 1 : -dot(y.n, s.w_i);
   if (!(cos_y > 0)) return;
-  double carried = std::abs(s.cos_i * s.cos_o) * cos_y / (s.distance_i * s.distance_i * s.distance_o * s.distance_o);
+  const double distances = s.distance_i * s.distance_o;
+  double carried = std::abs(s.cos_i * s.cos_o) * cos_y / (distances * distances);
   Rgb f = bsdf_value(scene_, q, s);
   out.pixel = pixel;
   if (path.size() == 1) {
@@ -213,21 +229,21 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, int t
     if (out.pixel < 0) return;
     carried *= scene_.importance(out.pixel, -s.w_o);
   } else {
-    const Scattering at_x(path.vertex[path.size() - 2].p, x, q.p);
+    const Directions at_x = scattering_to(-s.w_o);
     carried *= std::abs(at_x.cos_i);
     f *= bsdf_value(scene_, x, at_x);
   }
   if (!(carried > 0) || f.is_black()) return;
-  const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n);
+  const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, s.distance_o, s.distance_i, q.n);
   out.pdf = 1 / area;
   out.value = factor * scene_.emitted(y, -s.w_i) * f * (carried * area);
   out.point = q;
 }
 
-void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, double along, int pixel,
-                                               const Rgb& throughput, ArcPoint& out) const {
+void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, const FocalTriangle& triangle, int t,
+                                               double along, int pixel, const Rgb& throughput, ArcPoint& out) const {
   EllipseArcs arcs;
-  if (!scene_.clip(sphere, t, arcs)) return;
+  if (!clip_ellipse(sphere, triangle, arcs)) return;
   const SurfacePoint y{arcs.point_at(along), scene_.normal(t), t};
   const Path& path = worker_.path;
   const SurfacePoint& x = path.back();
@@ -244,7 +260,7 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, int t, d
     if (out.pixel < 0) return;
     carried *= scene_.camera.image_area_per_solid_angle(w);
   } else {
-    const Scattering at_x(path.vertex[path.size() - 2].p, x, y.p);
+    const Directions at_x = scattering_to(w);
     carried *= std::abs(at_x.cos_i);
     f = bsdf_value(scene_, x, at_x);
   }

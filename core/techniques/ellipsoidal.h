@@ -5,9 +5,9 @@
 //   emitter arcs   the emitter's point itself is put on a circle at the distance that is left.
 // Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
 // that ends outside is found by emitter arcs, whatever it went through before.
-// Every crossing arc is sampled once; only which of them gets its visibility tested is a random pick, so the density
-// of a technique is one over the arc's span. (The pick by contribution evaluates all arcs; the uniform one evaluates
-// the picked arc alone.)
+// Every crossing arc is sampled once; only which of them get their visibility tested is a random choice, so the density
+// of a technique is one over the arc's span. (The choice by contribution evaluates all arcs and tests as many of them as
+// cost about as much again; the uniform one evaluates and tests one arc alone.)
 #pragma once
 #include <span>
 #include <vector>
@@ -73,17 +73,25 @@ class EllipsoidalConnections {
   /// The path's last vertex with the half space that it scatters into; the camera with its field of view.
   EllipsoidBvh::Focus focus() const;
 
-  /// Picks one of the candidates' arcs, which sample(triangle, arcs) fills in: uniformly, or in proportion to the
-  /// unshadowed contribution (a weighted reservoir that re-uses one number). Returns one over the probability (times
-  /// what the candidates themselves were chosen with), 0 where nothing is carried.
+  /// An arc to test.
+  struct Choice {
+    int arc;                     ///< number in arcs_
+    double weight;               ///< unshadowed contribution over the probability
+    double inverse_probability;  ///< one over the probability to be chosen, candidates' own included
+  };
+  /// Chooses some of the candidates' arcs, which sample(triangle, arcs) fills in: one uniformly, or several in proportion to
+  /// the unshadowed contribution, as many as take about as long to test, by `rays` for each side of a pair, as all arcs took to
+  /// evaluate. One random number does for all. Arcs that carry nothing are left out.
   template <class F>
-  double choose(double pick, ArcPair& chosen, F&& sample) const;
+  std::span<const Choice> choose(double pick, int rays, F&& sample);
 
   /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.
-  void surface_arc_point(const Ellipsoid& ellipsoid, int t, const SurfacePoint& y, double along, int pixel,
-                         const Rgb& factor, ArcPoint& out) const;
-  void emitter_arc_point(const Ellipsoid& sphere, int t, double along, int pixel, const Rgb& throughput,
-                         ArcPoint& out) const;
+  void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, const SurfacePoint& y,
+                         double along, int pixel, const Rgb& factor, ArcPoint& out) const;
+  void emitter_arc_point(const Ellipsoid& sphere, const FocalTriangle& triangle, int t, double along, int pixel,
+                         const Rgb& throughput, ArcPoint& out) const;
+  /// At the path's last vertex, which is not its first: from the one before, to the unit direction `w`.
+  Directions scattering_to(const Vec3& w) const;
 
   /// Share of a contribution found by `technique`, over the connections' share of the samples.
   double mis_weight(const TargetLength& target, int i, const ArcPoint& found, double ArcDensities::*technique) const;
@@ -97,6 +105,9 @@ class EllipsoidalConnections {
   const GatePass pass_;
   LengthReceiver* const receiver_;
   std::vector<TargetLength> targets_;
+  std::vector<ArcPair> arcs_;
+  Vec3 back_;  ///< unit direction from the path's last vertex to the one before
+  std::vector<Choice> choices_;
 };
 
 }  // namespace isochron

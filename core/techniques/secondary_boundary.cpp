@@ -236,8 +236,8 @@ double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint&
   const Vec3 eye = scene_.sensor_point(pixel).p;
   const double received = scene_.importance(pixel, normalize(x1.p - eye)) * solid_angle_to_area(eye, x1);
   // Segments from an edge serve all pixels of a camera, but one of a capture.
-  const double found =
-      scene_.captures() ? scene_.first_vertex_pdf(x1, received) : worker_.pick.rate(pixel) * received / scene_.pixels();
+  const double found = scene_.captures() ? scene_.next_vertex_pdf(x1.triangle, worker_.hidden_share_at_wall(), received)
+                                         : worker_.pick.rate(pixel) * received / scene_.pixels();
   const double by_camera = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) /
                            edge_warp().density(g.y.x()) * found * walk.towards_light;
   const double by_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, g.camera_end) * walk.towards_camera;

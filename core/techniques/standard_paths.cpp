@@ -41,11 +41,11 @@ void StandardPaths::finish() {
 
 void StandardPaths::Slot::run_at_wall(int pixel, double scale, Rng& rng) {
   pixel_ = pixel;
-  scale_ = scale * worker_.start_path(pixel, rng);
+  scale_ = scale * worker_.start_path(pixel, rng, worker_.hidden_share_of_paths());
   if (scale_ == 0) return;
   std::swap(path_, worker_.path);
   walk_standard(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()}, rng,
-                Visitor{*this});
+                Visitor{*this}, worker_.hidden_share_of_walks());
 }
 
 void StandardPaths::Slot::start(int pixel, double scale, const Rng& rng) {

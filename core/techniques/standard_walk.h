@@ -1,6 +1,7 @@
 // The standard estimator: a random walk from the camera side with next-event estimation, combined with BSDF sampling
 // by multiple importance sampling (balance heuristic, solid-angle measure).
 #pragma once
+#include <cmath>
 #include <type_traits>
 #include <utility>
 
@@ -39,6 +40,7 @@ class StandardWalk {
     w_o_ = path_.vertex[path_.size() - 2].p - path_.back().p;
     distance_o_ = length(w_o_);
     w_o_ *= 1 / distance_o_;
+    if (worker_.scene.is_hidden(path_.back().triangle)) hidden_share_ = 0;
     if (worker_.scene.emits(path_.back().triangle)) take_emission(1);
     draw_light(rng);
     pick_light();
@@ -65,7 +67,7 @@ class StandardWalk {
     const SurfacePoint y = scene.point_on_emitter(light_, u1, u2);
     const Scattering s(x, w_o_, distance_o_, y.p);
     const bool goes_on = bounce_ < max_bounces_;
-    const double hidden = goes_on && !scene.transparent(x.triangle) ? hidden_share_ : 0;
+    const double hidden = goes_on && !scene.transparent(x.triangle) ? hidden_share() : 0;
     const bool has_extent = !is_light(light_);
     const double cos_y = has_extent ? -dot(y.n, s.w_i) : 1;
     if (cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {
@@ -85,7 +87,7 @@ class StandardWalk {
     // Rays meet no light without an extent.
     if (!goes_on && !scene.emitters.have_extent) return false;
     hidden_ = hidden;
-    if (hidden > 0 && rng.uniform() < hidden) return step_to_hidden(x, rng);
+    if (hidden == 1 || (hidden > 0 && rng.uniform() < hidden)) return step_to_hidden(x, rng);
     const auto next = sample_bsdf(scene, x, w_o_, throughput_, rng);
     if (!next) return false;
     pdf_ = next->pdf;
@@ -108,6 +110,7 @@ class StandardWalk {
     const bool emits = scene.emits(x->triangle);
     if (emits || hidden_ > 0) {
       const double to_area = std::abs(dot(x->n, w_o_)) / (distance_o_ * distance_o_);
+      if (hidden_ > 0 && by_area_ != scene.hidden_takes(x->triangle, hidden_, pdf_ * to_area)) return false;
       const double pdf_walk = step_pdf(pdf_ * to_area, x->triangle, hidden_);
       if (hidden_ > 0) throughput_ *= (by_area_ ? 1 : pdf_) * to_area / pdf_walk;
       if (emits) take_emission(bounce_ == 0 ? 1 : pdf_walk / (pdf_walk + scene.emitter_pdf(x->triangle)));
@@ -121,12 +124,13 @@ class StandardWalk {
   Vec3 direction() const { return -w_o_; }
 
  private:
-  /// Density per area of the next vertex, which the last one sees: hidden geometry sampling with probability `hidden`, else BSDF
-  /// sampling, of density `pdf_bsdf`.
+  /// Of the next step: if it is the last that can lead to what changes, all, for else the path adds nothing to derivatives.
+  double hidden_share() const {
+    return bounce_ + 1 == max_bounces_ && worker_.scene.gradients_are_hidden ? std::ceil(hidden_share_) : hidden_share_;
+  }
+  /// Density per area of a step's end, which the vertex before sees, with hidden geometry sampling of that share.
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
-    if (hidden == 0) return pdf_bsdf;
-    const PreparedScene& scene = worker_.scene;
-    return (1 - hidden) * pdf_bsdf + (scene.is_hidden(triangle) ? hidden * scene.hidden.pdf() : 0);
+    return hidden == 0 ? pdf_bsdf : worker_.scene.next_vertex_pdf(triangle, hidden, pdf_bsdf);
   }
   /// Takes the step by hidden geometry sampling; intersect() goes on. False where the walk ends.
   bool step_to_hidden(const SurfacePoint& x, Rng& rng) {
@@ -190,10 +194,10 @@ class StandardWalk {
 /// A whole walk. Leaves the path as it was.
 template <class Visitor>
 void walk_standard(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Rng& rng,
-                   Visitor&& visitor) {
+                   Visitor&& visitor, double hidden_share = 0) {
   const int base = path.size();
   StandardWalk<std::remove_cvref_t<Visitor>> walk(worker, path, pixel, max_bounces, reach,
-                                                  std::forward<Visitor>(visitor));
+                                                  std::forward<Visitor>(visitor), hidden_share);
   walk.begin(rng);
   for (bool goes_on = max_bounces > 0; goes_on;) goes_on = walk.next_event_and_sample(rng) && walk.intersect(rng);
   while (path.size() > base) path.pop();

@@ -6,7 +6,7 @@
 // random pixel.
 //
 // Standard sampling and ellipsoidal connections by a balance heuristic with an estimate for the latter:
-// connections pick one of all the arcs that an ellipsoid leaves on the scene, whose common length no single
+// connections choose among all the arcs that an ellipsoid leaves on the scene, whose common length no single
 // path knows.
 #pragma once
 #include "core/geometry/ellipsoid.h"

@@ -17,19 +17,21 @@ void Worker::start_at_sensor(Path& sensor_path, int pixel) const {
   sensor_path.start(scene.sensor_point(pixel), scene.extra_length(pixel));
 }
 
-double Worker::start_path(int pixel, Rng& rng) {
+double Worker::start_path(int pixel, Rng& rng, double hidden) {
   start_at_sensor(path, pixel);
-  if (scene.captures()) return start_at_wall(pixel, rng);
+  if (scene.captures()) return start_at_wall(pixel, rng, hidden);
   const auto point = trace_camera(direction_through(pixel, rng));
   if (point) path.push(scene, *point);
   return point.has_value() ? 1 : 0;
 }
 
-double Worker::start_at_wall(int pixel, Rng& rng) {
+double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
   const SurfacePoint s = path.back();
-  const double share = scene.hidden_share();
-  const bool by_area = share == 1 || (share > 0 && rng.uniform() < share);
-  const double u0 = rng.uniform(), u1 = rng.uniform();
+  // One number for the choice and for what is chosen: so the points of each way remain as evenly spread.
+  double u0 = rng.uniform();
+  const double u1 = rng.uniform();
+  const bool by_area = u0 < hidden;
+  u0 = by_area ? u0 / hidden : (u0 - hidden) / (1 - hidden);
   SurfacePoint x;
   if (by_area) {
     x = scene.sample_hidden(u0, u1);
@@ -45,9 +47,10 @@ double Worker::start_at_wall(int pixel, Rng& rng) {
   const double shortest = r + length(x.p - scene.scene.capture->spot_of(pixel).p) * scene.least_index();
   if (path.length.back() + shortest > gates.upper()) return 0;
   const double received = scene.importance(pixel, d / r) * solid_angle_to_area(s.p, x);
-  if (!(received > 0) || (by_area && !visible(s, x))) return 0;
+  if (!(received > 0) || by_area != scene.hidden_takes(x.triangle, hidden, received)) return 0;
+  if (by_area && !visible(s, x)) return 0;
   path.push(scene, x, r);
-  return received / scene.first_vertex_pdf(x, received);
+  return received / scene.next_vertex_pdf(x.triangle, hidden, received);
 }
 
 void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use) {

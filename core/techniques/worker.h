@@ -12,6 +12,10 @@
 
 namespace isochron {
 
+/// EstimatorOptions::hidden of captures with other shapes: of images, of derivatives (isochron_hidden_share: the least loss against
+/// the best share of each scene and number of bounces).
+inline constexpr double kHiddenShareOfImages = 0.5, kHiddenShareOfDerivatives = 0.75;
+
 /// The state of one partition; not shared between threads. What it refers to must outlive it.
 struct Worker {
   const PreparedScene& scene;
@@ -71,14 +75,26 @@ struct Worker {
   void start_at_sensor(Path& sensor_path, int pixel) const;
   /// Starts `path` with that and a surface point x1 that it sees: of a camera through a random point of the pixel, of a capture
   /// by the reflection of the wall or by hidden geometry sampling, combined by the balance heuristic. Returns what the pixel
-  /// makes of radiance from x1, over density; 0: there is no x1.
-  double start_path(int pixel, Rng& rng);
+  /// makes of radiance from x1, over density; 0: there is no x1. `hidden`: hidden geometry sampling's share in the latter.
+  double start_path(int pixel, Rng& rng, double hidden);
+  double start_path(int pixel, Rng& rng) { return start_path(pixel, rng, hidden_share_at_wall()); }
 
-  /// EstimatorOptions::hidden where it is of use: for derivatives, to which paths that miss hidden geometry add nothing, by
-  /// cameras' walks, and where there is something else to miss it for.
+  /// The part of a capture's first vertices that hidden geometry sampling finds.
+  double hidden_share_at_wall() const {
+    if (scene.hidden.empty()) return 0;
+    const double share = differential_sink ? kHiddenShareOfDerivatives : kHiddenShareOfImages;
+    return options.hidden.value_or(scene.hidden_suffices ? 1 : share);
+  }
+  /// Of a capture's paths that contribute themselves, not by what covers them: if their one bounce must be on what changes, all.
+  double hidden_share_of_paths() const {
+    const bool all = differential_sink && options.max_bounces == 1 && scene.first_gradients_are_hidden;
+    return all ? 1 : hidden_share_at_wall();
+  }
+  /// EstimatorOptions::hidden where it is of use: for derivatives, to which paths that miss hidden geometry add nothing, and
+  /// where there is something else to miss it for.
   double hidden_share_of_walks() const {
-    const bool of_use = differential_sink && !scene.captures() && !scene.hidden.empty() && !scene.hidden_is_all;
-    return of_use ? options.hidden : 0;
+    const bool of_use = differential_sink && !scene.hidden.empty() && !scene.hidden_is_all;
+    return of_use ? options.hidden.value_or(scene.captures() ? kHiddenShareOfDerivatives : 0) : 0;
   }
 
   /// Whether the complete path p (last vertex on an emitter) contributes: to images always, to derivatives where it can
@@ -93,7 +109,7 @@ struct Worker {
   void emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value);
 
  private:
-  double start_at_wall(int pixel, Rng& rng);
+  double start_at_wall(int pixel, Rng& rng, double hidden);
 };
 
 struct BsdfSample {

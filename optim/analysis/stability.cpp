@@ -42,13 +42,14 @@ GatedImage quick_target(Experiment experiment, double core_seconds, const Poll& 
 double reconstruct(const Problem& problem, const GatedImage& target, int iterations, const Poll& poll) {
   const Parameters& parameters = problem.parameters();
   if (!parameters.target_known()) return std::numeric_limits<double>::quiet_NaN();
-  const OptimizerSpec& spec = problem.experiment().optimizer;
+  OptimizerSpec spec = problem.experiment().optimizer;
   // The experiment's own schedule in fewer, larger steps, which lead as far in all.
   const double larger = std::max(1.0, static_cast<double>(spec.iterations) / iterations);
-  RateDecay decay = spec.decay;
-  decay.start = static_cast<int>(std::lround(decay.start / larger));
-  decay.half_life /= larger;
-  const std::unique_ptr<Optimizer> optimizer = make_adam(spec.learning_rate * larger, problem.preconditioner(), decay);
+  spec.method = OptimizerMethod::adam;
+  spec.learning_rate *= larger;
+  spec.decay.start = static_cast<int>(std::lround(spec.decay.start / larger));
+  spec.decay.half_life /= larger;
+  const std::unique_ptr<Optimizer> optimizer = make_optimizer(spec, problem.preconditioner());
   const RenderedObjective objective(problem, target, poll);
   LoopOptions options;
   options.iterations = iterations;

@@ -95,17 +95,31 @@ void describe(Keys& keys, SampleSpec& s) {
              "derivative: jumps of the gates; 0: left out");
 }
 
-void describe_estimator(Keys& keys, EstimatorOptions& options, bool& guiding) {
+Field hidden_share(std::optional<double>& share) {
+  const NumberRange range{.low = 0, .high = 1, .high_open = true};
+  return {"number", range.describe(), [&share, range](const YamlValue& value) { share = value.number(range); },
+          [&share] { return fmt::format("{}", *share); }};
+}
+
+void describe_estimator(Keys& keys, Experiment& e) {
+  EstimatorOptions& options = e.estimator;
+  keys.remember(e.estimator_keys);
   keys.value("sampling", field::choice(options.sampling), "how paths are found");
   keys.value("antithetic", field::boolean(options.antithetic),
              "coupled pairs for the gates' slopes, under ellipsoidal sampling");
   keys.value("pick", field::choice(options.pick), "which arc of an ellipsoid a connection takes");
   keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
-  keys.value("hidden", field::number(options.hidden, {.low = 0, .high = 1, .high_open = true}),
-             "cameras, standard sampling, derivatives: the share of a path's steps that are drawn on what parameters "
-             "change, until it "
-             "gets there");
-  keys.value("guiding", field::boolean(guiding),
+  keys.value(
+      "hidden", hidden_share(options.hidden),
+      "standard sampling: the share of a path's steps that are drawn on `hidden_shapes`, until it gets there; of "
+      "derivatives, and of the first step from a capture's wall in images, too",
+      {.unset = !options.hidden,
+       .otherwise = "cameras `0`; captures `0.5`, derivatives `0.75`, all where no other could serve"});
+  keys.value(
+      "hidden_shapes", field::names(e.hidden_shapes),
+      "the shapes that hidden geometry sampling draws points on, by area",
+      {.unset = e.hidden_shapes.empty(), .otherwise = "those that parameters change; captures: all if there are none"});
+  keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small share of the samples");
   keys.value("follow", field::non_negative(options.follow),
              "how far path vertices follow what moves close to them (needed where objects touch); 0: not at all",
@@ -207,7 +221,7 @@ Field file_name(std::string& variable) {
   return name;
 }
 
-void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
+void describe(Keys& keys, Experiment& e, ExperimentFolder& folder, bool target_values) {
   keys.value("name", file_name(e.name), "names the default output folder, `runs/NAME`", {.required = true});
   keys.value("scene", folder.file(e.scene), "the scene", {.required = true});
   keys.value("resolution", resolution(e.resolution),
@@ -218,14 +232,14 @@ void describe(Keys& keys, Experiment& e, ExperimentFolder& folder) {
              "scattering vertices on a path, at most");
   keys.map(
       "target", [&](Keys& inner) { describe(inner, e.target, folder); }, "the images to be matched");
-  keys.list("parameters", e.parameters,
-            [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, !e.target.measured()); },
-            "the unknowns; those of one shape act in this order", {.otherwise = "none"});
+  keys.list(
+      "parameters", e.parameters,
+      [&](Keys& inner, ParameterSpec& spec) { describe(inner, spec, folder, target_values && !e.target.measured()); },
+      "the unknowns; those of one shape act in this order", {.otherwise = "none"});
   keys.map(
       "samples", [&](Keys& inner) { describe(inner, e.samples); }, "per pixel and iteration");
   keys.map(
-      "estimator", [&](Keys& inner) { describe_estimator(inner, e.estimator, e.guiding); },
-      "how images and derivatives are sampled");
+      "estimator", [&](Keys& inner) { describe_estimator(inner, e); }, "how images and derivatives are sampled");
   keys.map(
       "gradient", [&](Keys& inner) { describe(inner, e.gradient); }, "how the loss is differentiated");
   keys.map(

@@ -31,7 +31,8 @@ void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder);
 void check_gates(const GateSpec& gates, const YamlValue& value);
 /// `target_required`: whether there is no target without the parameter's.
 void describe(Keys& keys, ParameterSpec& parameter, ExperimentFolder& folder, bool target_required);
-/// A target's max_bounces below 0 stands for the experiment's.
-void describe(Keys& keys, Experiment& experiment, ExperimentFolder& folder);
+/// A target's max_bounces below 0 stands for the experiment's. `target_values`: whether parameters must have them where
+/// the target is rendered.
+void describe(Keys& keys, Experiment& experiment, ExperimentFolder& folder, bool target_values = true);
 
 }  // namespace isochron

@@ -173,9 +173,11 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   keys.value("initial", folder.values(spec.initial),
              "where the optimisation starts; of what moves, offsets from the scene file",
              {.required = true, .unit = own});
-  keys.value(
-      "target", folder.values(spec.target), "where the target is rendered, or known to be",
-      {.required = target_required, .unit = own, .unset = spec.target.empty(), .otherwise = "required if rendered"});
+  keys.value("target", folder.values(spec.target), "where the target is rendered, or known to be",
+             {.required = target_required,
+              .unit = own,
+              .unset = spec.target.empty(),
+              .otherwise = "required to render a target"});
   keys.value("lower", folder.values(spec.lower),
              "bound. Besides, ior stays on its side of 1, emission, intensity and gain above 0, background at 0 or "
              "above, what else materials have between 0 and 1",

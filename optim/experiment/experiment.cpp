@@ -50,14 +50,14 @@ void reject_scene(const YamlValue& root) {
 
 }  // namespace
 
-Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides) {
+Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides, bool target_values) {
   const YamlValue root = open_yaml(file, overrides);
   reject_scene(root);
   Experiment experiment;
   experiment.file = std::filesystem::absolute(file).string();
   experiment.target.max_bounces = -1;
   ExperimentFolder folder{std::filesystem::absolute(file).parent_path()};
-  read_keys(root, [&](Keys& keys) { describe(keys, experiment, folder); });
+  read_keys(root, [&](Keys& keys) { describe(keys, experiment, folder, target_values); });
   if (experiment.target.max_bounces < 0) experiment.target.max_bounces = experiment.estimator.max_bounces;
   experiment.number_files = folder.number_files;
   return experiment;

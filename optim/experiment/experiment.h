@@ -113,6 +113,9 @@ struct Experiment {
   std::array<int, 2> resolution{0, 0};
   GateSpec gates;
   EstimatorOptions estimator;
+  /// Of hidden geometry sampling (Shape::hidden), by name; none: those that parameters change.
+  std::vector<std::string> hidden_shapes;
+  Keys::Places estimator_keys;  ///< where the file has them
   bool guiding = true;  ///< of the visibility term; see Problem::estimator
   std::vector<ParameterSpec> parameters;
   TargetSpec target;
@@ -126,8 +129,10 @@ struct Experiment {
 
 /// Reads and checks an experiment file, all that can be checked without the scene. `overrides` are
 /// KEY.PATH=VALUE strings, applied before the checks (see open_yaml). Throws InputError: one line that names
-/// file, line, column, key and what is allowed.
-Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides = {});
+/// file, line, column, key and what is allowed. `target_values`: whether parameters must have them where the target is
+/// rendered; who renders no target can do without.
+Experiment load_experiment(const std::string& file, const std::vector<std::string>& overrides = {},
+                           bool target_values = true);
 
 /// The experiment with everything resolved, as YAML that load_experiment reads back to the same values when
 /// it lies in `folder`: paths are written relative to it, tables and value files inline, numbers with all

@@ -11,8 +11,8 @@ struct OutputSpec {
   std::string geometry = "ply";  ///< a format of mesh_formats(), or none
   int every = 0;                 ///< meshes of every so many iterations besides the first and the last; 0: of none
   int frames = 24;               ///< images over the iterations at most, see frames.h; 0: none
-  /// Per sensor point, of final.h5, whose noise should be small beside that of counts: the real capture of hidden_s takes 4096
-  /// to a thousandth of its deviance.
+  /// Per sensor point, of final.h5, whose noise should be small beside that of counts: variance over mean, by which it raises the
+  /// deviance per reading, is 0.084, 0.0030, 0.00048 and 0.00006 in `letter` with 64, 1024, 4096 and 16384 samples.
   int histogram_samples = 4096;
 };
 

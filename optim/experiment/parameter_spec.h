@@ -80,7 +80,8 @@ inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterTy
      {ParameterType::gain, "gain", "what multiplies all readings"},
      {ParameterType::background, "background", "what is added to every gate"},
      {ParameterType::time_offset, "time_offset", "light is counted later by it, in the unit of the gates"},
-     {ParameterType::camera_translation, "camera_translation", "of camera or capture along `direction`, scene units"},
+     {ParameterType::camera_translation, "camera_translation",
+      "of camera or capture, its `origin` included, along `direction`, scene units"},
      {ParameterType::camera_rotation, "camera_rotation",
       "of camera or capture about `axis`, degrees, through the camera's position (a capture's: the mean of its "
       "points)"}});

@@ -130,7 +130,9 @@ std::string warning_about(const Problem& problem, const std::vector<double>& the
   };
   const auto range = path_length_range(problem, theta);
   text += range ? fmt::format("; paths with light are about {} long", shown(range->first, range->second))
-                : "; no path with light was found at all: does a lamp face the scene?";
+          : problem.scene().capture
+              ? "; no path with light was found at all: does a surface face the wall, in front of it?"
+              : "; no path with light was found at all: does a lamp face the scene?";
   if (range && !spec.unbounded()) {
     const auto by_center = [&](int a, int b) { return problem.gates().center(a) < problem.gates().center(b); };
     const auto [first, last] = std::minmax_element(dark.begin(), dark.end(), by_center);

@@ -31,6 +31,10 @@ namespace isochron {
 /// has an albedo of one); and marks the shapes that they change as hidden (see Shape). Throws InputError where that cannot be.
 void make_room(Scene& scene, const std::vector<ParameterSpec>& specs);
 
+/// Marks the shapes that the experiment names as hidden, if it names some, in place of others. Throws InputError where there
+/// is none of a name.
+void mark_hidden(Scene& scene, const Experiment& experiment);
+
 class Parameters {
  public:
   /// `gate_unit`: scene units per unit of the gates' lengths. Binds the parameters to a loaded scene, which must outlive this. Throws InputError (line and key) for a

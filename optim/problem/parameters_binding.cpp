@@ -107,8 +107,18 @@ void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
   for (const ParameterSpec& spec : specs)
     for (Shape& shape : scene.shapes)
       shape.hidden |= spec.type == ParameterType::material && scene.materials[shape.material].name == spec.material;
-  const bool none = std::none_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.hidden; });
-  for (Shape& shape : scene.shapes) shape.hidden |= none;
+}
+
+void mark_hidden(Scene& scene, const Experiment& experiment) {
+  if (experiment.hidden_shapes.empty()) return;
+  for (Shape& shape : scene.shapes) shape.hidden = false;
+  for (const std::string& name : experiment.hidden_shapes) {
+    const int index = scene.find_shape(name);
+    if (index < 0)
+      experiment.estimator_keys.at("hidden_shapes")
+          .fail(fmt::format("there is no shape '{}' in the scene", name), "allowed: " + names_of(scene.shapes));
+    scene.shapes[index].hidden = true;
+  }
 }
 
 Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit)

@@ -20,6 +20,7 @@ namespace {
 Scene load_scene_at(const Experiment& experiment) {
   Scene scene = load_scene(experiment.scene);
   make_room(scene, experiment.parameters);
+  mark_hidden(scene, experiment);
   if (experiment.resolution[0] > 0) {
     if (scene.capture)
       throw InputError(experiment.file + ": resolution: belongs to cameras; a capture has its sensor's grid");

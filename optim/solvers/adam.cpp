@@ -7,8 +7,8 @@ namespace {
 
 class Adam : public Optimizer {
  public:
-  Adam(double learning_rate, const Preconditioner& preconditioner, const RateDecay& decay)
-      : learning_rate_(learning_rate), preconditioner_(preconditioner), decay_(decay) {}
+  Adam(const OptimizerSpec& spec, const Preconditioner& preconditioner)
+      : learning_rate_(spec.learning_rate), preconditioner_(preconditioner), decay_(spec.decay) {}
 
   std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
                            std::uint32_t iteration, double rate) override {
@@ -35,9 +35,8 @@ class Adam : public Optimizer {
 
 }  // namespace
 
-std::unique_ptr<Optimizer> make_adam(double learning_rate, const Preconditioner& preconditioner,
-                                     const RateDecay& decay) {
-  return std::make_unique<Adam>(learning_rate, preconditioner, decay);
+std::unique_ptr<Optimizer> make_adam(const OptimizerSpec& spec, const Preconditioner& preconditioner) {
+  return std::make_unique<Adam>(spec, preconditioner);
 }
 
 }  // namespace isochron

@@ -100,6 +100,11 @@ class ScaledLoss : public ceres::FirstOrderFunction {
   mutable double best_loss_;
 };
 
+/// L-BFGS of Ceres. One iteration makes up to `inner_iterations` steps, each with a line search (strong Wolfe conditions), all on
+/// the random numbers of that iteration; the pairs that approximate the curvature are gathered anew, since they are of use only
+/// on one and the same function. The point of least loss among all that were tried is kept. Bounds: the loss is evaluated at
+/// the nearest point within them and is constant beyond. The first trial step of each iteration has the length `first_step`
+/// (largest component, > 0); no unknown moves further than 10 times that in one iteration.
 class Lbfgs : public Optimizer {
  public:
   Lbfgs(double first_step, int inner_iterations) : first_step_(first_step), inner_iterations_(inner_iterations) {}
@@ -157,8 +162,8 @@ class Lbfgs : public Optimizer {
 
 }  // namespace
 
-std::unique_ptr<Optimizer> make_lbfgs(double first_step, int inner_iterations) {
-  return std::make_unique<Lbfgs>(first_step, inner_iterations);
+std::unique_ptr<Optimizer> make_lbfgs(const OptimizerSpec& spec) {
+  return std::make_unique<Lbfgs>(spec.learning_rate, spec.inner_iterations);
 }
 
 }  // namespace isochron

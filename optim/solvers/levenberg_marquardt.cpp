@@ -84,6 +84,8 @@ class CondensedLoss : public ceres::CostFunction {
   mutable double last_loss_ = 0;
 };
 
+/// Levenberg-Marquardt of Ceres on the linearised objective. One iteration is one accepted step; trial points that Ceres rejects
+/// cost an image each. The radius of the trust region is carried from one iteration to the next.
 class LevenbergMarquardt : public Optimizer {
  public:
   Evaluation evaluate(const Objective& objective, const std::vector<double>& theta,

@@ -5,6 +5,13 @@
 #include <stdexcept>
 
 namespace isochron {
+
+// In files of their names.
+std::unique_ptr<Optimizer> make_adam(const OptimizerSpec& spec, const Preconditioner& preconditioner);
+std::unique_ptr<Optimizer> make_lbfgs(const OptimizerSpec& spec);
+std::unique_ptr<Optimizer> make_levenberg_marquardt();
+std::unique_ptr<Optimizer> make_quasi_newton(const OptimizerSpec& spec);
+
 namespace {
 
 /// An objective in the unknowns u = theta / scale.
@@ -96,27 +103,24 @@ class Scaled : public Optimizer {
 std::unique_ptr<Optimizer> make_unscaled(const OptimizerSpec& spec, const Preconditioner& preconditioner) {
   switch (spec.method) {
     case OptimizerMethod::adam:
-      return make_adam(spec.learning_rate, preconditioner, spec.decay);
+      return make_adam(spec, preconditioner);
     case OptimizerMethod::lbfgs:
-      return make_lbfgs(spec.learning_rate, spec.inner_iterations);
+      return make_lbfgs(spec);
     case OptimizerMethod::levenberg_marquardt:
       return make_levenberg_marquardt();
     case OptimizerMethod::quasi_newton:
-      return make_quasi_newton(spec.inner_iterations);
+      return make_quasi_newton(spec);
   }
   throw std::logic_error("unknown method");
 }
 
 }  // namespace
 
-std::unique_ptr<Optimizer> make_scaled(std::unique_ptr<Optimizer> inner, const std::vector<double>& scales) {
-  if (std::all_of(scales.begin(), scales.end(), [](double scale) { return scale == 1; })) return inner;
-  return std::make_unique<Scaled>(std::move(inner), scales);
-}
-
 std::unique_ptr<Optimizer> make_optimizer(const OptimizerSpec& spec, const Preconditioner& preconditioner,
                                           const std::vector<double>& scales) {
-  return make_scaled(make_unscaled(spec, preconditioner), scales);
+  std::unique_ptr<Optimizer> method = make_unscaled(spec, preconditioner);
+  if (std::all_of(scales.begin(), scales.end(), [](double scale) { return scale == 1; })) return method;
+  return std::make_unique<Scaled>(std::move(method), scales);
 }
 
 }  // namespace isochron

@@ -24,6 +24,8 @@ bool finite(const Evaluation& at) {
          std::all_of(at.gradient.begin(), at.gradient.end(), [](double g) { return std::isfinite(g); });
 }
 
+/// One iteration makes up to `inner_iterations` steps, all on its random numbers. Diagonal, which random signs estimate, and pairs
+/// are carried from one iteration to the next: each pair is a difference on common random numbers, whichever they were.
 class QuasiNewton : public Optimizer {
  public:
   explicit QuasiNewton(int inner_iterations) : inner_iterations_(inner_iterations) {}
@@ -35,12 +37,12 @@ class QuasiNewton : public Optimizer {
     Vector at = theta;
     Evaluation here = now;
     for (int i = 0; i < inner_iterations_; ++i) {
-      bool moved = descend(objective, iteration, at, here);
-      if (!moved && !pairs_.empty()) {  // the pairs may be to blame
+      Search search = descend(objective, iteration, at, here);
+      if (search == Search::failed && !pairs_.empty()) {  // the pairs may be to blame
         pairs_.clear();
-        moved = descend(objective, iteration, at, here);
+        search = descend(objective, iteration, at, here);
       }
-      if (!moved) break;
+      if (search != Search::moved) break;
       rejected_ = false;
     }
     for (std::size_t i = 0; i < at.size(); ++i) at[i] = theta[i] + rate * (at[i] - theta[i]);
@@ -90,6 +92,9 @@ class QuasiNewton : public Optimizer {
     }
   }
 
+  /// How a line search ended: at a lower loss, where noise hides whether there is one, or without one.
+  enum class Search { moved, noise, failed };
+
   /// A point along the projected direction.
   struct Trial {
     double slope;  ///< that of the loss at the start times the way there
@@ -97,16 +102,22 @@ class QuasiNewton : public Optimizer {
     Evaluation at;
   };
 
-  /// One line search; false where no trial lowers the loss. Trials take the gradient with the loss, since the first is nearly
-  /// always the one. Noise of the Jacobian makes the diagonal too large and steps too short; so they also become longer.
-  bool descend(const Objective& objective, std::uint32_t iteration, Vector& at, Evaluation& here) {
+  /// One line search. Trials take the gradient with the loss, since the first is nearly always the one. Noise of the Jacobian
+  /// makes the diagonal too large and steps too short; so they also become longer. The gradient, whose derivatives have random
+  /// numbers of their own, is not that of the loss on this iteration's: where less of a fall is left to be promised by it than the
+  /// loss's standard error, its slope says little of the loss, and shorter trials would follow the noise.
+  Search descend(const Objective& objective, std::uint32_t iteration, Vector& at, Evaluation& here) {
     constexpr double kLonger = 2;  // by how much, where the loss still falls there
     const Vector direction = find_direction(at, here.gradient, objective.lower(), objective.upper());
     std::optional<Trial> best;
     double length = 1;
     for (int i = 0; i < kMostTrials; ++i) {
-      Trial trial = try_length(objective, iteration, at, here, direction, length);
-      if (!(trial.slope < 0)) break;
+      const double least = i > 0 && here.loss_noise > 0 ? here.loss_noise : 0;
+      Trial trial = try_length(objective, iteration, at, here, direction, length, least);
+      if (!(-trial.slope > least)) {
+        if (!best && trial.slope < 0) return Search::noise;
+        break;
+      }
       constexpr double kLeastFall = 1e-4;  // Armijo's condition
       const bool falls = finite(trial.at) && trial.at.loss <= here.loss + kLeastFall * trial.slope;
       if (best && (!falls || trial.at.loss >= best->at.loss)) break;
@@ -121,21 +132,22 @@ class QuasiNewton : public Optimizer {
         length *= std::clamp(factor, 0.1, 0.5);
       }
     }
-    if (!best) return false;
+    if (!best) return Search::failed;
     remember(at, here.gradient, best->theta, best->at.gradient);
     at = std::move(best->theta);
     here = std::move(best->at);
-    return true;
+    return Search::moved;
   }
 
+  /// Evaluates the loss where the slope promises a fall of more than `least`.
   static Trial try_length(const Objective& objective, std::uint32_t iteration, const Vector& at, const Evaluation& here,
-                          const Vector& direction, double length) {
+                          const Vector& direction, double length, double least) {
     Trial trial{0, at, {}};
     for (std::size_t i = 0; i < at.size(); ++i) {
       trial.theta[i] = std::clamp(at[i] + length * direction[i], objective.lower()[i], objective.upper()[i]);
       trial.slope += here.gradient[i] * (trial.theta[i] - at[i]);
     }
-    if (trial.slope < 0) trial.at = objective.evaluate(trial.theta, iteration);
+    if (-trial.slope > least) trial.at = objective.evaluate(trial.theta, iteration);
     return trial;
   }
 
@@ -201,8 +213,8 @@ class QuasiNewton : public Optimizer {
 
 }  // namespace
 
-std::unique_ptr<Optimizer> make_quasi_newton(int inner_iterations) {
-  return std::make_unique<QuasiNewton>(inner_iterations);
+std::unique_ptr<Optimizer> make_quasi_newton(const OptimizerSpec& spec) {
+  return std::make_unique<QuasiNewton>(spec.inner_iterations);
 }
 
 }  // namespace isochron

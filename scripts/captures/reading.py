@@ -52,11 +52,11 @@ class Arrays:
 
 
 def _matlab(path):
-    try:
-        members = scipy.io.loadmat(path)
-    except NotImplementedError:  # version 7.3 is HDF5
+    if h5py.is_hdf5(path):  # version 7.3, with or without the header that MATLAB writes before it
         file = h5py.File(path, "r")
         members = {name: member for name, member in file.items() if isinstance(member, h5py.Dataset)}
+    else:
+        members = scipy.io.loadmat(path)
     return {n: m for n, m in members.items() if not n.startswith("__")}
 
 
@@ -74,10 +74,10 @@ def open_arrays(path):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return Arrays(path, readers[path.suffix](path))
-    except OSError as error:
-        reason = error.strerror or "damaged, or of another format"
+    except (OSError, LookupError) as error:  # LookupError: too short or strange for SciPy
+        reason = getattr(error, "strerror", None) or "damaged, or of another format"
         raise CaptureError(f"{path}: cannot be read: {reason}") from None
-    except (ValueError, TypeError, KeyError, EOFError, MemoryError, zipfile.BadZipFile,
+    except (ValueError, TypeError, EOFError, MemoryError, NotImplementedError, zipfile.BadZipFile,
             scipy.io.matlab.MatReadError) as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise CaptureError(f"{path}: cannot be read: {reason}") from None

@@ -49,6 +49,22 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
   EXPECT_FALSE(folder_.has("out/experiment.yaml"));
 }
 
+TEST_F(Program, TargetValuesAreForThoseWhoRenderTheTarget) {
+  const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out"), unset = "parameters[0].target=";
+  const std::vector<std::string> common = {"-o", out, "--no-plots", "--quiet", "--set", unset};
+  const auto status = [&](std::vector<std::string> command) {
+    command.insert(command.end(), common.begin(), common.end());
+    const Result result = run(command);
+    EXPECT_EQ(result.errors.find("target") != std::string::npos, result.status == 2) << result.errors;
+    return result.status;
+  };
+  EXPECT_EQ(status({"render", file}), 0);
+  EXPECT_EQ(status({"derive", file}), 0);
+  EXPECT_EQ(status({"render", file, "--at", "target"}), 2);
+  EXPECT_EQ(status({"gradient", file}), 2);
+  EXPECT_EQ(status({"run", file}), 2);
+}
+
 TEST_F(Program, AFileThatCannotBeReplacedIsAMistakeInTheInput) {
   const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
   std::filesystem::create_directories(out + "/render.exr");

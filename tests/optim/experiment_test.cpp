@@ -137,6 +137,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "11:20: gradient.method: 'exact' is not known (allowed: analytic, finite"},
       {"seed: 3", "gradient: {step: 0}", "11:18: gradient.step: 0 is out of range (a number above 0)"},
       {"seed: 3", "estimator: {sampling: best}", "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
+      {"seed: 3", "estimator: {hidden_shapes: []}", "11:28: estimator.hidden_shapes: holds no name (at least one)"},
       {"seed: 3", "estimator: {antithetic: 1}", "11:25: estimator.antithetic: '1' is neither (true or false)"},
   };
   expect_messages(folder, cases);
@@ -257,7 +258,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
   folder.write("table.txt", "-1 0\n0 1\n0 0.5\n1.5 0\n");
   const std::string vertices =
       "seed: 9007199254740993\nestimator: {sampling: ellipsoidal, antithetic: false, pick: uniform, "
-      "numbers: independent, guiding: false, follow: 0.25, follow_radius: 2.5}\n"
+      "numbers: independent, hidden: 0.3, hidden_shapes: [block, lamp], guiding: false, follow: 0.25, follow_radius: "
+      "2.5}\n"
       "gradient: {method: finite_difference, step: 0.003, common_numbers: false}\nresolution: [12, 9]\n";
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
   for (const char* other : {"{kind: gaussian, centers: [0.1, 0.30000000000000004], sigma: 1e-3}", "{kind: steady}",
@@ -307,6 +309,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.estimator.pick, ArcPick::uniform);
     EXPECT_EQ(back.estimator.numbers, Numbers::independent);
     EXPECT_FALSE(back.guiding);
+    EXPECT_EQ(back.estimator.hidden, 0.3);
+    EXPECT_EQ(back.hidden_shapes, (std::vector<std::string>{"block", "lamp"}));
     EXPECT_EQ(back.estimator.follow, 0.25);
     EXPECT_EQ(back.estimator.follow_radius, 2.5);
     EXPECT_EQ(back.gradient.step, 0.003);

@@ -43,7 +43,7 @@ TEST(Adam, StepsHalveAsTheDecayAsks) {
   Evaluation now;
   now.gradient = {3.0, -3.0};
   const Preconditioner none;
-  const auto adam = make_adam(0.5, none, {.start = 2, .half_life = 1});
+  const auto adam = make_optimizer({.learning_rate = 0.5, .decay = {.start = 2, .half_life = 1}}, none);
   std::vector<double> theta = {0, 0};
   const double expected[] = {0.5, 0.5, 0.5, 0.25, 0.125, 0.0625};
   for (std::uint32_t i = 0; i < 6; ++i) {

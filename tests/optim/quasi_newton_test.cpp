@@ -119,7 +119,8 @@ class Bumps : public Objective {
 };
 
 Checkpoint run(const Bumps& bumps, int iterations, Checkpoint state = {}) {
-  const auto optimizer = make_quasi_newton(10);
+  const auto optimizer =
+      make_optimizer({.method = OptimizerMethod::quasi_newton, .inner_iterations = 10}, Preconditioner());
   if (state.theta.empty()) state.theta = bumps.start();
   LoopOptions options;
   options.iterations = iterations;
@@ -164,6 +165,23 @@ TEST(QuasiNewton, NoisyImagesLeadToTheSamePoint) {
   EXPECT_LT(many, 0.4);
 }
 
+/// Where values contradict the slope by less than their noise, no shorter steps are tried.
+TEST(QuasiNewton, EndsSearchesThatNoiseHides) {
+  const std::vector<double> theta = {2, 0.3};
+  const auto evaluations = [&](double noise) {
+    ExponentialFit fit;
+    fit.loss_noise = noise;
+    fit.inject = [&](const std::vector<double>& at, double loss) { return at == theta ? loss : loss + 0.1; };
+    const Evaluation now = fit.evaluate(theta, 0);
+    fit.gradients = 0;
+    const auto optimizer = make_quasi_newton(5);
+    EXPECT_EQ(optimizer->step(fit, now, theta, 0, 1), theta);
+    EXPECT_TRUE(optimizer->rejected());
+    return fit.gradients;
+  };
+  EXPECT_EQ(evaluations(0) - evaluations(1), 5);
+}
+
 TEST(QuasiNewton, WhatNothingDependsOnStays) {
   class Idle : public ExponentialFit {
    public:
@@ -177,7 +195,7 @@ TEST(QuasiNewton, WhatNothingDependsOnStays) {
       return {0, ExponentialFit::probe_curvature(theta, iteration, now, probe)[1]};
     }
   } fit;
-  const auto optimizer = make_quasi_newton(5);
+  const auto optimizer = make_optimizer({.method = OptimizerMethod::quasi_newton}, Preconditioner());
   const std::vector<double> theta = {2, 0.3};
   const std::vector<double> next = optimizer->step(fit, fit.evaluate(theta, 0), theta, 0, 1);
   EXPECT_EQ(next[0], 2);

@@ -67,6 +67,17 @@ TEST_F(Report, ShowsParametersErrorsAndNoise) {
       << summary;
 }
 
+TEST_F(Report, TellsWhichUnknownsReachedTheirUpperBounds) {
+  ParameterSpec free = albedo("thing", {0.25}, {});
+  free.upper = {0.375};
+  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), free});
+  state_.theta = {0.6875, 0.375};
+  const std::string line = "  thing is at its upper bound\n";
+  EXPECT_NE(run_report({}, state_, last_, parameters).find(line), std::string::npos);
+  state_.theta = {0.6875, 0.374};
+  EXPECT_EQ(run_report({}, state_, last_, parameters).find("upper"), std::string::npos);
+}
+
 TEST_F(Report, SummaryHasErrorsAndCost) {
   const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
   state_.theta = {0.6875, 0.375};

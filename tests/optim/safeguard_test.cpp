@@ -51,7 +51,7 @@ Outcome run(const NoisyQuadratic& objective, double rate, int iterations, int wi
   Outcome outcome;
   outcome.state.theta = {start};
   const Preconditioner none;
-  const auto optimizer = make_adam(rate, none);
+  const auto optimizer = make_optimizer({.learning_rate = rate}, none);
   LoopOptions options;
   options.iterations = iterations;
   options.row = [&](const Evaluation&, const std::vector<double>& theta, bool) { outcome.rows.push_back(theta[0]); };
@@ -183,7 +183,7 @@ TEST(Loop, JudgesLossesByTheirStandardErrors) {
     Checkpoint state;
     state.theta = {0};
     const Preconditioner none;
-    const auto optimizer = make_adam(0.1, none);
+    const auto optimizer = make_optimizer({.learning_rate = 0.1}, none);
     LoopOptions options;
     options.iterations = iterations;
     options.converged_rmse = rmse;

@@ -31,6 +31,8 @@ struct CaptureSetup {
   std::vector<Vec3> sensor{{-0.3, 0.25, 0}, {0.2, 0.3, 0}, {-0.15, -0.2, 0}, {0.35, -0.3, 0}};
   Vec3 spot{0.1, -0.2, 0}, normal{0, 0, 1};
   Quadrature quadrature = {};
+  std::vector<int> hidden{0};  ///< of the board, 0, and the occluder, 1
+  bool time_offset = true;     ///< is unknown, so that every path has a derivative
 
   BoardAndOccluder at(const Offsets& o) const {
     BoardAndOccluder b;
@@ -82,13 +84,13 @@ struct CaptureSetup {
     if (occluded)
       add_shape(scene, "occluder", quad(b.occluder[0], b.occluder[1], b.occluder[2], b.occluder[3]),
                 diffuse(Rgb(0.0), true));
-    scene.shapes[0].hidden = true;
+    for (const int shape : hidden) scene.shapes[shape].hidden = true;
     return scene;
   }
 };
 
-/// board x, board z, [occluder x, occluder z,] albedo, time offset
-TangentBasis basis_of(const Scene& scene, bool occluded) {
+/// board x, board z, [occluder x, occluder z,] albedo[, time offset]
+TangentBasis basis_of(const Scene& scene, bool occluded, bool time_offset = true) {
   const DofLayout layout(scene);
   std::vector<std::vector<TangentBasis::Entry>> rows(layout.size());
   int column = 0;
@@ -100,9 +102,9 @@ TangentBasis basis_of(const Scene& scene, bool occluded) {
       ++column;
     }
   for (int c = 0; c < 3; ++c) rows[layout.number(0, c)].push_back({column, 1.0});
-  rows[layout.time_offset()].push_back({column + 1, 1.0});
+  if (time_offset) rows[layout.time_offset()].push_back({column + 1, 1.0});
   TangentBasis basis;
-  basis.columns = column + 2;
+  basis.columns = column + (time_offset ? 2 : 1);
   for (const auto& row : rows) {
     basis.row_begin.push_back(static_cast<int>(basis.entries.size()));
     basis.entries.insert(basis.entries.end(), row.begin(), row.end());
@@ -149,7 +151,7 @@ void expect_readings_and_derivatives(const CaptureSetup& setup, const GateSet& g
                                      int samples, double precision) {
   options.max_bounces = 1;
   const Scene scene = setup.scene();
-  const TangentBasis basis = basis_of(scene, setup.occluded);
+  const TangentBasis basis = basis_of(scene, setup.occluded, setup.time_offset);
   const Renderer renderer(scene, gates, options, &basis);
   const SampleRange range{0, samples};
   const auto seed = [](int r) { return static_cast<std::uint64_t>(r + 1); };
@@ -179,7 +181,7 @@ void expect_readings_and_derivatives(const CaptureSetup& setup, const GateSet& g
     unknowns.emplace_back("occluder z", &Offsets::occluder_z);
   }
   unknowns.emplace_back("albedo", &Offsets::albedo);
-  unknowns.emplace_back("time offset", &Offsets::length);
+  if (setup.time_offset) unknowns.emplace_back("time offset", &Offsets::length);
   for (std::size_t i = 0; i < unknowns.size(); ++i)
     expect_means(over_replicates(gates.size(), [&](int r) { return derivatives[r][i]; }),
                  setup.differences(gates, unknowns[i].second), setup.quadrature.error, 10 * precision,
@@ -203,6 +205,18 @@ TEST(CaptureReadings, ConfocalWithOccluder) {
 
 TEST(CaptureReadings, OneSpotWithOccluder) {
   expect_readings_and_derivatives({.confocal = false, .occluded = true}, kWide, {}, 2048, 0.006);
+}
+
+/// Whichever shapes hidden geometry is, whatever its share: of the board and the occluder, without any named, and where paths
+/// that miss the board have no derivative.
+TEST(CaptureReadings, AnyHiddenGeometry) {
+  for (const bool time_offset : {true, false})
+    for (const std::vector<int>& hidden : {std::vector<int>{0}, {1}, {0, 1}, {}}) {
+      SCOPED_TRACE("shapes " + ::testing::PrintToString(hidden) + (time_offset ? ", time offset" : ""));
+      const CaptureSetup setup{.confocal = time_offset, .hidden = hidden, .time_offset = time_offset};
+      expect_readings_and_derivatives(setup, kWide, {}, 2048, 0.012);
+      expect_readings_and_derivatives(setup, kWide, {.hidden = 0.3}, 2048, 0.012);
+    }
 }
 
 TEST(CaptureReadings, NarrowGates) {

@@ -1,7 +1,8 @@
-// Hidden geometry sampling in a camera's walks: derivatives have the means that BSDF sampling alone gives.
+// Hidden geometry sampling in walks: images and derivatives have the means that BSDF sampling alone gives. Against quadrature:
+// capture_test.cpp.
 //
-// Statistics: z-tests at 4.5 standard errors of the difference, of 8 derivatives (false alarms: 7e-6 each), fixed seeds. Both
-// standard errors must be below 3 % of the derivative's scale, so that a density that lacks a term or a factor fails.
+// Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each), fixed seeds. Both standard errors must
+// be below 3 % of the derivative's scale, so that a density that lacks a term or a factor fails.
 #include <gtest/gtest.h>
 
 #include "tests/render/support.h"
@@ -42,6 +43,71 @@ TEST_P(HiddenWalk, LeavesDerivativesUnbiased) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Gates, HiddenWalk, ::testing::Values(GateShape::gaussian(0.3), GateShape::boxcar(0.8)));
+
+/// A board in a room before the wall of a capture: the board is seen from the wall and by way of the room.
+Scene board_in_room() {
+  Scene scene;
+  scene.capture.emplace();
+  scene.capture->columns = scene.camera.width = 2;
+  scene.capture->rows = scene.camera.height = 1;
+  scene.capture->sensor = {{{-0.3, 0.1, 0}, {0, 0, 1}}, {{0.2, -0.2, 0}, {0, 0, 1}}};
+  scene.camera.look_at = {0, 0, 1};
+  add_shape(scene, "board", quad({-0.2, -0.2, 0.5}, {-0.2, 0.2, 0.5}, {0.2, 0.2, 0.5}, {0.2, -0.2, 0.5}),
+            diffuse(Rgb(0.7), true));
+  Mesh room = box({-0.8, -0.8, -0.1}, {0.8, 0.8, 1}, true);
+  add_shape(scene, "room", room, diffuse(Rgb(0.7)));
+  return scene;
+}
+
+/// Three bounces, with and without unknowns that every path changes: then the last step may have to lead to the board.
+TEST(HiddenGeometry, LeavesCapturesUnbiased) {
+  Scene scene = board_in_room();
+  const GateSet gates(GateShape::gaussian(0.15), {1.1, 1.6});
+  const Motion gain{{}, [](const Scene& source, auto& out) { out.emplace_back(DofLayout(source).gain(), 1.0); }};
+  const Motion towards = translate(scene, "board", {0.2, 0, -1});
+  constexpr int kBatches = 32, kSamples = 8192;
+  for (const bool named : {true, false})
+    for (const bool every_path : {true, false}) {
+      scene.shapes[0].hidden = named;
+      const TangentBasis basis = make_basis(scene, every_path ? std::vector{towards, gain} : std::vector{towards});
+      EstimatorOptions options{.max_bounces = 3};
+      const Renderer ours(scene, gates, options, &basis);
+      options.hidden = 0;
+      const Renderer plain(scene, gates, options, &basis);
+      const auto found = term_means(ours, Term::interior, basis.columns, 2, kSamples, kBatches, {74, 0, 0}),
+                 expected = term_means(plain, Term::interior, basis.columns, 2, kSamples, kBatches, {75, 0, 0});
+      const auto image = image_means(ours, 2, kSamples, kBatches, {76, 0, 0}),
+                 expected_image = image_means(plain, 2, kSamples, kBatches, {77, 0, 0});
+      const auto compare = [&](const Estimate& a, const Estimate& b, const std::string& what) {
+        EXPECT_LT(std::abs(z_score(a, b)), 4.5)
+            << what << (named ? ", board named" : "") << ": " << a.mean << " +- " << a.standard_error << ", without "
+            << b.mean << " +- " << b.standard_error;
+        EXPECT_LT(std::hypot(a.standard_error, b.standard_error), 0.03 * std::abs(b.mean)) << what;
+      };
+      for (int g = 0; g < 2; ++g) {
+        compare(image[g], expected_image[g], "image");
+        for (int column = 0; column < basis.columns; ++column)
+          compare(found[column][g], expected[column][g], column ? "gain" : "motion");
+      }
+    }
+}
+
+/// Where no shape is named, a board alone is found by area and a room by the wall's reflection as well, which is far less noisy.
+TEST(HiddenGeometry, IsLessNoisyThanEitherWayWithoutNames) {
+  Scene board = board_in_room();
+  board.shapes.pop_back();
+  board.triangles.resize(2);
+  board.positions.resize(4);
+  std::erase_if(board.edges, [](const Edge& e) { return e.vertex[0] >= 4; });
+  const Scene room = board_in_room();
+  const GateSet gates(GateShape::gaussian(0.15), {1.1, 1.6});
+  const auto deviation = [&](const Scene& scene, std::optional<double> share) {
+    const Renderer renderer(scene, gates, {.max_bounces = 1, .hidden = share});
+    return image_means(renderer, 2, 256, 64, {78, 0, 0})[0].standard_error;
+  };
+  EXPECT_LT(deviation(board, {}), 0.5 * deviation(board, 0.0));
+  EXPECT_LT(deviation(room, {}), 2 * deviation(room, 0.0));  // 0.999: six times
+}
 
 /// A step that only hidden geometry can take part in: of a scene that is all hidden geometry nothing changes.
 TEST(HiddenGeometry, IsLeftOutWhereItIsAll) {

@@ -63,7 +63,7 @@ TEST_P(Kept, GivesTheBitsOfAFreshOne) {
   std::size_t intersections = 0;
   for (const auto& theta : kPoints) {
     const Scene moved = at(scene, all, theta);
-    intersections = std::max(intersections, find_mesh_intersections(moved, RayCaster(moved)).size());
+    intersections = std::max(intersections, MeshIntersections(moved, ray_offset(moved)).segments().size());
     EXPECT_EQ(everything(Renderer(moved, gates, options, &basis, &cache), moved, gates),
               everything(Renderer(moved, gates, options, &basis), moved, gates));
   }
@@ -75,16 +75,20 @@ INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling:
 });
 
 TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
-  const auto [scene, all, basis, gates] = CacheSetting();
+  const CacheSetting rigid;
   const EstimatorOptions options{.max_bounces = 3, .sampling = Sampling::standard};
-  SceneCache cache(scene, CasterUpdate::refit);
-  for (const auto& theta : kPoints) {
-    const Scene moved = at(scene, all, theta);
-    SceneCache fresh(scene, CasterUpdate::refit);
-    const auto kept = everything(Renderer(moved, gates, options, &basis, &cache), moved, gates);
-    EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis, &fresh), moved, gates));
-    // Rays meet the same triangles as those of a hierarchy made anew.
-    EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis), moved, gates));
+  for (const bool deforms : {false, true}) {
+    auto [scene, all, basis, gates] = rigid;
+    scene.shapes[scene.find_shape("block")].deforms = deforms;
+    SceneCache cache(scene, CasterUpdate::refit);
+    for (const auto& theta : kPoints) {
+      const Scene moved = at(scene, all, theta);
+      SceneCache fresh(scene, CasterUpdate::refit);
+      const auto kept = everything(Renderer(moved, gates, options, &basis, &cache), moved, gates);
+      EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis, &fresh), moved, gates));
+      // Rays meet the same triangles as those of a hierarchy made anew.
+      EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis), moved, gates));
+    }
   }
 }
 
@@ -132,36 +136,6 @@ TEST(PreparedScene, TouchesWhatMovedAlone) {
   const int block = scene.find_shape("block");
   for (std::size_t t = 0; t < scene.triangles.size(); ++t)
     EXPECT_EQ(prepared.changed(static_cast<int>(t)) > before, scene.triangles[t].shape == block) << t;
-}
-
-// Boxes that turn and go through each other, one of them through itself as well.
-TEST(CrossingEdges, FindWhatAllEdgesFind) {
-  Scene scene;
-  scene.camera = {{0, 0, 5}, {0, 0, 0}, {0, 1, 0}, 40, 8, 8};
-  add_shape(scene, "still", box({-1, -1, -1}, {1, 0, 1}), diffuse(Rgb(0.5)));
-  add_shape(scene, "turns", box({-0.4, -0.3, -0.3}, {0.4, 0.5, 0.3}), diffuse(Rgb(0.5)));
-  Mesh crossed = box({-0.2, 1, -0.2}, {0.2, 1.4, 0.2});
-  const Mesh other = box({-0.1, 1.1, -0.4}, {0.1, 1.2, 0.4});
-  const int first = static_cast<int>(crossed.positions.size());
-  crossed.positions.insert(crossed.positions.end(), other.positions.begin(), other.positions.end());
-  for (const auto& f : other.faces) crossed.faces.push_back({f[0] + first, f[1] + first, f[2] + first});
-  add_shape(scene, "crossed", crossed, diffuse(Rgb(0.5)));
-  const CrossingEdges crossing(scene);
-  int found = 0;
-  for (int k = 0; k < 24; ++k) {
-    Scene moved = scene;
-    rotate_y(scene, "turns", {0.2, 0, 0}).apply(moved, 0.3 * k);
-    translate(scene, "crossed", {0.02, -0.11, 0.01}).apply(moved, k);
-    const RayCaster caster(moved);
-    const auto all = find_mesh_intersections(moved, caster), some = crossing.find(moved, caster);
-    ASSERT_EQ(all.size(), some.size());
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      EXPECT_EQ(all[i].triangle, some[i].triangle);
-      EXPECT_EQ(all[i].end, some[i].end);
-    }
-    found += static_cast<int>(all.size());
-  }
-  EXPECT_GT(found, 500);
 }
 
 }  // namespace

@@ -150,6 +150,31 @@ target: {images: none.exr}
                 clearest = max(2 * abs(float(r["visibility"])) / float(r["finite_difference_error"]) for r in rows)
                 self.assertGreater(clearest, 10)
 
+    def test_instruments_move_with_the_capture(self):
+        """With `origin` as without, moving capture and board alike changes nothing."""
+        (self.folder / "scene.yaml").write_text(SCENE.replace("  laser: confocal\n", "  laser: {points: [[0.1, 0, 0]]}\n  origin: "
+                                                              "{laser: [0.3, 0, 0.4], sensor: [-0.2, 0.1, 0.5]}\n"))
+        gates = "gates: {kind: gaussian, centers: [2.15, 2.2, 2.25], sigma: 0.05}\n"
+        (self.folder / "board.yaml").write_text("name: board\nscene: scene.yaml\nmax_bounces: 1\n" + gates + """\
+parameters:
+  - {name: board, type: translation, shape: board, direction: [0.3, 0, 1], initial: 0}
+  - {name: capture, type: camera_translation, direction: [0.3, 0, 1], initial: 0}
+samples: {primal: 256, interior: 256, visibility: 0, path_length: 0}
+""")
+        done = self.run_program("derive", self.folder / "board.yaml", "-o", self.folder / "derived")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        with open(self.folder / "derived/derive.csv", encoding="ascii") as file:
+            rows = [row for row in csv.DictReader(file) if row["component"] == "total"]
+        board, capture = (np.array([float(r["mean"]) for r in rows if r["parameter"] == name]) for name in ("board", "capture"))
+        self.assertGreater(np.abs(board).max(), 0)
+        np.testing.assert_allclose(capture, -board, atol=1e-4 * np.abs(board).max())
+
+    def test_a_surface_that_faces_away(self):
+        (self.folder / "scene.yaml").write_text(SCENE.replace("two_sided: true", "two_sided: false"))
+        done = self.run_program("render", self.folder / "board.yaml", "-o", self.folder / "rendered")
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (0, 1), done.stderr)
+        self.assertIn("does a surface face the wall", done.stderr)
+
     def test_bad_files_get_one_line(self):
         rendered = self.render()
 

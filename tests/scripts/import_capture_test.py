@@ -2,6 +2,7 @@
 """scripts/import_capture.py on small files of every kind that it knows."""
 
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -66,7 +67,8 @@ class ImportTest(unittest.TestCase):
         counts = numbered(4, 3, 8)
         self.save("five.mat", rect_data=counts, width=0.35)
         write_matlab_73(self.folder / "seven.mat", {"rect_data": counts, "width": [[0.35]]})
-        for name in ("five.mat", "seven.mat"):
+        (self.folder / "plain.mat").write_bytes((self.folder / "seven.mat").read_bytes()[512:])  # as of h5py and Octave
+        for name in ("five.mat", "seven.mat", "plain.mat"):
             file = self.imported(name)
             np.testing.assert_array_equal(file["H"], counts.transpose(2, 0, 1))
             self.assertEqual(file["H"].dtype, np.float32)
@@ -191,6 +193,26 @@ class ImportTest(unittest.TestCase):
         shifts = response.alignment(np.zeros((100, 2, 2)), 0.0, 16)
         self.assertEqual(shifts.tolist(), [0, 0, 0, 0])
 
+    def test_start_of_a_fit(self):
+        """Counts of a plane of albedo 0.01 at 0.5 m with gain 1000 over a background of 3, by quadrature."""
+        points, bins, bin_ps = np.linspace(-0.1, 0.1, 3), 300, 64
+        cell = 4 / 500
+        x, y = np.meshgrid(*2 * [(np.arange(500) + 0.5) * cell - 2])
+        counts = np.full((3, 3, bins), 3.0)
+        for i, j in np.ndindex(3, 3):
+            distance = np.sqrt((x - points[i]) ** 2 + (y + points[j]) ** 2 + 0.25)
+            light = 0.01 / np.pi * (0.5 / distance) ** 4 / (np.pi**2 * distance**4) * cell**2
+            number = (2 * distance / (bin_ps * C)).astype(int)
+            counts[i, j] += 1000 / (bin_ps * C) * np.bincount(number.ravel(), light.ravel(), bins)[:bins]
+        self.save("plane.npy", a=counts)
+        options = ("--bin-ps", bin_ps, "--width", 0.1)
+        said = self.run_script("plane.npy", *options, "--bins", 0, bins).stdout
+        words = re.search(r"albedo 0\.01, gain (\S+) z\^2 \(z: depth, metres\), background (\S+)\n\Z", said)
+        self.assertIsNotNone(words, said)
+        self.assertAlmostEqual(float(words[1]) * 0.25, 1000, delta=30)
+        self.assertAlmostEqual(float(words[2]), 3, delta=0.05)
+        self.assertNotIn("gain", self.run_script("plane.npy", *options).stdout)  # may have the wall's own light
+
     def test_what_cannot_be_used(self):
         self.save("a.npy", a=numbered(3, 2, 6))
         good = ("--bin-ps", 4, "--width", 1)
@@ -198,6 +220,8 @@ class ImportTest(unittest.TestCase):
         self.assert_fails(r"not a file of MATLAB or NumPy \(.mat, .npy, .npz\)", "a.txt")
         for name in ("bad.mat", "bad.npy", "bad.npz"):
             (self.folder / name).write_bytes(b"neither of them" * 50)
+            self.assert_fails(f"{name}: cannot be read: ", name)
+            (self.folder / name).write_bytes(b"short")
             self.assert_fails(f"{name}: cannot be read: ", name)
             (self.folder / name).write_bytes(b"")
             self.assert_fails(f"{name}: cannot be read: ", name)
