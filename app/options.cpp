@@ -66,17 +66,7 @@ void add_parameter_option(CLI::App& command, std::string& name) {
 }
 
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name) {
-  if (name.empty()) return {"", 0, parameters.size()};
-  std::string known;
-  for (const Parameters::Block& block : parameters.blocks()) {
-    if (block.name == name) return block;
-    known += (known.empty() ? "" : ", ") + block.name;
-  }
-  const auto& names = parameters.component_names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end())
-    throw InputError(fmt::format("--parameter {}: there is no such parameter (allowed: {})", name, known));
-  return {name, static_cast<int>(found - names.begin()), 1};
+  return name.empty() ? Parameters::Block{"", 0, parameters.size()} : parameters.find(name, "--parameter");
 }
 
 void say_written(const std::string& folder, const std::vector<std::string>& files) {

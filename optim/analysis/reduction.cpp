@@ -27,15 +27,15 @@ MeanNorm mean_norm(const std::vector<std::vector<double>>& vectors) {
   return {std::sqrt(result.norm), std::sqrt(result.error)};
 }
 
-enum class Verdict { within, undecided, beyond };
+enum class BiasVerdict { within, undecided, beyond };
 
-Verdict judge(std::span<const GradientReplicates> points, const Reduction& kept, double tolerance) {
-  Verdict worst = Verdict::within;
+BiasVerdict judge(std::span<const GradientReplicates> points, const Reduction& kept, double tolerance) {
+  BiasVerdict worst = BiasVerdict::within;
   for (const GradientReplicates& point : points) {
     const RelativeBias bias = relative_bias(point, kept);
-    worst = std::max(worst, bias.upper <= tolerance  ? Verdict::within
-                            : bias.lower > tolerance ? Verdict::beyond
-                                                     : Verdict::undecided);
+    worst = std::max(worst, bias.upper <= tolerance  ? BiasVerdict::within
+                            : bias.lower > tolerance ? BiasVerdict::beyond
+                                                     : BiasVerdict::undecided);
   }
   return worst;
 }
@@ -100,10 +100,10 @@ ReductionChoice choose_reduction(std::span<const GradientReplicates> points, dou
   ReductionChoice choice;
   choice.kept = points[0].full();
   const auto accepts = [&](const Reduction& fewer, const std::string& what) {
-    const Verdict verdict = judge(points, fewer, tolerance);
-    if (verdict == Verdict::undecided) choice.undecided.push_back(what);
-    if (verdict == Verdict::within) choice.kept = fewer;
-    return verdict == Verdict::within;
+    const BiasVerdict verdict = judge(points, fewer, tolerance);
+    if (verdict == BiasVerdict::undecided) choice.undecided.push_back(what);
+    if (verdict == BiasVerdict::within) choice.kept = fewer;
+    return verdict == BiasVerdict::within;
   };
   while (choice.kept.max_bounces > 0) {
     Reduction fewer = choice.kept;

@@ -18,10 +18,10 @@ namespace {
 
 constexpr int kEstimates = 24;
 /// Shares of a width's time.
-constexpr double kReferenceShare = 0.25, kTargetShare = 0.05;
+constexpr double kShareOfReference = 0.25, kTargetShare = 0.05;
 constexpr double kMostOfBias = 0.1, kMostOfVariance = 0.5;
 /// Finite differences of more unknowns would take nearly all the time.
-constexpr int kMostDifferences = 16;
+constexpr int kMostUnknowns = 16;
 
 /// Target images with as many samples as fit the time, but no more than the experiment's.
 GatedImage quick_target(Experiment experiment, double core_seconds, const Poll& poll) {
@@ -169,7 +169,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     const Problem problem(experiment);
     theta = problem.parameters().initial();
   }
-  if (theta.size() > kMostDifferences) {
+  if (theta.size() > kMostUnknowns) {
     std::erase_if(methods, [](const Method& m) { return m.gradient == Method::Gradient::finite_difference; });
     map.notes.push_back(fmt::format("{} unknowns: no finite differences", theta.size()));
   }
@@ -180,7 +180,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     Experiment narrow = experiment;
     narrow.gates = with_relative_width(experiment.gates, width);
     const GatedImage target = quick_target(narrow, kTargetShare * of_width, options.poll);
-    const Reference reference = make_reference(narrow, theta, target, kReferenceShare * of_width, options.poll);
+    const Reference reference = make_reference(narrow, theta, target, kShareOfReference * of_width, options.poll);
     std::deque<MethodRun> runs;
     for (const Method& method : methods) runs.emplace_back(narrow, method);
     const std::vector<std::size_t> first = first_alike(runs, methods, fmt::format("width {:.3g}: ", width), map.notes);
@@ -192,7 +192,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
       runs[m].set_factor(runs[m].least_factor());
       slowest = std::max(slowest, runs[m].gradient(theta, target, 0, options.poll).core_seconds);
     }
-    const double of_methods = (1 - kReferenceShare - kTargetShare) * of_width;
+    const double of_methods = (1 - kShareOfReference - kTargetShare) * of_width;
     const double time = std::max(slowest, of_methods / different / (kEstimates + options.iterations));
     std::vector<StabilityCell> cells;
     for (std::size_t m = 0; m < methods.size(); ++m) {

@@ -16,7 +16,7 @@
 namespace isochron {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnlimited = std::numeric_limits<double>::infinity();
 
 /// Copies of an image's size that sums of work partitions take at a time: one for every thread and those that wait for
 /// others to be added (core/base/partition_sum.h). With more than a few threads they may be more, with few samples, which
@@ -28,18 +28,18 @@ double kilobytes(const char* file, const std::string& key) {
   std::ifstream lines(file);
   for (std::string word; lines >> word;)
     if (double number = 0; word == key && lines >> number) return 1024 * number;
-  return kInfinity;
+  return kUnlimited;
 }
 
 double first_number(const std::string& file) {
   double number = 0;
-  return std::ifstream(file) >> number ? number : kInfinity;
+  return std::ifstream(file) >> number ? number : kUnlimited;
 }
 
 /// Of the process's control group; "max" where there is no limit.
 double group_memory() {
   std::ifstream groups("/proc/self/cgroup");
-  double least = kInfinity;
+  double least = kUnlimited;
   for (std::string line; std::getline(groups, line);) {
     const std::size_t at = line.rfind(':');
     const std::string group = line.substr(at + 1);
@@ -51,13 +51,13 @@ double group_memory() {
       least = std::min(
           least, first_number(folder + "/memory.limit_in_bytes") - first_number(folder + "/memory.usage_in_bytes"));
   }
-  return std::isnan(least) ? kInfinity : least;
+  return std::isnan(least) ? kUnlimited : least;
 }
 
 double limit(int resource, const std::string& used) {
   rlimit most{};
   if (getrlimit(static_cast<__rlimit_resource>(resource), &most) != 0 || most.rlim_cur == RLIM_INFINITY)
-    return kInfinity;
+    return kUnlimited;
   return static_cast<double>(most.rlim_cur) - kilobytes("/proc/self/status", used);
 }
 

@@ -5,314 +5,20 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <limits>
 #include <numeric>
+#include <stdexcept>
 
-#include "core/base/constants.h"
 #include "core/base/error.h"
-#include "optim/experiment/choices.h"
 
 namespace isochron {
 namespace {
-
-constexpr double kRadian = 180 / kPi;
-constexpr double kLeastRelativeEmission = 1e-6;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-
-template <class Item>
-std::string names_of(const std::vector<Item>& items) {
-  std::string list;
-  for (const Item& item : items) list += (list.empty() ? "" : ", ") + item.name;
-  return list.empty() ? "none" : list;
-}
-
-/// The index, which is -1 where the scene has no such item: complains of the key that names it.
-template <class Item>
-int found(int index, const ParameterSpec& spec, const char* key, const std::string& name,
-          const std::vector<Item>& items) {
-  if (index < 0)
-    spec.fail(key, fmt::format("there is no {} '{}' in the scene", key, name), "allowed: " + names_of(items));
-  return index;
-}
 
 std::string trimmed(const std::string& text) {
   const std::size_t first = text.find_first_not_of(" \t");
   return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
-/// Area-weighted sums of face normals at the vertices of a shape; zero where no face of positive area meets.
-std::vector<Vec3> vertex_normals(const Scene& scene, const Shape& shape) {
-  std::vector<Vec3> sum(shape.vertex_count);
-  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
-    const auto& v = scene.triangles[t].vertex;
-    const Vec3& a = scene.positions[v[0]];
-    const Vec3 area = cross(scene.positions[v[1]] - a, scene.positions[v[2]] - a);
-    for (int k : v) sum[k - shape.first_vertex] += area;
-  }
-  return sum;
-}
-
-int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, std::vector<int>& slot) {
-  const Selection& selection = spec.selection;
-  slot.assign(shape.vertex_count, -1);
-  int count = 0;
-  if (selection.kind == Selection::Kind::list) {
-    for (int v : selection.indices) {
-      if (v < 0 || v >= shape.vertex_count)
-        spec.fail("selection", fmt::format("there is no vertex {} in shape '{}'", v, shape.name),
-                  fmt::format("0 to {}", shape.vertex_count - 1));
-      if (slot[v] >= 0) spec.fail("selection", fmt::format("vertex {} is listed twice", v));
-      slot[v] = count++;
-    }
-  } else {
-    const Vec3 &lo = selection.min, &hi = selection.max;
-    for (int v = 0; v < shape.vertex_count; ++v) {
-      const Vec3& p = scene.positions[shape.first_vertex + v];
-      const bool inside = selection.kind == Selection::Kind::all ||
-                          (p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y && p.z >= lo.z && p.z <= hi.z);
-      if (inside) slot[v] = count++;
-    }
-  }
-  if (count == 0) spec.fail("selection", fmt::format("selects no vertex of shape '{}'", shape.name));
-  return count;
-}
-
-/// What counts as one unit of the parameter where the user does not say.
-double default_scale(const ParameterSpec& spec) {
-  using enum ParameterType;
-  if (spec.type == rotation || spec.type == camera_rotation) return kRadian;
-  if (spec.type == emission || spec.type == intensity || spec.type == gain)
-    return *std::max_element(spec.initial.begin(), spec.initial.end());
-  return 1;
-}
-
 }  // namespace
-
-void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
-  for (const ParameterSpec& spec : specs) {
-    const int index = scene.find_shape(spec.shape);
-    if (index >= 0) scene.shapes[index].hidden = true;
-    if (spec.type == ParameterType::background && spec.per == Per::pixel) {
-      if (!scene.capture) spec.fail("per", "the scene has a camera", "captures alone have backgrounds per pixel");
-      scene.detector.background.assign(scene.capture->sensor.size(), 0.0);
-    }
-    if (spec.type != ParameterType::texture || index < 0) continue;
-    Shape& shape = scene.shapes[index];
-    if (shape.textured) spec.fail("shape", "another parameter sets the albedos of '" + shape.name + "' already");
-    const Material& own = scene.materials[shape.material];
-    if (own.find("albedo") < 0 || own.kind() != std::string("diffuse"))
-      spec.fail("shape", fmt::format("the material of '{}' is {}", shape.name, own.kind()), "diffuse");
-    Material white = own;
-    white.name = shape.name + " (albedo by vertex)";
-    white.set("albedo", 1.0);
-    shape.material = static_cast<int>(scene.materials.size());
-    scene.materials.push_back(std::move(white));
-    shape.textured = true;
-    scene.texture.resize(scene.positions.size(), 1.0);
-  }
-  // Materials that parameters change count for the shapes that are made of them.
-  for (const ParameterSpec& spec : specs)
-    for (Shape& shape : scene.shapes)
-      shape.hidden |= spec.type == ParameterType::material && scene.materials[shape.material].name == spec.material;
-}
-
-void mark_hidden(Scene& scene, const Experiment& experiment) {
-  if (experiment.hidden_shapes.empty()) return;
-  for (Shape& shape : scene.shapes) shape.hidden = false;
-  for (const std::string& name : experiment.hidden_shapes) {
-    const int index = scene.find_shape(name);
-    if (index < 0)
-      experiment.estimator_keys.at("hidden_shapes")
-          .fail(fmt::format("there is no shape '{}' in the scene", name), "allowed: " + names_of(scene.shapes));
-    scene.shapes[index].hidden = true;
-  }
-}
-
-Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit)
-    : scene_(scene), motions_(scene.shapes.size()), light_motions_(scene.lights.size()) {
-  for (const ParameterSpec& spec : specs) {
-    int count = 1;
-    const int first = size();
-    switch (spec.type) {
-      case ParameterType::translation:
-      case ParameterType::rotation:
-      case ParameterType::vertices:
-        if (spec.light.empty()) {
-          Motion motion;
-          motion.first_component = first;
-          const int shape = find_shape(spec);
-          bind_motion(spec, motion, shape, count);
-          motions_[shape].push_back(std::move(motion));
-        } else {
-          bind_light(spec, first);
-        }
-        break;
-      case ParameterType::camera_translation:
-        camera_motions_.push_back({spec.type, first, spec.direction});
-        break;
-      case ParameterType::camera_rotation:
-        camera_motions_.push_back({spec.type, first, normalize(spec.axis)});
-        break;
-      default:
-        count = bind_value(spec, first, gate_unit);
-    }
-    bind_values(spec, count);
-    blocks_.push_back({spec.name, first, count, spec.scale > 0 ? spec.scale : default_scale(spec)});
-    for (int i = 0; i < count; ++i)
-      component_names_.push_back(count == 1 ? spec.name : fmt::format("{}[{}]", spec.name, i));
-  }
-}
-
-int Parameters::find_shape(const ParameterSpec& spec) const {
-  return found(scene_.find_shape(spec.shape), spec, "shape", spec.shape, scene_.shapes);
-}
-
-int Parameters::find_light(const ParameterSpec& spec) const {
-  return found(scene_.find_light(spec.light), spec, "light", spec.light, scene_.lights);
-}
-
-void Parameters::bind_light(const ParameterSpec& spec, int first) {
-  const int light = find_light(spec);
-  const bool turns = spec.type == ParameterType::rotation;
-  if (turns && scene_.lights[light].kind == PointLight::Kind::point)
-    spec.fail("light", fmt::format("'{}' shines in all directions: turning it changes nothing", spec.light), "a spot");
-  if (spec.selection.kind != Selection::Kind::all) spec.fail("selection", "a light has no vertices");
-  light_motions_[light].push_back({spec.type, first, turns ? normalize(spec.axis) : spec.direction});
-}
-
-int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_unit) {
-  const DofLayout layout(scene_);
-  Value value{0, 1, first, 1};
-  const auto colour = [&](int dof) {
-    value.dof = dof;
-    value.numbers = 3;
-    value.count = scene_.grey ? 1 : 3;
-  };
-  switch (spec.type) {
-    case ParameterType::material: {
-      const int material =
-          found(scene_.find_material(spec.material), spec, "material", spec.material, scene_.materials);
-      Quantity quantity{};
-      const int number = scene_.materials[material].find(spec.quantity, &quantity);
-      if (number < 0)
-        spec.fail("material", fmt::format("material '{}' is {} and has no {}", spec.material,
-                                          scene_.materials[material].kind(), spec.quantity));
-      value.dof = layout.number(material, number);
-      if (quantity.values.size() == 3) colour(value.dof);
-      break;
-    }
-    case ParameterType::emission:
-      colour(layout.emission(find_shape(spec), 0));
-      break;
-    case ParameterType::intensity:
-      colour(layout.light_intensity(find_light(spec), 0));
-      break;
-    case ParameterType::texture: {
-      const Shape& shape = scene_.shapes[find_shape(spec)];
-      value.dof = layout.texture(shape.first_vertex);
-      value.numbers = value.count = shape.vertex_count;
-      break;
-    }
-    case ParameterType::background:
-      value.dof = layout.background(0);
-      value.numbers = layout.backgrounds;
-      value.count = spec.per == Per::pixel ? layout.backgrounds : 1;
-      break;
-    case ParameterType::gain:
-      value.dof = layout.gain();
-      break;
-    case ParameterType::time_offset:
-      value.dof = layout.time_offset();
-      value.factor = gate_unit;
-      break;
-    default:
-      throw std::logic_error("no value: " + type_name(spec));
-  }
-  for (const Value& other : values_)
-    if (other.dof == value.dof)
-      spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
-  values_.push_back(value);
-  return value.count;
-}
-
-void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shape_index, int& count) {
-  const Shape& shape = scene_.shapes[shape_index];
-  motion.type = spec.type;
-  motion.direction_kind = spec.direction_kind;
-  motion.direction = spec.type == ParameterType::rotation ? normalize(spec.axis) : spec.direction;
-  const int selected = select(spec, scene_, shape, motion.slot);
-  if (spec.type == ParameterType::rotation) bind_pivot(spec, motion, shape_index);
-  if (spec.type != ParameterType::vertices) return;
-  count = spec.direction_kind == VertexDirection::free ? 3 * selected : selected;
-  if (spec.direction_kind != VertexDirection::normal) return;
-  const std::vector<Vec3> sums = vertex_normals(scene_, shape);
-  motion.normals.resize(selected);
-  for (int v = 0; v < shape.vertex_count; ++v) {
-    if (motion.slot[v] < 0) continue;
-    const double norm = length(sums[v]);
-    if (!(norm > 0))
-      spec.fail("direction", fmt::format("vertex {} of shape '{}' has no normal", v, shape.name),
-                "leave it out by selection");
-    motion.normals[motion.slot[v]] = sums[v] / norm;
-  }
-}
-
-void Parameters::bind_values(const ParameterSpec& spec, int count) {
-  const auto expand = [&](const std::vector<double>& values, const char* key, double missing, auto& into) {
-    if (values.size() > 1 && static_cast<int>(values.size()) != count)
-      spec.fail(key, fmt::format("{} values are given", values.size()),
-                count == 1 ? "1" : fmt::format("1 or {}", count));
-    for (int i = 0; i < count; ++i)
-      into.push_back(values.empty() ? missing : values.size() == 1 ? values[0] : values[i]);
-  };
-  double lowest = -kInfinity, highest = kInfinity;
-  const double largest = spec.initial.empty() ? 0 : *std::max_element(spec.initial.begin(), spec.initial.end());
-  const auto within = [&](const Quantity::Range& range) {
-    lowest = range.lowest;
-    highest = range.highest;
-  };
-  switch (spec.type) {
-    case ParameterType::material: {
-      Quantity quantity{};
-      scene_.materials[scene_.find_material(spec.material)].find(spec.quantity, &quantity);
-      within(quantity.range(largest));
-      break;
-    }
-    case ParameterType::texture:
-      within(fraction_range(largest));
-      break;
-    case ParameterType::emission:
-    case ParameterType::intensity:
-    case ParameterType::gain:
-      if (!(largest > 0)) spec.fail("initial", fmt::format("is no {}", type_name(spec)), "a number above 0");
-      lowest = kLeastRelativeEmission * largest;
-      break;
-    case ParameterType::background:
-      lowest = 0;
-      break;
-    default:
-      break;
-  }
-  const std::size_t first = initial_.size();
-  expand(spec.initial, "initial", kUnknown, initial_);
-  expand(spec.target, "target", kUnknown, target_);
-  expand(spec.lower, "lower", lowest, lower_);
-  expand(spec.upper, "upper", highest, upper_);
-  for (std::size_t i = first; i < initial_.size(); ++i) {
-    lower_[i] = std::max(lower_[i], lowest);
-    upper_[i] = std::min(upper_[i], highest);
-    if (!(lower_[i] < upper_[i]))
-      spec.fail(spec.where.contains("lower") ? "lower" : "upper", "leaves no value to choose",
-                fmt::format("lower below upper, within {} to {}", lowest, highest));
-    const auto check = [&](double value, const char* key) {
-      if (value < lower_[i] || value > upper_[i])
-        spec.fail(key, fmt::format("{} is out of bounds", value), fmt::format("{} to {}", lower_[i], upper_[i]));
-    };
-    check(initial_[i], "initial");
-    check(target_[i], "target");  // NaN, where unknown, passes
-  }
-}
 
 Parameters::VertexField Parameters::vertex_field(const Block& block) const {
   for (std::size_t s = 0; s < motions_.size(); ++s)
@@ -448,6 +154,18 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
   return basis;
 }
 
+Parameters::Block Parameters::find(const std::string& name, const char* option) const {
+  std::string known;
+  for (const Block& block : blocks_) {
+    if (block.name == name) return block;
+    known += (known.empty() ? "" : ", ") + block.name;
+  }
+  const auto component = std::find(component_names_.begin(), component_names_.end(), name);
+  if (component == component_names_.end())
+    throw InputError(fmt::format("{} {}: no such parameter; allowed: {}", option, name, known));
+  return {name, static_cast<int>(component - component_names_.begin()), 1};
+}
+
 std::vector<double> Parameters::parse_point(const std::string& text) const {
   std::vector<double> theta = initial_;
   std::vector<std::string> given;
@@ -471,16 +189,11 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
     const double value = std::strtod(number.c_str(), &stop);
     if (number.empty() || *stop != '\0' || !std::isfinite(value))
       throw InputError(fmt::format("--at {}: '{}' is not a finite number", key, number));
-    int from = -1, count = 1;
-    for (const Block& block : blocks_)
-      if (block.name == key) from = block.begin, count = block.count;
-    const auto component = std::find(component_names_.begin(), component_names_.end(), key);
-    if (component != component_names_.end()) from = static_cast<int>(component - component_names_.begin());
+    const Block block = find(key, "--at");
     if (std::find(given.begin(), given.end(), key) != given.end())
       throw InputError(fmt::format("--at {}: is given twice", key));
     given.push_back(key);
-    if (from < 0) throw InputError(fmt::format("--at {}: no such parameter; allowed: {}", key, names_of(blocks_)));
-    for (int i = from; i < from + count; ++i) {
+    for (int i = block.begin; i < block.begin + block.count; ++i) {
       if (value < lower_[i] || value > upper_[i])
         throw InputError(
             fmt::format("--at {}: {} is out of bounds; allowed: {} to {}", key, value, lower_[i], upper_[i]));

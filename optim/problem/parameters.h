@@ -54,6 +54,10 @@ class Parameters {
   };
   const std::vector<Block>& blocks() const { return blocks_; }
 
+  /// The parameter, or the one component of it, of that name. Throws InputError, which begins with the command line's
+  /// `option`, where there is none.
+  Block find(const std::string& name, const char* option) const;
+
   /// The vertices of one parameter of type `vertices`, or of albedos by vertex: component `axis` of vertices[i] is the
   /// unknown begin + stride i + axis.
   struct VertexField {

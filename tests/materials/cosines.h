@@ -1,10 +1,16 @@
 // Materials as functions of three cosines, each of which can be set by itself, where a colour's value counts like another's.
 #pragma once
+#include <cmath>
 #include <string>
 
 #include "core/scene/materials/material.h"
 
 namespace isochron::testing {
+
+/// At theta from z.
+inline Vec3 direction(double theta, double phi) {
+  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
+}
 
 /// With vectors that are no directions but keep the three cosines apart in derivatives.
 inline Directions directions(double cos_i, double cos_o, double cos_io) {

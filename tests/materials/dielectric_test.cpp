@@ -16,18 +16,14 @@ namespace {
 
 using namespace textbook;
 using testing::CosineDerivative;
-using testing::derivative, testing::glass, testing::pdf, testing::value;
+using testing::derivative, testing::direction, testing::glass, testing::pdf, testing::value;
 
-struct Cosines {
+struct BothCosines {
   double i, o, io;
 };
 
-Cosines cosines(const Vec3& i, const Vec3& o) {
+BothCosines cosines(const Vec3& i, const Vec3& o) {
   return {i.z, o.z, dot(i, o)};
-}
-
-Vec3 direction(double theta, double phi) {
-  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
 }
 
 /// Refracts o at the microfacet h (o.h > 0) into a medium of relative index m; false under total reflection.
@@ -38,7 +34,7 @@ bool refract(const Vec3& o, const Vec3& h, double m, Vec3& i) {
   return true;
 }
 
-void expect_matches_walter(const Cosines& c, double alpha, double ior, int& compared) {
+void expect_matches_walter(const BothCosines& c, double alpha, double ior, int& compared) {
   using Jet = ceres::Jet<long double, 5>;
   const Jet expected = walter(Jet(c.i, 0), Jet(c.o, 1), Jet(c.io, 2), Jet(alpha, 3), Jet(ior, 4));
   const Material m = glass(alpha, ior);

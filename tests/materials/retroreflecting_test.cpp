@@ -22,10 +22,6 @@ Material retroreflector(double alpha, const Rgb& albedo = {0.3, 0.1, 0.5}, const
   return m;
 }
 
-Vec3 direction(double theta, double phi) {
-  return {std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)};
-}
-
 Directions directions(const Vec3& i, const Vec3& o) {
   return {{0, 0, 1}, i, o, i.z, o.z, dot(i, o)};
 }

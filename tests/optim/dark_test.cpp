@@ -7,12 +7,10 @@
 #include "optim/problem/rendered_objective.h"
 #include "optim/problem/statistics.h"
 #include "optim/run/loop.h"
-#include "tests/optim/temporary_folder.h"
+#include "tests/optim/tiny_scene.h"
 
 namespace isochron {
 namespace {
-
-const Poll kGoOn = [] {};
 
 class Dark : public testing::Test {
  protected:
@@ -62,21 +60,21 @@ TEST_F(Dark, LossAtTheTruthIsZero) {
   EXPECT_NEAR(std::sqrt(squared_noise / kRows) / found.standard_error[0], 1, 0.35);
 }
 
-struct Case {
+struct OptimizerCase {
   const char* parameter;
   const char* optimizer;
   double tolerance;  ///< relative; three or more standard deviations over seeds
 };
 
 TEST_F(Dark, EveryMethodFindsTheTruth) {
-  const Case cases[] = {
+  const OptimizerCase cases[] = {
       {kAlbedo, "{method: levenberg_marquardt, iterations: 30}", 0.02},
       {kAlbedo, "{method: lbfgs, learning_rate: 0.02, iterations: 20, inner_iterations: 3}", 0.02},
       {kAlbedo, "{method: adam, iterations: 120, stop: {window: 30}}", 0.03},
       {kEmission, "{method: levenberg_marquardt, iterations: 30}", 0.02},
   };
   const GatedImage target = Problem(load(kAlbedo)).make_target(kGoOn);  // the same for both
-  for (const Case& c : cases) {
+  for (const OptimizerCase& c : cases) {
     const Problem problem(load(c.parameter, {std::string("optimizer=") + c.optimizer}));
     const RenderedObjective objective(problem, target, kGoOn);
     const OptimizerSpec& spec = problem.experiment().optimizer;

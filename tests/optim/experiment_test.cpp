@@ -12,14 +12,14 @@
 namespace isochron {
 namespace {
 
-struct Case {
+struct Refusal {
   std::string from, to;
   std::string message;  ///< after the file's name
 };
 
 /// The tiny experiment with each of the changes is refused with its message, of which the beginning is given.
-void expect_messages(const TemporaryFolder& folder, std::span<const Case> cases) {
-  for (const Case& c : cases) {
+void expect_messages(const TemporaryFolder& folder, std::span<const Refusal> cases) {
+  for (const Refusal& c : cases) {
     const std::string file = folder.write("tiny.yaml", replaced(tiny_experiment(), c.from, c.to));
     try {
       load_experiment(file);
@@ -39,7 +39,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
   folder.write("wide.txt", "-1 0 3\n");
   folder.write("good.txt", "-1 0\n0 1\n");
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
-  const Case cases[] = {
+  const Refusal cases[] = {
       {"name: tiny", "nam: tiny", "1:1: name: is missing, is 'nam' a misspelling of it?"},
       {"name: tiny", "name: a/b", "1:7: name: 'a/b' is not a usable name (letters, digits, _ and -)"},
       {"scene.yaml", "none.yaml", "2:8: scene: there is no file 'none.yaml' (a path relative to the experiment file)"},
@@ -160,7 +160,7 @@ TEST(Experiment, MessagesAboutMapsNameTheirKeys) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string gates = "gates: {kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}\n";
-  const Case cases[] = {
+  const Refusal cases[] = {
       {"iterations: 6", "stop: 5", "10:54: optimizer.stop: is not a map (keys and values; its keys: window)"},
       {"iterations: 6", "stop: {}", "10:54: optimizer.stop.window: is missing"},
       {"iterations: 6", "decay: {start: 5}", "10:55: optimizer.decay.half_life: is missing"},

@@ -11,7 +11,7 @@
 namespace isochron {
 namespace {
 
-struct Case {
+struct GatesAlike {
   std::string gates, alike;  ///< `alike`: what `auto` comes down to
 };
 
@@ -20,8 +20,9 @@ TEST(Methods, KnowsWhatAutomaticSamplingComesDownTo) {
   TemporaryFolder folder;
   write_tiny_scene(folder);
   folder.write("tiny.yaml", tiny_experiment());
-  for (const Case& c : {Case{"gates={kind: steady}", "standard"},
-                        Case{"gates={kind: gaussian, centers: [4.5], sigma: 0.005}", "ellipsoidal_coupled"}}) {
+  for (const GatesAlike& c :
+       {GatesAlike{"gates={kind: steady}", "standard"},
+        GatesAlike{"gates={kind: gaussian, centers: [4.5], sigma: 0.005}", "ellipsoidal_coupled"}}) {
     SCOPED_TRACE(c.gates);
     const Experiment experiment = load_experiment(folder.file("tiny.yaml"), {c.gates});
     std::vector<std::string> notes;

@@ -16,8 +16,6 @@
 namespace isochron {
 namespace {
 
-const Poll kGoOn = [] {};
-
 /// A file as numpy.save writes it.
 std::string npy(const std::string& type, bool fortran, const std::string& shape, const std::string& elements) {
   std::string header =

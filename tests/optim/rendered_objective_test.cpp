@@ -13,8 +13,6 @@
 namespace isochron {
 namespace {
 
-const Poll kGoOn = [] {};
-
 class Rendered : public testing::Test {
  protected:
   Rendered() {

@@ -1,9 +1,13 @@
 #pragma once
 #include <string>
 
+#include "optim/problem/problem.h"
 #include "tests/optim/temporary_folder.h"
 
 namespace isochron {
+
+/// For what may be stopped from outside: nothing stops it.
+inline const Poll kGoOn = [] {};
 
 /// A floor, a raised quad and a lamp seen by 8 x 8 pixels; path lengths about 3.5 to 6.
 inline void write_tiny_scene(const TemporaryFolder& folder) {

@@ -15,15 +15,15 @@ GatedImage adjoint_for(const Scene& scene, const GateSet& gates, double shift) {
   return adjoint;
 }
 
-struct Case {
+struct BreakdownCase {
   const char* name;
   Sampling sampling;
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const BreakdownCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class Breakdown : public ::testing::TestWithParam<Case> {
+class Breakdown : public ::testing::TestWithParam<BreakdownCase> {
  protected:
   Breakdown() : scene_(load_scene(TEST_DATA "/reference/scene.yaml")) {
     scene_.camera.width = scene_.camera.height = 6;
@@ -159,8 +159,8 @@ TEST_P(Breakdown, HoldsWhatFewerBouncesFindOnAverage) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Samplings, Breakdown,
-                         ::testing::Values(Case{"standard", Sampling::standard},
-                                           Case{"ellipsoidal", Sampling::ellipsoidal}),
+                         ::testing::Values(BreakdownCase{"standard", Sampling::standard},
+                                           BreakdownCase{"ellipsoidal", Sampling::ellipsoidal}),
                          ::testing::PrintToStringParamName());
 
 }  // namespace

@@ -31,7 +31,7 @@ void expect_same(const std::vector<Batches>& one, const std::vector<Batches>& ot
   ::testing::Test::RecordProperty("error_over_scale", std::to_string(std::sqrt(difference / scale)));
 }
 
-struct Case {
+struct FlowCase {
   const char* name;
   bool glass;
   GateShape shape;
@@ -39,18 +39,18 @@ struct Case {
   double radius, reference_radius;
   int samples;  ///< per batch
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const FlowCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class CameraFlowOfEveryPixel : public ::testing::TestWithParam<Case> {};
+class CameraFlowOfEveryPixel : public ::testing::TestWithParam<FlowCase> {};
 
 /// Two radii give the same derivative in every pixel. Mean of squared z-scores over 64 pixels, 2 gates and 3
 /// motions (of which one third or so see something): with 32 batches its expectation is 31/29 = 1.07 and, the
 /// motions being correlated, its standard deviation at most 0.15: the limit of 1.7 means a false-alarm rate
 /// below 1e-4.
 TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
-  const Case& c = GetParam();
+  const FlowCase& c = GetParam();
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   scene.camera.width = scene.camera.height = 8;
   if (c.glass) replace_material(scene, "block", glass(0.3, 1.5));
@@ -88,10 +88,10 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
 
 INSTANTIATE_TEST_SUITE_P(
     Scenes, CameraFlowOfEveryPixel,
-    ::testing::Values(Case{"everything_follows", false, GateShape::gaussian(0.3), Sampling::standard, 1000, 0, 48},
-                      Case{"a_few_pixels_boxcar_ellipsoidal", false, GateShape::boxcar(0.6), Sampling::ellipsoidal, 6,
-                           0, 24},
-                      Case{"glass", true, GateShape::gaussian(0.3), Sampling::standard, 4, 16, 48}),
+    ::testing::Values(FlowCase{"everything_follows", false, GateShape::gaussian(0.3), Sampling::standard, 1000, 0, 48},
+                      FlowCase{"a_few_pixels_boxcar_ellipsoidal", false, GateShape::boxcar(0.6), Sampling::ellipsoidal,
+                               6, 0, 24},
+                      FlowCase{"glass", true, GateShape::gaussian(0.3), Sampling::standard, 4, 16, 48}),
     [](const auto& test) { return test.param.name; });
 
 /// A moving corner of two faces, bright, under a lamp that looks away from the camera.

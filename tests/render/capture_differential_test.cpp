@@ -21,14 +21,14 @@ struct LogAndLength {
 };
 
 /// Two scattering vertices on triangles 0 and 1 at given barycentrics; `ray`: of x1 where a camera looks, zero where a wall does.
-struct Case {
+struct CaptureCase {
   Scene scene;
   SurfacePoint start, end;
   Vec3 ray;
   std::array<double, 3> b[2];
 };
 
-LogAndLength by_textbook(const Case& c, const std::vector<Jet>& dofs) {
+LogAndLength by_textbook(const CaptureCase& c, const std::vector<Jet>& dofs) {
   const DofLayout layout(c.scene);
   const bool wall = c.ray == Vec3();
   Vec3T<Jet> x[4], n[3];
@@ -120,8 +120,8 @@ std::vector<double> values_of(const Scene& scene) {
 }
 
 /// Two triangles that face each other, the start and the end.
-Case make_case(bool wall, std::optional<PointLight::Kind> light) {
-  Case c;
+CaptureCase make_case(bool wall, std::optional<PointLight::Kind> light) {
+  CaptureCase c;
   const Material white = diffuse(Rgb(1.0), true);
   add_shape(c.scene, "near", {{{-0.3, -0.2, 1.1}, {0.4, -0.1, 1.0}, {0.05, 0.5, 1.2}}, {{0, 1, 2}}}, white);
   add_shape(c.scene, "far", {{{0.6, -0.3, 0.6}, {1.1, 0.1, 0.4}, {0.7, 0.4, 0.9}}, {{0, 1, 2}}}, white);
@@ -157,7 +157,7 @@ Case make_case(bool wall, std::optional<PointLight::Kind> light) {
   return c;
 }
 
-void expect_right(const Case& c) {
+void expect_right(const CaptureCase& c) {
   const TangentBasis basis = identity(c.scene);
   const PreparedScene prepared(c.scene, &basis, {});
   std::vector<SurfacePoint> x{c.start};

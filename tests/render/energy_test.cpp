@@ -13,7 +13,7 @@ namespace isochron::testing {
 namespace {
 
 constexpr double kLimit = 4.5;
-constexpr int kBatches = 38;
+constexpr int kEnergyBatches = 38;
 
 struct Rule {
   std::vector<double> x, w;  ///< on (0, 1)
@@ -113,7 +113,7 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
   for (const Sampling sampling : samplings(gate)) {
     const Renderer renderer(scene, gates, {.max_bounces = 0, .sampling = sampling});
     std::vector<Batches> batches(12 * gates.size());
-    for (int b = 0; b < kBatches; ++b) {
+    for (int b = 0; b < kEnergyBatches; ++b) {
       const GatedImage image = renderer.render({5, 0, 0}, {b * 200, (b + 1) * 200});
       for (int pixel = 0; pixel < 12; ++pixel)
         for (int g = 0; g < gates.size(); ++g) {
@@ -207,7 +207,7 @@ TEST_P(ClosedForm, DirectLightOnAFloor) {
   const GateSet gates(gate.shape(), centers);
   for (const Sampling sampling : samplings(gate)) {
     const Renderer renderer(scene, gates, {.max_bounces = 1, .sampling = sampling});
-    const auto means = image_means(renderer, gates.size(), 600, kBatches, {8, 0, 0});
+    const auto means = image_means(renderer, gates.size(), 600, kEnergyBatches, {8, 0, 0});
     for (int g = 0; g < gates.size(); ++g) {
       const int n = gate.jumps() ? 80 : 20;  // jumps leave kinks along the outer dimensions
       const double expected = floor_mean(scene, gate, centers[g], n);
@@ -225,7 +225,7 @@ INSTANTIATE_TEST_SUITE_P(, ClosedForm, ::testing::ValuesIn(kGates),
 
 /// A closed box whose walls all emit 1 and reflect `albedo`: after n bounces the radiance anywhere is a
 /// geometric sum.
-Scene furnace(double albedo) {
+Scene white_furnace(double albedo) {
   Scene scene;
   scene.camera = {{0.1, 0.2, 0.3}, {0.5, -0.2, -1}, {0, 1, 0}, 70, 4, 4};
   add_shape(scene, "walls", box({-1, -0.8, -1.2}, {1, 0.9, 1}, true), diffuse(Rgb(albedo)), Rgb(1.0));
@@ -234,7 +234,7 @@ Scene furnace(double albedo) {
 
 TEST(Furnace, EveryBounceAddsItsPower) {
   const double albedo = 0.6;
-  const Scene scene = furnace(albedo);
+  const Scene scene = white_furnace(albedo);
   // Steady, and a boxcar so wide that it holds every path of up to three bounces: the diagonal is below 3.45.
   const GateSet steady(GateShape::steady(), {0}), wide(GateShape::boxcar(14), {7});
   const struct {
@@ -252,7 +252,7 @@ TEST(Furnace, EveryBounceAddsItsPower) {
       expected += power;
       const Renderer renderer(scene, run.gates, {.max_bounces = bounces, .sampling = run.sampling});
       const Stream stream{static_cast<std::uint64_t>(12 + bounces), 0, 0};
-      const Estimate e = image_means(renderer, 1, run.samples, kBatches, stream)[0];
+      const Estimate e = image_means(renderer, 1, run.samples, kEnergyBatches, stream)[0];
       EXPECT_NEAR(e.mean, expected * run.weight, kLimit * e.standard_error + 1e-12) << bounces << " bounces";
       EXPECT_LT(e.standard_error, run.error * expected * run.weight) << bounces << " bounces";
       // The last bounce alone: nothing beyond it arrives, nothing short of it is missing.
@@ -267,10 +267,10 @@ TEST(Furnace, EveryBounceAddsItsPower) {
 /// Many bounces: Russian roulette keeps the mean.
 TEST(Furnace, RouletteKeepsTheMean) {
   const double albedo = 0.5;
-  const Scene scene = furnace(albedo);
+  const Scene scene = white_furnace(albedo);
   const GateSet steady(GateShape::steady(), {0});
   const Renderer renderer(scene, steady, {.max_bounces = 12});
-  const Estimate e = image_means(renderer, 1, 200, kBatches, {16, 0, 0})[0];
+  const Estimate e = image_means(renderer, 1, 200, kEnergyBatches, {16, 0, 0})[0];
   EXPECT_NEAR(e.mean, (1 - std::pow(albedo, 13)) / (1 - albedo), kLimit * e.standard_error);
   EXPECT_LT(e.standard_error, 2e-3);
 }
@@ -295,7 +295,7 @@ TEST_P(Agreement, OfStandardAndEllipsoidalPerBlock) {
     const Renderer renderer(scene, gates, {.max_bounces = bounces, .sampling = sampling});
     const int samples = sampling == Sampling::standard ? 32 : 24;
     std::vector<Batches> sums((blocks + 1) * gates.size());
-    for (int b = 0; b < kBatches; ++b) {
+    for (int b = 0; b < kEnergyBatches; ++b) {
       const GatedImage image =
           renderer.render({sampling == Sampling::standard ? 1u : 2u, 0, 0}, {b * samples, (b + 1) * samples});
       for (int g = 0; g < gates.size(); ++g) {

@@ -15,15 +15,15 @@
 namespace isochron::testing {
 namespace {
 
-struct Case {
+struct Figure8Case {
   const char* name;
   GateShape shape;
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const Figure8Case& c, std::ostream* out) {
   *out << c.name;
 }
 
-class Figure8 : public ::testing::TestWithParam<Case> {};
+class Figure8 : public ::testing::TestWithParam<Figure8Case> {};
 
 TEST_P(Figure8, Pixels) {
   constexpr int kBatches = 32, kTermSamples[3] = {32, 48, 4}, kReferenceSamples = 64;
@@ -80,11 +80,11 @@ TEST_P(Figure8, Pixels) {
   RecordProperty("rms_z", std::to_string(std::sqrt(squares / moving)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Gates, Figure8,
-                         ::testing::Values(Case{"gaussian", GateShape::gaussian(0.1)},
-                                           Case{"boxcar", GateShape::boxcar(0.25)},
-                                           Case{"truncated_gaussian", GateShape::truncated_gaussian(0.15, 0.15)}),
-                         [](const auto& test) { return test.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Gates, Figure8,
+    ::testing::Values(Figure8Case{"gaussian", GateShape::gaussian(0.1)}, Figure8Case{"boxcar", GateShape::boxcar(0.25)},
+                      Figure8Case{"truncated_gaussian", GateShape::truncated_gaussian(0.15, 0.15)}),
+    [](const auto& test) { return test.param.name; });
 
 }  // namespace
 }  // namespace isochron::testing

@@ -22,24 +22,24 @@ namespace {
 
 enum class Look { diffuse, glossy, retroreflecting, glass };
 
-struct Case {
+struct DifferenceCase {
   const char* name;
   Look look;
   GateShape shape;
   Sampling sampling;
   int samples, reference_samples;  ///< per batch
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const DifferenceCase& c, std::ostream* out) {
   *out << c.name;
 }
 
 /// With a response that comes late and has a tail.
 const GateShape kBin = GateShape::bin(0.5, {-0.3, 0, 1.2}, {0, 1, 0});
 
-class FiniteDifference : public ::testing::TestWithParam<Case> {};
+class FiniteDifference : public ::testing::TestWithParam<DifferenceCase> {};
 
 TEST_P(FiniteDifference, TotalDerivative) {
-  const Case& c = GetParam();
+  const DifferenceCase& c = GetParam();
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
   if (c.look == Look::glass) replace_material(scene, "block", glass(0.3, 1.5));
   if (c.look == Look::glossy) {
@@ -142,23 +142,28 @@ TEST_P(FiniteDifference, TotalDerivative) {
 INSTANTIATE_TEST_SUITE_P(
     Scenes, FiniteDifference,
     ::testing::Values(
-        Case{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120, 125},
-        Case{"diffuse_boxcar_standard", Look::diffuse, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
-        Case{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3),
-             Sampling::ellipsoidal, 40, 400},
-        Case{"diffuse_bins_standard", Look::diffuse, kBin, Sampling::standard, 120, 125},
-        Case{"diffuse_bins_ellipsoidal", Look::diffuse, kBin, Sampling::ellipsoidal, 60, 125},
-        Case{"diffuse_modulated_standard", Look::diffuse, GateShape::modulated(1.5), Sampling::standard, 120, 125},
-        Case{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60, 125},
-        Case{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40, 200},
-        Case{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3), Sampling::standard, 60,
-             200},
-        Case{"retroreflecting_gaussian_standard", Look::retroreflecting, GateShape::gaussian(0.3), Sampling::standard,
-             60, 125},
-        Case{"retroreflecting_boxcar_ellipsoidal", Look::retroreflecting, GateShape::boxcar(0.6), Sampling::ellipsoidal,
-             40, 200},
-        Case{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 125},
-        Case{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60, 125}),
+        DifferenceCase{"diffuse_gaussian_standard", Look::diffuse, GateShape::gaussian(0.3), Sampling::standard, 120,
+                       125},
+        DifferenceCase{"diffuse_boxcar_standard", Look::diffuse, GateShape::boxcar(0.6), Sampling::standard, 60, 400},
+        DifferenceCase{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3),
+                       Sampling::ellipsoidal, 40, 400},
+        DifferenceCase{"diffuse_bins_standard", Look::diffuse, kBin, Sampling::standard, 120, 125},
+        DifferenceCase{"diffuse_bins_ellipsoidal", Look::diffuse, kBin, Sampling::ellipsoidal, 60, 125},
+        DifferenceCase{"diffuse_modulated_standard", Look::diffuse, GateShape::modulated(1.5), Sampling::standard, 120,
+                       125},
+        DifferenceCase{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 60,
+                       125},
+        DifferenceCase{"glossy_boxcar_ellipsoidal", Look::glossy, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40,
+                       200},
+        DifferenceCase{"glossy_truncated_standard", Look::glossy, GateShape::truncated_gaussian(0.3, 0.3),
+                       Sampling::standard, 60, 200},
+        DifferenceCase{"retroreflecting_gaussian_standard", Look::retroreflecting, GateShape::gaussian(0.3),
+                       Sampling::standard, 60, 125},
+        DifferenceCase{"retroreflecting_boxcar_ellipsoidal", Look::retroreflecting, GateShape::boxcar(0.6),
+                       Sampling::ellipsoidal, 40, 200},
+        DifferenceCase{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 125},
+        DifferenceCase{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60,
+                       125}),
     [](const auto& test) { return test.param.name; });
 
 }  // namespace

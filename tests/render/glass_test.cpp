@@ -7,10 +7,10 @@
 namespace isochron::testing {
 namespace {
 
-constexpr int kBatches = 32;
+constexpr int kGlassBatches = 32;
 
 /// A block of glass with no two faces parallel, so that it traps no light, in a room whose black walls emit 1.
-Scene furnace(double ior) {
+Scene glass_furnace(double ior) {
   Scene scene;
   add_shape(scene, "walls", box({-2, -2, -2}, {2, 2, 2}, true), diffuse(Rgb(0)), Rgb(1.0));
   Mesh mesh = box({-0.5, -0.4, -0.5}, {0.5, 0.4, 0.5});
@@ -28,11 +28,11 @@ Scene furnace(double ior) {
 TEST(Glass, WhiteFurnace) {
   for (const double ior : {1.5, 0.7})
     for (const bool inside : {false, true}) {
-      Scene scene = furnace(ior);
+      Scene scene = glass_furnace(ior);
       scene.camera = {inside ? Vec3{0.05, 0, 0.1} : Vec3{0.3, 0.5, 1.6}, {0, 0, 0}, {0, 1, 0}, 40, 8, 8};
       const GateSet steady(GateShape::steady(), {0});
       const Renderer renderer(scene, steady, {.max_bounces = 60});
-      const Estimate e = image_means(renderer, 1, 16, kBatches, {61, 0, 0})[0];
+      const Estimate e = image_means(renderer, 1, 16, kGlassBatches, {61, 0, 0})[0];
       const double expected = inside ? ior * ior : 1;
       EXPECT_LT(e.mean, expected + 5 * e.standard_error) << ior << (inside ? " inside" : "");
       EXPECT_GT(e.mean, 0.98 * expected - 5 * e.standard_error) << ior << (inside ? " inside" : "");
@@ -80,7 +80,7 @@ TEST(Glass, StandardAgreesWithEllipsoidal) {
   for (const bool ellipsoidal : {false, true}) {
     const Sampling sampling = ellipsoidal ? Sampling::ellipsoidal : Sampling::standard;
     const Renderer renderer(scene, gates, {.max_bounces = 4, .sampling = sampling});
-    results[ellipsoidal] = image_means(renderer, 3, ellipsoidal ? 80 : 60, kBatches, {63, ellipsoidal, 0});
+    results[ellipsoidal] = image_means(renderer, 3, ellipsoidal ? 80 : 60, kGlassBatches, {63, ellipsoidal, 0});
   }
   for (int g = 0; g < 3; ++g) {
     const Estimate &a = results[0][g], &b = results[1][g];

@@ -31,7 +31,7 @@ Scene standing_cube(double albedo) {
   return scene;
 }
 
-struct ContactCase {
+struct StandingCase {
   const char* name;
   GateShape shape;
   double center;
@@ -40,14 +40,14 @@ struct ContactCase {
   int max_bounces;
   int samples;
 };
-void PrintTo(const ContactCase& c, std::ostream* out) {
+void PrintTo(const StandingCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class StandingCube : public ::testing::TestWithParam<ContactCase> {};
+class StandingCube : public ::testing::TestWithParam<StandingCase> {};
 
 TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
-  const ContactCase& c = GetParam();
+  const StandingCase& c = GetParam();
   const Scene scene = standing_cube(c.albedo);
   const std::vector<Motion> motions = {translate(scene, "cube", {1, 0, 0}), translate(scene, "cube", {0, 0, 1})};
   const TangentBasis basis = make_basis(scene, motions);
@@ -78,10 +78,10 @@ TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
 INSTANTIATE_TEST_SUITE_P(
     Gates, StandingCube,
     ::testing::Values(
-        ContactCase{"direct_gaussian_standard", GateShape::gaussian(0.4), 5.0, Sampling::standard, 0.7, 1, 40},
-        ContactCase{"direct_boxcar_ellipsoidal", GateShape::boxcar(1.2), 5.0, Sampling::ellipsoidal, 0.7, 1, 24},
-        ContactCase{"black_steady", GateShape::steady(), 0, Sampling::standard, 0, 2, 40},
-        ContactCase{"black_boxcar_ellipsoidal", GateShape::boxcar(1.2), 5.0, Sampling::ellipsoidal, 0, 2, 24}),
+        StandingCase{"direct_gaussian_standard", GateShape::gaussian(0.4), 5.0, Sampling::standard, 0.7, 1, 40},
+        StandingCase{"direct_boxcar_ellipsoidal", GateShape::boxcar(1.2), 5.0, Sampling::ellipsoidal, 0.7, 1, 24},
+        StandingCase{"black_steady", GateShape::steady(), 0, Sampling::standard, 0, 2, 40},
+        StandingCase{"black_boxcar_ellipsoidal", GateShape::boxcar(1.2), 5.0, Sampling::ellipsoidal, 0, 2, 24}),
     [](const auto& test) { return test.param.name; });
 
 /// Irradiance at p with normal n from a polygon of unit radiance, all of it above p's horizon (Lambert's

@@ -54,14 +54,14 @@ Scene make_scene(const Place& place) {
 }
 
 /// How far floor and lamp are moved.
-struct Shift {
+struct LampShift {
   double floor = 0;
   Vec3 lamp;
 };
 
 /// Mean of the image under the gate, by the midpoint rule: what the floor reflects, over the image, and the
 /// lamp itself, over its area.
-double image_mean(const Place& place, const GateShape& gate, double center, const Shift& shift) {
+double image_mean(const Place& place, const GateShape& gate, double center, const LampShift& shift) {
   const Vec3 forward = normalize(place.look_at - place.camera), right = normalize(cross(forward, Vec3{0, 1, 0}));
   const Vec3 up = cross(right, forward), area = cross(place.u, place.v) * 4.0, lamp = place.lamp + shift.lamp;
   const double t = std::tan(0.5 * place.fov * kPi / 180);
@@ -136,25 +136,25 @@ Place in_the_walls_plane() {
           quad({0, 0.2, -0.9}, {0, 0.2, -0.3}, {0, 0.6, -0.3}, {0, 0.6, -0.9})};
 }
 
-struct Case {
+struct LampCase {
   const char* name;
   Place (*place)();
   GateShape gate;
   double center, step;  ///< of the quadrature's finite difference
   Vec3 lamp_motion;
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const LampCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class HardLight : public ::testing::TestWithParam<Case> {};
+class HardLight : public ::testing::TestWithParam<LampCase> {};
 
 TEST_P(HardLight, MatchesQuadrature) {
-  const Case& c = GetParam();
+  const LampCase& c = GetParam();
   const Place place = c.place();
   const Scene scene = make_scene(place);
   const GateSet gates(c.gate, {c.center});
-  const std::vector<Shift> shifts = {{1, {}}, {0, c.lamp_motion}};
+  const std::vector<LampShift> shifts = {{1, {}}, {0, c.lamp_motion}};
   std::vector<Motion> motions = {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", c.lamp_motion)};
   if (!place.wall.faces.empty()) motions.push_back(translate(scene, "wall", {0, 1, 1}));
   const TangentBasis basis = make_basis(scene, motions);
@@ -205,15 +205,15 @@ TEST_P(HardLight, MatchesQuadrature) {
 INSTANTIATE_TEST_SUITE_P(
     Places, HardLight,
     ::testing::Values(
-        Case{"confocal", confocal, GateShape::gaussian(0.02), 4.3, 1e-3, {1, 0.3, 0}},
-        Case{"confocal_specular", confocal, GateShape::gaussian(0.004), 4.0, 1e-4, {0.5, 1, 0}},
-        Case{"beside_boxcar", beside_the_camera, GateShape::boxcar(0.04), 4.0, 2e-3, {0.5, 1, 0}},
-        Case{"specular", bistatic, GateShape::gaussian(1e-3 * kSpecular), kSpecular, 2e-4, {1, 1, 0}},
-        Case{"specular_boxcar", bistatic, GateShape::boxcar(4e-3 * kSpecular), kSpecular, 1e-3, {1, 1, 0}},
-        Case{"slivers", slivers, GateShape::gaussian(1e-3 * kSpecular), 1.002 * kSpecular, 2e-4, {1, 1, 0}},
-        Case{"straight_grazing", grazing, GateShape::gaussian(1e-3), 1.0, 2e-4, {0, 1, 0}},
-        Case{"straight_seen", seen, GateShape::gaussian(2e-3), std::sqrt(0.01 + 0.04 + 4), 2e-4, {0.2, 0.3, 1}},
-        Case{"in_plane", in_the_walls_plane, GateShape::gaussian(0.02), 3.21, 1e-3, {0, 1, 0.2}}),
+        LampCase{"confocal", confocal, GateShape::gaussian(0.02), 4.3, 1e-3, {1, 0.3, 0}},
+        LampCase{"confocal_specular", confocal, GateShape::gaussian(0.004), 4.0, 1e-4, {0.5, 1, 0}},
+        LampCase{"beside_boxcar", beside_the_camera, GateShape::boxcar(0.04), 4.0, 2e-3, {0.5, 1, 0}},
+        LampCase{"specular", bistatic, GateShape::gaussian(1e-3 * kSpecular), kSpecular, 2e-4, {1, 1, 0}},
+        LampCase{"specular_boxcar", bistatic, GateShape::boxcar(4e-3 * kSpecular), kSpecular, 1e-3, {1, 1, 0}},
+        LampCase{"slivers", slivers, GateShape::gaussian(1e-3 * kSpecular), 1.002 * kSpecular, 2e-4, {1, 1, 0}},
+        LampCase{"straight_grazing", grazing, GateShape::gaussian(1e-3), 1.0, 2e-4, {0, 1, 0}},
+        LampCase{"straight_seen", seen, GateShape::gaussian(2e-3), std::sqrt(0.01 + 0.04 + 4), 2e-4, {0.2, 0.3, 1}},
+        LampCase{"in_plane", in_the_walls_plane, GateShape::gaussian(0.02), 3.21, 1e-3, {0, 1, 0.2}}),
     [](const auto& test) { return test.param.name; });
 
 /// Values of images and derivative images that are not zero; none may fail to be finite.

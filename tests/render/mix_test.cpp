@@ -18,15 +18,15 @@
 namespace isochron::testing {
 namespace {
 
-struct Case {
+struct MixCase {
   const char* name;
   GateShape shape;
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const MixCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class Combined : public ::testing::TestWithParam<Case> {};
+class Combined : public ::testing::TestWithParam<MixCase> {};
 
 TEST_P(Combined, GivesWhatStandardSamplingGives) {
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
@@ -71,11 +71,11 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Gates, Combined,
-                         ::testing::Values(Case{"gaussian", GateShape::gaussian(0.15)},
-                                           Case{"truncated", GateShape::truncated_gaussian(0.2, 0.25)},
-                                           Case{"boxcar", GateShape::boxcar(0.5)},
-                                           Case{"table", GateShape::tabulated({-0.3, -0.1, -0.1, 0.2, 0.4},
-                                                                              {0.2, 0.8, 1.4, 0.6, 0.1})}),
+                         ::testing::Values(MixCase{"gaussian", GateShape::gaussian(0.15)},
+                                           MixCase{"truncated", GateShape::truncated_gaussian(0.2, 0.25)},
+                                           MixCase{"boxcar", GateShape::boxcar(0.5)},
+                                           MixCase{"table", GateShape::tabulated({-0.3, -0.1, -0.1, 0.2, 0.4},
+                                                                                 {0.2, 0.8, 1.4, 0.6, 0.1})}),
                          [](const auto& test) { return test.param.name; });
 
 /// Image and derivative by the light's motion with arcs picked uniformly, against those picked by

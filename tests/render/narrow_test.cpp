@@ -15,7 +15,7 @@
 namespace isochron::testing {
 namespace {
 
-constexpr double kRadiance = 7, kAlbedo = 0.6;
+constexpr double kEmission = 7, kReflected = 0.6;
 constexpr double kLampHeight = 2, kLampHalf = 0.5, kOccluderHeight = 1, kOccluderEdge = 0.1;
 const Vec3 kCamera{0.4, 3, 2};
 
@@ -104,23 +104,23 @@ double pixel_value(const GateShape& gate, double center, const Shift& s) {
       return sum_of_pieces(ends, [&](double z0, double z1) {
         return integrate(z0, z1, 30, [&](double z) {
           const double r2 = across + (z - d.z) * (z - d.z);
-          return kRadiance * kAlbedo / kPi * h * h / (r2 * r2) * gate.value(first + std::sqrt(r2) - center);
+          return kEmission * kReflected / kPi * h * h / (r2 * r2) * gate.value(first + std::sqrt(r2) - center);
         });
       });
     });
   });
 }
 
-struct Case {
+struct NarrowCase {
   const char* name;
   GateShape gate;
 };
 
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const NarrowCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class NarrowFieldOfView : public ::testing::TestWithParam<std::tuple<Case, Sampling>> {};
+class NarrowFieldOfView : public ::testing::TestWithParam<std::tuple<NarrowCase, Sampling>> {};
 
 TEST_P(NarrowFieldOfView, MatchesQuadrature) {
   const auto& [c, sampling] = GetParam();
@@ -179,12 +179,12 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
 // Total length is about 5.7: sigma 0.0114 is 0.2 %, 0.1 is 2 %.
 INSTANTIATE_TEST_SUITE_P(
     Gates, NarrowFieldOfView,
-    ::testing::Values(std::tuple(Case{"gaussian_narrow", GateShape::gaussian(0.0114)}, Sampling::ellipsoidal),
-                      std::tuple(Case{"truncated_narrow", GateShape::truncated_gaussian(0.0114, 0.0171)},
+    ::testing::Values(std::tuple(NarrowCase{"gaussian_narrow", GateShape::gaussian(0.0114)}, Sampling::ellipsoidal),
+                      std::tuple(NarrowCase{"truncated_narrow", GateShape::truncated_gaussian(0.0114, 0.0171)},
                                  Sampling::ellipsoidal),
-                      std::tuple(Case{"boxcar_narrow", GateShape::boxcar(0.0228)}, Sampling::ellipsoidal),
-                      std::tuple(Case{"gaussian_wide", GateShape::gaussian(0.1)}, Sampling::standard),
-                      std::tuple(Case{"boxcar_wide", GateShape::boxcar(0.2)}, Sampling::standard)),
+                      std::tuple(NarrowCase{"boxcar_narrow", GateShape::boxcar(0.0228)}, Sampling::ellipsoidal),
+                      std::tuple(NarrowCase{"gaussian_wide", GateShape::gaussian(0.1)}, Sampling::standard),
+                      std::tuple(NarrowCase{"boxcar_wide", GateShape::boxcar(0.2)}, Sampling::standard)),
     [](const auto& test) { return std::get<0>(test.param).name; });
 
 }  // namespace

@@ -18,13 +18,13 @@ Scene lit_box() {
   return scene;
 }
 
-const GateSet kWide(GateShape::gaussian(0.5), {3.5, 5});
+const GateSet kWideGates(GateShape::gaussian(0.5), {3.5, 5});
 
 // Direct light, 16 samples: the mean variance of pixels over 32 repeats, known to 2 % or so; it falls 3.3 times.
 TEST(LowDiscrepancy, VarianceOfASmoothImageFalls) {
   const Scene scene = lit_box();
   const auto variance = [&](Numbers numbers) {
-    const Renderer renderer(scene, kWide, {.max_bounces = 1, .sampling = Sampling::standard, .numbers = numbers});
+    const Renderer renderer(scene, kWideGates, {.max_bounces = 1, .sampling = Sampling::standard, .numbers = numbers});
     PixelBatches batches;
     for (std::uint32_t b = 0; b < 32; ++b) batches.add(renderer.render({1, b, 0}, {0, 16}));
     return batches.mean_variance();
@@ -38,7 +38,7 @@ TEST(LowDiscrepancy, VarianceOfASmoothImageFalls) {
 TEST(LowDiscrepancy, RangesStreamsAndPixelsAreIndependent) {
   constexpr int kRepeats = 64;
   const Scene scene = lit_box();
-  const Renderer renderer(scene, kWide, {.max_bounces = 1, .sampling = Sampling::standard});
+  const Renderer renderer(scene, kWideGates, {.max_bounces = 1, .sampling = Sampling::standard});
   const auto deviations = [&](std::uint32_t pass, SampleRange range) {
     std::vector<GatedImage> images;
     for (std::uint32_t i = 0; i < kRepeats; ++i) images.push_back(renderer.render({1, i, pass}, range));

@@ -84,9 +84,9 @@ void expect_same(const std::vector<double>& actual, const std::vector<double>& e
     ASSERT_NEAR(actual[i], expected[i], 1e-9 * scale) << what << ", degree of freedom " << i;
 }
 
-class Numbers {
+class RandomNumbers {
  public:
-  explicit Numbers(std::uint64_t seed) : rng_(Stream{seed, 0, 0}, 0, 0) {}
+  explicit RandomNumbers(std::uint64_t seed) : rng_(Stream{seed, 0, 0}, 0, 0) {}
   double in(double low, double high) { return low + (high - low) * rng_.uniform(); }
   bool coin() { return rng_.uniform() < 0.5; }
   int below(int n) { return static_cast<int>(n * rng_.uniform()); }
@@ -111,7 +111,7 @@ class Numbers {
 };
 
 /// A triangle of the plane through p with unit normal n, of which p has barycentrics b.
-Mesh triangle_about(const Vec3& p, const Vec3& n, const std::array<double, 3>& b, Numbers& numbers) {
+Mesh triangle_about(const Vec3& p, const Vec3& n, const std::array<double, 3>& b, RandomNumbers& numbers) {
   Vec3 s, t;
   complete_frame(n, s, t);
   Mesh mesh{{}, {{0, 1, 2}}};
@@ -127,7 +127,7 @@ Mesh triangle_about(const Vec3& p, const Vec3& n, const std::array<double, 3>& b
 
 /// `count` surface vertices at random places, each on a triangle of its own that faces both neighbours (or
 /// neither, where it is two-sided), with random materials.
-void random_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
+void random_path(int count, RandomNumbers& numbers, Scene& scene, PathSpec& spec) {
   std::vector<Vec3> x(count + 1);
   for (int k = 0; k <= count; ++k) x[k] = numbers.vector() * 0.7 + Vec3{k % 2 ? 1.5 : 0.0, 0.4 * k, 0.0};
   spec.camera = x[0];
@@ -150,7 +150,7 @@ void random_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
 
 /// A path through glass, more or less straight on: every vertex but the last refracts or reflects at a triangle of its
 /// own, of one of two kinds of glass.
-void glass_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
+void glass_path(int count, RandomNumbers& numbers, Scene& scene, PathSpec& spec) {
   std::vector<Vec3> x(count + 1);
   for (int k = 0; k <= count; ++k) x[k] = numbers.vector() * 0.25 + Vec3{0, 0, 1.0 * k};
   spec.camera = x[0];
@@ -176,7 +176,7 @@ void glass_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
 
 /// Two triangles that share an edge, like an open book, and a path that goes to and fro between them:
 /// vertices and materials occur again and again.
-void book_path(int count, Numbers& numbers, Scene& scene, PathSpec& spec) {
+void book_path(int count, RandomNumbers& numbers, Scene& scene, PathSpec& spec) {
   Mesh mesh;
   mesh.positions = {numbers.vector() * 0.1 + Vec3{0, -1, 0}, numbers.vector() * 0.1 + Vec3{0, 1, 0},
                     numbers.vector() * 0.1 + Vec3{-1, 0, 1}, numbers.vector() * 0.1 + Vec3{1, 0, 1}};
@@ -201,20 +201,20 @@ std::vector<int> every_dof(const Scene& scene) {
   return dofs;
 }
 
-using MakePath = void (*)(int, Numbers&, Scene&, PathSpec&);
-struct Case {
+using MakePath = void (*)(int, RandomNumbers&, Scene&, PathSpec&);
+struct MadePath {
   const char* name;
   MakePath make;
 };
 
-class PathDifferential : public ::testing::TestWithParam<Case> {};
+class PathDifferential : public ::testing::TestWithParam<MadePath> {};
 
 TEST_P(PathDifferential, AgreesWithJets) {
   int rough = 0, from_behind = 0;
   for (int count = 1; count <= 5; ++count)
     for (std::uint64_t trial = 0; trial < 60; ++trial) {
       SCOPED_TRACE("surface vertices " + std::to_string(count) + ", trial " + std::to_string(trial));
-      Numbers numbers(1000 * count + trial);
+      RandomNumbers numbers(1000 * count + trial);
       Scene scene;
       PathSpec spec;
       GetParam().make(count, numbers, scene, spec);
@@ -244,7 +244,7 @@ TEST_P(PathDifferential, AgreesWithJets) {
 TEST_P(PathDifferential, LeavesOutWhatIsStatic) {
   for (int count = 2; count <= 5; ++count)
     for (std::uint64_t trial = 0; trial < 40; ++trial) {
-      Numbers numbers(7000 * count + trial);
+      RandomNumbers numbers(7000 * count + trial);
       Scene scene;
       PathSpec spec;
       GetParam().make(count, numbers, scene, spec);
@@ -302,8 +302,8 @@ TEST(EdgeOnPath, HasNoDifferential) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, PathDifferential,
-                         ::testing::Values(Case{"Scattered", random_path}, Case{"ToAndFro", book_path},
-                                           Case{"ThroughGlass", glass_path}),
+                         ::testing::Values(MadePath{"Scattered", random_path}, MadePath{"ToAndFro", book_path},
+                                           MadePath{"ThroughGlass", glass_path}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace

@@ -41,21 +41,21 @@ Estimate sum(const Estimate& a, const Estimate& b) {
   return {a.mean + b.mean, std::hypot(a.standard_error, b.standard_error)};
 }
 
-struct Case {
+struct ReferenceCase {
   const char* kind;
   const char* names[3];
   GateShape shape;
   Sampling sampling;
   bool antithetic = true;
 };
-void PrintTo(const Case& c, std::ostream* out) {
+void PrintTo(const ReferenceCase& c, std::ostream* out) {
   *out << c.kind;
 }
 
-class Reference : public ::testing::TestWithParam<Case> {};
+class Reference : public ::testing::TestWithParam<ReferenceCase> {};
 
 TEST_P(Reference, EveryTerm) {
-  const Case& c = GetParam();
+  const ReferenceCase& c = GetParam();
   const bool standard = c.sampling == Sampling::standard;
   const std::string folder = TEST_DATA "/reference/";
   const Scene scene = load_scene(folder + "scene.yaml");
@@ -108,31 +108,31 @@ TEST_P(Reference, EveryTerm) {
 
 INSTANTIATE_TEST_SUITE_P(
     Gates, Reference,
-    ::testing::Values(Case{"gaussian_standard",
-                           {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
-                           GateShape::gaussian(0.3),
-                           Sampling::standard},
-                      Case{"boxcar_standard",
-                           {"boxcar:5:0:4.7:5.3", "boxcar:6:0:5.7:6.3", "boxcar:7:0:6.7:7.3"},
-                           GateShape::boxcar(0.6),
-                           Sampling::standard},
-                      Case{"truncated_standard",
-                           {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
-                           GateShape::truncated_gaussian(0.3, 0.3),
-                           Sampling::standard},
-                      Case{"gaussian_ellipsoidal",
-                           {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
-                           GateShape::gaussian(0.3),
-                           Sampling::ellipsoidal},
-                      Case{"truncated_ellipsoidal",
-                           {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
-                           GateShape::truncated_gaussian(0.3, 0.3),
-                           Sampling::ellipsoidal},
-                      Case{"truncated_uncoupled",
-                           {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
-                           GateShape::truncated_gaussian(0.3, 0.3),
-                           Sampling::ellipsoidal,
-                           false}),
+    ::testing::Values(ReferenceCase{"gaussian_standard",
+                                    {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
+                                    GateShape::gaussian(0.3),
+                                    Sampling::standard},
+                      ReferenceCase{"boxcar_standard",
+                                    {"boxcar:5:0:4.7:5.3", "boxcar:6:0:5.7:6.3", "boxcar:7:0:6.7:7.3"},
+                                    GateShape::boxcar(0.6),
+                                    Sampling::standard},
+                      ReferenceCase{"truncated_standard",
+                                    {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
+                                    GateShape::truncated_gaussian(0.3, 0.3),
+                                    Sampling::standard},
+                      ReferenceCase{"gaussian_ellipsoidal",
+                                    {"gauss:5:0.3:0:0", "gauss:6:0.3:0:0", "gauss:7:0.3:0:0"},
+                                    GateShape::gaussian(0.3),
+                                    Sampling::ellipsoidal},
+                      ReferenceCase{"truncated_ellipsoidal",
+                                    {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
+                                    GateShape::truncated_gaussian(0.3, 0.3),
+                                    Sampling::ellipsoidal},
+                      ReferenceCase{"truncated_uncoupled",
+                                    {"tgauss:5:0.3:4.7:5.3", "tgauss:6:0.3:5.7:6.3", "tgauss:7:0.3:6.7:7.3"},
+                                    GateShape::truncated_gaussian(0.3, 0.3),
+                                    Sampling::ellipsoidal,
+                                    false}),
     [](const auto& test) { return test.param.kind; });
 
 }  // namespace

@@ -47,7 +47,7 @@ const std::vector<std::vector<double>> kPoints = {
     {0.45, 0.3, 0.1, 2, 0}, {0, 0, 0, 0, 0},     {-0.2, -0.1, 0.05, 1, 0}, {-0.2, -0.1, 0.05, 1, 3}};
 
 /// The box, what moves in it, and gates.
-struct Setting {
+struct CacheSetting {
   Scene scene = small_box();
   std::vector<Motion> all = motions(scene);
   TangentBasis basis = make_basis(scene, all);
@@ -57,7 +57,7 @@ struct Setting {
 class Kept : public ::testing::TestWithParam<Sampling> {};
 
 TEST_P(Kept, GivesTheBitsOfAFreshOne) {
-  const auto [scene, all, basis, gates] = Setting();
+  const auto [scene, all, basis, gates] = CacheSetting();
   const EstimatorOptions options{.max_bounces = 3, .sampling = GetParam(), .guiding_samples = 8};
   SceneCache cache(scene, CasterUpdate::rebuild);
   std::size_t intersections = 0;
@@ -75,7 +75,7 @@ INSTANTIATE_TEST_SUITE_P(, Kept, ::testing::Values(Sampling::standard, Sampling:
 });
 
 TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
-  const Setting rigid;
+  const CacheSetting rigid;
   const EstimatorOptions options{.max_bounces = 3, .sampling = Sampling::standard};
   for (const bool deforms : {false, true}) {
     auto [scene, all, basis, gates] = rigid;
@@ -93,7 +93,7 @@ TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
 }
 
 TEST(KeptScenes, TimesOfPassesGoToTheirKind) {
-  const auto [scene, all, basis, gates] = Setting();
+  const auto [scene, all, basis, gates] = CacheSetting();
   SceneCache cache(scene, CasterUpdate::rebuild);
   const auto seconds = [&](PassKind kind) { return cache.times().seconds(kind); };
   const Renderer renderer(scene, gates, {.max_bounces = 2, .guiding_samples = 8}, &basis, &cache);
@@ -114,7 +114,7 @@ TEST(KeptScenes, TimesOfPassesGoToTheirKind) {
 }
 
 TEST(KeptScenes, TwoAtATimeDoNotMeet) {
-  const auto [scene, all, basis, gates] = Setting();
+  const auto [scene, all, basis, gates] = CacheSetting();
   const EstimatorOptions options{.max_bounces = 2, .sampling = Sampling::standard};
   SceneCache cache(scene, CasterUpdate::rebuild);
   const Scene a = at(scene, all, kPoints[1]), b = at(scene, all, kPoints[3]);
@@ -129,7 +129,7 @@ TEST(KeptScenes, TwoAtATimeDoNotMeet) {
 }
 
 TEST(PreparedScene, TouchesWhatMovedAlone) {
-  const auto [scene, all, basis, gates] = Setting();
+  const auto [scene, all, basis, gates] = CacheSetting();
   PreparedScene prepared(scene, &basis);
   const int before = prepared.revision();
   prepared.update(at(scene, all, {0.1, 0, 0, 0, 0}), &basis, {});

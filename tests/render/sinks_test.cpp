@@ -40,15 +40,15 @@ GateShape table() {
   return GateShape::tabulated({-0.4, -0.1, -0.1, 0.3, 0.5}, {0.2, 0.8, 1.4, 0.6, 0.1});
 }
 
-struct Setting {
+struct SinkSetting {
   const char* name;
   GateShape shape;
   Sampling sampling;
   bool antithetic;
 };
 
-std::vector<Setting> settings() {
-  std::vector<Setting> all;
+std::vector<SinkSetting> settings() {
+  std::vector<SinkSetting> all;
   for (const Sampling sampling : {Sampling::standard, Sampling::ellipsoidal}) {
     all.push_back({"gaussian", GateShape::gaussian(0.2), sampling, true});
     all.push_back({"boxcar", GateShape::boxcar(0.5), sampling, true});
@@ -74,7 +74,7 @@ TEST_P(Sinks, AdjointIsTheTransposeOfTheJacobian) {
   const Scene scene = make_scene(GetParam());
   const std::vector<Motion> motions = all_motions(scene);
   const TangentBasis basis = make_basis(scene, motions);
-  for (const Setting& s : settings()) {
+  for (const SinkSetting& s : settings()) {
     const GateSet gates(s.shape, {4.9, 5.6, 5.8});
     const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = s.sampling, .antithetic = s.antithetic},
                             &basis);

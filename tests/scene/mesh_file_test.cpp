@@ -21,7 +21,7 @@ void append(std::string& bytes, T value, bool big_endian = false) {
   bytes.append(raw, sizeof(T));
 }
 
-class MeshFile : public testing::Test {
+class MeshFile : public ::testing::Test {
  protected:
   Mesh read(const std::string& name, const std::string& contents) { return read_mesh(folder.write(name, contents)); }
   /// The message without the folder.

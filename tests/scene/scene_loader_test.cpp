@@ -31,7 +31,7 @@ double number(const Material& material, const char* quantity) {
   return material.number(material.find(quantity));
 }
 
-class SceneLoader : public testing::Test {
+class SceneLoader : public ::testing::Test {
  protected:
   SceneLoader() {
     folder.write("meshes/quad.obj", kQuad);

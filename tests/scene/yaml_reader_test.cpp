@@ -7,7 +7,7 @@
 namespace isochron {
 namespace {
 
-class YamlReader : public testing::Test {
+class YamlReader : public ::testing::Test {
  protected:
   YamlValue open(const std::string& text, const std::vector<std::string>& overrides = {}) {
     return open_yaml(folder.write("f.yaml", text), overrides);
