@@ -202,7 +202,8 @@ std::span<const EllipsoidalConnections::Choice> EllipsoidalConnections::choose(d
     return choices_;
   }
   for (int i = 0; i < count; ++i) evaluate(i, worker_.inverse_probability[i]);
-  const int tested = std::max(1, static_cast<int>(count * kRaysPerArc / rays));
+  // To hand on what is found takes about as long as its rays (profile of the sofa's path_length term).
+  const int tested = std::max(1, static_cast<int>(count * kRaysPerArc / (2 * rays)));
   const int carrying = static_cast<int>(choices_.size());
   if (carrying > tested) choices_.resize(sample_systematically(choices_.data(), carrying, tested, pick));
   return choices_;
