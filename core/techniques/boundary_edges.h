@@ -95,7 +95,7 @@ class BoundaryEdges {
   Choice primary_, secondary_;
   const Scene* at_first_;
   std::unique_ptr<MeshIntersections> intersections_;  ///< made when first asked for
-  int revision_ = 0;  ///< of the scene
+  int revision_ = 0;                                  ///< of the scene
   bool wedge_ = true, camera_possible_ = false;
 };
 

@@ -35,7 +35,7 @@ struct OptimizerSpec {
   int iterations = 100;
   double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
   int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
-  RateDecay decay;           ///< adam
+  RateDecay decay = {};      ///< adam
   int inner_iterations = 5;  ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
 };
 

@@ -174,7 +174,8 @@ TEST(QuasiNewton, EndsSearchesThatNoiseHides) {
     fit.inject = [&](const std::vector<double>& at, double loss) { return at == theta ? loss : loss + 0.1; };
     const Evaluation now = fit.evaluate(theta, 0);
     fit.gradients = 0;
-    const auto optimizer = make_quasi_newton(5);
+    const auto optimizer =
+        make_optimizer({.method = OptimizerMethod::quasi_newton, .inner_iterations = 5}, Preconditioner());
     EXPECT_EQ(optimizer->step(fit, now, theta, 0, 1), theta);
     EXPECT_TRUE(optimizer->rejected());
     return fit.gradients;

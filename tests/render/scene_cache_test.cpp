@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/geometry/mesh_intersections.h"
 #include "tests/render/support.h"
 
 namespace isochron::testing {
