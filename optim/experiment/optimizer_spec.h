@@ -27,12 +27,6 @@ struct RateDecay {
   }
 };
 
-/// The first iterations take several gates in a row for one, in which light that arrives at a wrong time is nearly right.
-struct CoarseStart {
-  int gates = 0;  ///< 0: none
-  int iterations = 0;
-};
-
 struct OptimizerSpec {
   OptimizerMethod method = OptimizerMethod::adam;
   /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
@@ -43,7 +37,6 @@ struct OptimizerSpec {
   int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
   RateDecay decay = {};      ///< adam
   int inner_iterations = 5;  ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
-  CoarseStart coarse = {};   ///< quasi_newton
 };
 
 inline void describe(Keys& keys, OptimizerSpec& optimizer) {
@@ -74,15 +67,6 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
              "line searches of an iteration, all on the same random numbers",
              {.only = only(optimizer.method, {OptimizerMethod::lbfgs, OptimizerMethod::quasi_newton})});
-  CoarseStart& coarse = optimizer.coarse;
-  const auto together = [&](Keys& inner) {
-    inner.value("gates", field::integer(coarse.gates, 2, 100000), "in a row whose readings are added up",
-                {.required = true});
-    inner.value("iterations", field::integer(coarse.iterations, 1, kMostIterations), "that do so", {.required = true});
-  };
-  keys.map("coarse", together,
-           "the first iterations fit sums over gates, to which what is far from its place is nearer",
-           {.only = of(OptimizerMethod::quasi_newton), .unset = coarse.gates == 0});
 }
 
 }  // namespace isochron

@@ -1,7 +1,6 @@
 // What an optimiser asks of the problem that it solves, and what it is told.
 #pragma once
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "core/image/image.h"
@@ -43,9 +42,6 @@ class Objective {
   /// J makes it too large, on average; otherwise it has no bias. Costs about as much as a gradient.
   virtual std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
                                               const Evaluation& now, int probe) const = 0;
-  /// The same unknowns with a loss of readings that are sums over so many gates in a row (of the last ones fewer). This must
-  /// outlive it. Null where there are no gates.
-  virtual std::unique_ptr<Objective> coarse([[maybe_unused]] int gates) const { return nullptr; }
 };
 
 }  // namespace isochron

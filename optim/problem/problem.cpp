@@ -273,29 +273,16 @@ void Problem::require_usable(const GatedImage& target, const std::string& what) 
   if (experiment_.loss.kind == LossKind::poisson) require_counts(target, readings_, what);
 }
 
-ReadingLoss Problem::reading_loss(const GatedImage& target, int gates_together) const {
+ReadingLoss Problem::reading_loss(const GatedImage& target) const {
   constexpr double kLeastMean = 0.02;  // see loss.h
   const LossSpec& loss = experiment_.loss;
-  const Readings readings = readings_of_sums(readings_, gates_together);
-  const double scale = loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings)
-                                                      : loss.scale * std::sqrt(mean_square(target, readings));
-  return scale > 0 ? ReadingLoss{loss.kind, scale, readings} : ReadingLoss{LossKind::squared, 0, readings};
+  const double scale = loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings_)
+                                                      : loss.scale * std::sqrt(mean_square(target, readings_));
+  return scale > 0 ? ReadingLoss{loss.kind, scale, readings_} : ReadingLoss{LossKind::squared, 0, readings_};
 }
 
-SplitImage Problem::sums(const SplitImage& image, int gates_together) const {
-  return {sum_of_gates(image.image, readings_, gates_together),
-          image.halved() ? sum_of_gates(image.difference, readings_, gates_together) : GatedImage(), image.first};
-}
-
-LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta,
-                           int gates_together) const {
-  LossEstimate estimate;
-  if (gates_together == 1) {
-    estimate = estimate_loss(image, target, reading_loss(target));
-  } else {
-    const GatedImage of_target = sum_of_gates(target, readings_, gates_together);
-    estimate = estimate_loss(sums(image, gates_together), of_target, reading_loss(of_target, gates_together));
-  }
+LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
+  LossEstimate estimate = estimate_loss(image, target, reading_loss(target));
   if (!penalty_.empty()) estimate.value += mean_square(target, readings_) * penalty_.value(theta);
   return estimate;
 }
@@ -307,16 +294,8 @@ EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) con
   return options;
 }
 
-GatedImage Problem::adjoint(const SplitImage& image, const GatedImage& target, int gates_together) const {
-  if (gates_together == 1) return loss_adjoint(image, target, reading_loss(target));
-  const GatedImage of_target = sum_of_gates(target, readings_, gates_together);
-  return of_each_gate(loss_adjoint(sums(image, gates_together), of_target, reading_loss(of_target, gates_together)),
-                      readings_, gates_together, target.gates);
-}
-
 Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                             const Poll& poll, Share share, std::vector<std::vector<double>>* parts,
-                             int gates_together) const {
+                             const Poll& poll, Share share, std::vector<std::vector<double>>* parts) const {
   const SampleSpec& samples = experiment_.samples;
   const Scene scene = parameters_->apply(theta);
   if (!coordinates_fit(scene)) return no_evaluation(target);
@@ -328,8 +307,8 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
   SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
   stage.advance();
-  set_loss(loss(image, target, theta, gates_together), result);
-  const GatedImage adjoint = this->adjoint(image, target, gates_together);
+  set_loss(loss(image, target, theta), result);
+  const GatedImage adjoint = loss_adjoint(image, target, reading_loss(target));
   result.image = std::move(image.image);
   poll();
   if (differences) {

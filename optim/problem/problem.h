@@ -130,21 +130,17 @@ class Problem {
 
   /// The experiment's loss, made absolute by the target's root mean square, for counts by their mean. Squared where the
   /// target is black.
-  /// `gates_together`: the target is the sum over so many gates in a row, sum_of_gates (readings.h).
-  ReadingLoss reading_loss(const GatedImage& target, int gates_together = 1) const;
+  ReadingLoss reading_loss(const GatedImage& target) const;
 
-  /// Loss of an image rendered at theta, the penalty included; of sums over gates, where asked for, with the mean squared error
-  /// of these.
-  LossEstimate loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta,
-                    int gates_together = 1) const;
+  /// Loss of an image rendered at theta, the penalty included.
+  LossEstimate loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const;
 
   /// Image, loss and gradient at theta from the random numbers of one iteration, unbiased (robust losses: as loss.h
   /// says). The loss is NaN where the share has a single sample of the image.
   /// `parts`, where asked for, becomes what terms and sets of pixels contribute to the gradient, the penalty aside:
   /// [part][unknown], the same terms and pixels whatever the share.
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                      const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr,
-                      int gates_together = 1) const;
+                      const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
 
   /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. theta must be one
   /// that can_render() accepts.
@@ -157,9 +153,6 @@ class Problem {
                                SampleRange range) const;
 
  private:
-  SplitImage sums(const SplitImage& image, int gates_together) const;
-  /// d(loss)/d(image), of the image's own gates.
-  GatedImage adjoint(const SplitImage& image, const GatedImage& target, int gates_together) const;
   /// The name of a light at the camera that parameters move away from it; empty where there is none.
   std::string light_that_leaves_the_camera() const;
 

@@ -20,33 +20,6 @@ double Readings::count(const GatedImage& image) const {
   return pixels(image) * gates * image.channels;
 }
 
-GatedImage sum_of_gates(const GatedImage& image, const Readings& readings, int together) {
-  if (together == 1) return image;
-  GatedImage sums(image.width, image.height, (image.gates + together - 1) / together, image.channels);
-  for (int pixel = 0; pixel < image.pixels(); ++pixel)
-    for (int g = 0; g < image.gates; ++g)
-      for (int c = 0; readings.uses_gate(g) && c < image.channels; ++c)
-        sums.data[sums.index(pixel, g / together, c)] += image.data[image.index(pixel, g, c)];
-  return sums;
-}
-
-Readings readings_of_sums(const Readings& readings, int together) {
-  if (together == 1 || readings.gate.empty()) return readings;
-  Readings of_sums{readings.pixel, std::vector<char>((readings.gate.size() + together - 1) / together, 0)};
-  for (std::size_t g = 0; g < readings.gate.size(); ++g) of_sums.gate[g / together] |= readings.gate[g];
-  return of_sums;
-}
-
-GatedImage of_each_gate(const GatedImage& sums, const Readings& readings, int together, int gates) {
-  if (together == 1) return sums;
-  GatedImage image(sums.width, sums.height, gates, sums.channels);
-  for (int pixel = 0; pixel < image.pixels(); ++pixel)
-    for (int g = 0; g < gates; ++g)
-      for (int c = 0; readings.uses_gate(g) && c < image.channels; ++c)
-        image.data[image.index(pixel, g, c)] = sums.data[sums.index(pixel, g / together, c)];
-  return image;
-}
-
 Readings make_readings(const Experiment& experiment, const GateSet& gates, int width, int height, int spots) {
   const TargetSpec& target = experiment.target;
   Readings readings;

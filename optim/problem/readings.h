@@ -30,13 +30,6 @@ void for_each_reading(const GatedImage& image, const Readings& readings, int pix
       for (int c = 0; c < image.channels; ++c) f(image.index(pixel, g, c));
 }
 
-/// What counts of a pixel, added up over so many gates in a row, as gates of an image with fewer; and which of these count.
-/// 1: the same.
-GatedImage sum_of_gates(const GatedImage& image, const Readings& readings, int together);
-Readings readings_of_sums(const Readings& readings, int together);
-/// The transpose of sum_of_gates: each gate that counts has the value of its sum.
-GatedImage of_each_gate(const GatedImage& sums, const Readings& readings, int together, int gates);
-
 /// As `target.window` and `target.mask` say, for images of so many pixels. The image has `spots` parts one below the other,
 /// to each of which the mask applies. Throws InputError where they do not fit or leave nothing.
 Readings make_readings(const Experiment& experiment, const GateSet& gates, int width, int height, int spots = 1);

@@ -88,11 +88,11 @@ SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint
 
 double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {
   if (!problem_.can_render(theta)) return std::numeric_limits<double>::infinity();
-  return problem_.loss(render(theta, iteration), target_, theta, gates_together_).value;
+  return problem_.loss(render(theta, iteration), target_, theta).value;
 }
 
 Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::uint32_t iteration) const {
-  return problem_.evaluate(theta, target_, iteration, poll_, {}, nullptr, gates_together_);
+  return problem_.evaluate(theta, target_, iteration, poll_);
 }
 
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
@@ -116,15 +116,12 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
 
 std::vector<double> RenderedObjective::probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
                                                        const Evaluation& now, int probe) const {
-  const GatedImage image = sum_of_gates(now.image, problem_.readings(), gates_together_);
-  const GatedImage target = sum_of_gates(target_, problem_.readings(), gates_together_);
-  GatedImage signs = image;
-  signs.data = curvature_weights(image, target, problem_.reading_loss(target, gates_together_));
+  GatedImage signs = now.image;
+  signs.data = curvature_weights(now.image, target_, problem_.reading_loss(target_));
   for (std::size_t i = 0; i < signs.data.size(); ++i) {
     Rng rng(problem_.stream(Pass::probe, iteration), i, static_cast<std::uint32_t>(probe));
     signs.data[i] = std::copysign(std::sqrt(signs.data[i]), rng.uniform() - 0.5);
   }
-  signs = of_each_gate(signs, problem_.readings(), gates_together_, target_.gates);
   std::vector<double> diagonal = problem_.transpose_apply(theta, signs, iteration, poll_);
   for (double& d : diagonal) d *= d;
   problem_.penalty().add_diagonal(mean_square(target_, problem_.readings()), diagonal);

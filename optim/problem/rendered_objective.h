@@ -17,10 +17,9 @@ void require_two_samples(const Problem& problem);
 
 class RenderedObjective : public Objective {
  public:
-  /// All must outlive this. `poll` is called between passes; what it throws leaves every function. `gates_together`: see
-  /// coarse().
-  RenderedObjective(const Problem& problem, const GatedImage& target, Poll poll, int gates_together = 1)
-      : problem_(problem), target_(target), poll_(std::move(poll)), gates_together_(gates_together) {}
+  /// All must outlive this. `poll` is called between passes; what it throws leaves every function.
+  RenderedObjective(const Problem& problem, const GatedImage& target, Poll poll)
+      : problem_(problem), target_(target), poll_(std::move(poll)) {}
 
   const std::vector<double>& lower() const override { return problem_.parameters().lower(); }
   const std::vector<double>& upper() const override { return problem_.parameters().upper(); }
@@ -32,9 +31,6 @@ class RenderedObjective : public Objective {
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
   std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
                                       int probe) const override;
-  std::unique_ptr<Objective> coarse(int gates) const override {
-    return std::make_unique<RenderedObjective>(problem_, target_, poll_, gates);
-  }
 
  private:
   SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;
@@ -42,7 +38,6 @@ class RenderedObjective : public Objective {
   const Problem& problem_;
   const GatedImage& target_;
   Poll poll_;
-  const int gates_together_;
 };
 
 }  // namespace isochron

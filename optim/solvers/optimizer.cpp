@@ -38,13 +38,6 @@ class ScaledObjective : public Objective {
     return diagonal;
   }
 
-  std::unique_ptr<Objective> coarse(int gates) const override {
-    std::unique_ptr<Objective> inner = objective_.coarse(gates);
-    auto scaled = std::make_unique<ScaledObjective>(*inner, scales_);
-    scaled->owned_ = std::move(inner);
-    return scaled;
-  }
-
   std::vector<double> to_u(std::vector<double> theta) const {
     for (std::size_t i = 0; i < theta.size(); ++i) theta[i] /= scales_[i];
     return theta;
@@ -68,7 +61,6 @@ class ScaledObjective : public Objective {
 
  private:
   const Objective& objective_;
-  std::unique_ptr<Objective> owned_;  ///< objective_, where nobody else has it
   const std::vector<double>& scales_;
   std::vector<double> lower_, upper_;
 };

@@ -28,17 +28,25 @@ bool finite(const Evaluation& at) {
 /// are carried from one iteration to the next: each pair is a difference on common random numbers, whichever they were.
 class QuasiNewton : public Optimizer {
  public:
-  explicit QuasiNewton(const OptimizerSpec& spec) : inner_iterations_(spec.inner_iterations), coarse_(spec.coarse) {}
+  explicit QuasiNewton(int inner_iterations) : inner_iterations_(inner_iterations) {}
 
   Vector step(const Objective& objective, const Evaluation& now, const Vector& theta, std::uint32_t iteration,
               double rate) override {
-    const auto coarse_iterations = static_cast<std::uint32_t>(coarse_.iterations);
-    if (iteration < coarse_iterations) {
-      const std::unique_ptr<Objective> sums = objective.coarse(coarse_.gates);
-      return search(*sums, sums->evaluate(theta, iteration), theta, iteration, rate);
+    update_diagonal(objective, now, theta, iteration);
+    rejected_ = true;
+    Vector at = theta;
+    Evaluation here = now;
+    for (int i = 0; i < inner_iterations_; ++i) {
+      Search search = descend(objective, iteration, at, here);
+      if (search == Search::failed && !pairs_.empty()) {  // the pairs may be to blame
+        pairs_.clear();
+        search = descend(objective, iteration, at, here);
+      }
+      if (search != Search::moved) break;
+      rejected_ = false;
     }
-    if (iteration == coarse_iterations) reset();  // diagonal and pairs are those of another loss
-    return search(objective, now, theta, iteration, rate);
+    for (std::size_t i = 0; i < at.size(); ++i) at[i] = theta[i] + rate * (at[i] - theta[i]);
+    return at;
   }
   bool rejected() const override { return rejected_; }
   bool scatters() const override { return true; }
@@ -71,26 +79,6 @@ class QuasiNewton : public Optimizer {
   struct Pair {
     Vector step, change;
   };
-
-  /// The steps of one iteration; `now` is evaluate(theta, iteration).
-  Vector search(const Objective& objective, const Evaluation& now, const Vector& theta, std::uint32_t iteration,
-                double rate) {
-    update_diagonal(objective, now, theta, iteration);
-    rejected_ = true;
-    Vector at = theta;
-    Evaluation here = now;
-    for (int i = 0; i < inner_iterations_; ++i) {
-      Search search = descend(objective, iteration, at, here);
-      if (search == Search::failed && !pairs_.empty()) {  // the pairs may be to blame
-        pairs_.clear();
-        search = descend(objective, iteration, at, here);
-      }
-      if (search != Search::moved) break;
-      rejected_ = false;
-    }
-    for (std::size_t i = 0; i < at.size(); ++i) at[i] = theta[i] + rate * (at[i] - theta[i]);
-    return at;
-  }
 
   void update_diagonal(const Objective& objective, const Evaluation& now, const Vector& theta,
                        std::uint32_t iteration) {
@@ -217,7 +205,6 @@ class QuasiNewton : public Optimizer {
   }
 
   int inner_iterations_;
-  CoarseStart coarse_;
   Vector diagonal_;
   double probes_ = 0;
   std::deque<Pair> pairs_;  ///< the newest last
@@ -227,7 +214,7 @@ class QuasiNewton : public Optimizer {
 }  // namespace
 
 std::unique_ptr<Optimizer> make_quasi_newton(const OptimizerSpec& spec) {
-  return std::make_unique<QuasiNewton>(spec);
+  return std::make_unique<QuasiNewton>(spec.inner_iterations);
 }
 
 }  // namespace isochron
