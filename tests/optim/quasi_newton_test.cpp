@@ -171,7 +171,7 @@ TEST(QuasiNewton, EndsSearchesThatNoiseHides) {
   const auto evaluations = [&](double noise) {
     ExponentialFit fit;
     fit.loss_noise = noise;
-    fit.inject = [&](const std::vector<double>& at, double loss) { return at == theta ? loss : loss + 0.1; };
+    fit.inject = [&](const std::vector<double>& at, double loss) { return at == theta ? loss : loss + 10; };
     const Evaluation now = fit.evaluate(theta, 0);
     fit.gradients = 0;
     const auto optimizer =
