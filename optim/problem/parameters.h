@@ -134,6 +134,8 @@ class Parameters {
   /// Throw InputError where there is none.
   int find_shape(const ParameterSpec& spec) const;
   int find_light(const ParameterSpec& spec) const;
+  /// Of a parameter that moves something, else false; `count` becomes the number of its unknowns.
+  bool bind_move(const ParameterSpec& spec, int first, int& count);
   void bind_light(const ParameterSpec& spec, int first);
   /// Returns how many unknowns there are.
   int bind_value(const ParameterSpec& spec, int first, double gate_unit);

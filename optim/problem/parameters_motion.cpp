@@ -1,4 +1,6 @@
-// How the parameters move vertices and the pivots that they turn about.
+// Parameters that move something: what they are bound to, and how they move vertices and the pivots that they turn about.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +18,101 @@ Vec3 rotate(const Vec3& p, const Vec3& axis, double radians) {
   return c * p + s * cross(axis, p) + (1 - c) * dot(axis, p) * axis;
 }
 
+/// Area-weighted sums of face normals at the vertices of a shape; zero where no face of positive area meets.
+std::vector<Vec3> vertex_normals(const Scene& scene, const Shape& shape) {
+  std::vector<Vec3> sum(shape.vertex_count);
+  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
+    const auto& v = scene.triangles[t].vertex;
+    const Vec3& a = scene.positions[v[0]];
+    const Vec3 area = cross(scene.positions[v[1]] - a, scene.positions[v[2]] - a);
+    for (int k : v) sum[k - shape.first_vertex] += area;
+  }
+  return sum;
+}
+
+int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, std::vector<int>& slot) {
+  const Selection& selection = spec.selection;
+  slot.assign(shape.vertex_count, -1);
+  int count = 0;
+  if (selection.kind == Selection::Kind::list) {
+    for (int v : selection.indices) {
+      if (v < 0 || v >= shape.vertex_count)
+        spec.fail("selection", fmt::format("there is no vertex {} in shape '{}'", v, shape.name),
+                  fmt::format("0 to {}", shape.vertex_count - 1));
+      if (slot[v] >= 0) spec.fail("selection", fmt::format("vertex {} is listed twice", v));
+      slot[v] = count++;
+    }
+  } else {
+    const Vec3 &lo = selection.min, &hi = selection.max;
+    for (int v = 0; v < shape.vertex_count; ++v) {
+      const Vec3& p = scene.positions[shape.first_vertex + v];
+      const bool inside = selection.kind == Selection::Kind::all ||
+                          (p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y && p.z >= lo.z && p.z <= hi.z);
+      if (inside) slot[v] = count++;
+    }
+  }
+  if (count == 0) spec.fail("selection", fmt::format("selects no vertex of shape '{}'", shape.name));
+  return count;
+}
+
 }  // namespace
+
+bool Parameters::bind_move(const ParameterSpec& spec, int first, int& count) {
+  switch (spec.type) {
+    case ParameterType::translation:
+    case ParameterType::rotation:
+    case ParameterType::vertices:
+      if (spec.light.empty()) {
+        Motion motion;
+        motion.first_component = first;
+        const int shape = find_shape(spec);
+        bind_motion(spec, motion, shape, count);
+        motions_[shape].push_back(std::move(motion));
+      } else {
+        bind_light(spec, first);
+      }
+      return true;
+    case ParameterType::camera_translation:
+      camera_motions_.push_back({spec.type, first, spec.direction});
+      return true;
+    case ParameterType::camera_rotation:
+      camera_motions_.push_back({spec.type, first, normalize(spec.axis)});
+      return true;
+    default:
+      return false;
+  }
+}
+
+void Parameters::bind_light(const ParameterSpec& spec, int first) {
+  const int light = find_light(spec);
+  const bool turns = spec.type == ParameterType::rotation;
+  if (turns && scene_.lights[light].kind == PointLight::Kind::point)
+    spec.fail("light", fmt::format("'{}' shines in all directions: turning it changes nothing", spec.light), "a spot");
+  if (spec.selection.kind != Selection::Kind::all) spec.fail("selection", "a light has no vertices");
+  light_motions_[light].push_back({spec.type, first, turns ? normalize(spec.axis) : spec.direction});
+}
+
+void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shape_index, int& count) {
+  const Shape& shape = scene_.shapes[shape_index];
+  motion.type = spec.type;
+  motion.direction_kind = spec.direction_kind;
+  motion.direction = spec.type == ParameterType::rotation ? normalize(spec.axis) : spec.direction;
+  const int selected = select(spec, scene_, shape, motion.slot);
+  if (spec.type == ParameterType::rotation) bind_pivot(spec, motion, shape_index);
+  if (spec.type != ParameterType::vertices) return;
+  count = spec.direction_kind == VertexDirection::free ? 3 * selected : selected;
+  if (spec.direction_kind != VertexDirection::normal) return;
+  const std::vector<Vec3> sums = vertex_normals(scene_, shape);
+  motion.normals.resize(selected);
+  for (int v = 0; v < shape.vertex_count; ++v) {
+    if (motion.slot[v] < 0) continue;
+    const double norm = length(sums[v]);
+    if (!(norm > 0))
+      spec.fail("direction", fmt::format("vertex {} of shape '{}' has no normal", v, shape.name),
+                "leave it out by selection");
+    motion.normals[motion.slot[v]] = sums[v] / norm;
+  }
+}
 
 void Parameters::bind_pivot(const ParameterSpec& spec, Motion& motion, int shape_index) const {
   motion.pivot = spec.pivot;
