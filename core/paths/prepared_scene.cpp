@@ -170,9 +170,10 @@ void PreparedScene::update_hidden() {
                                                       !changes(differentiable.light) &&
                                                       !changes(differentiable.emission);
   for (int t = 0; first_gradients_are_hidden && t < static_cast<int>(records_.size()); ++t) {
-    if (!records_[t].has_gradient || records_[t].hidden || records_[t].area == 0) continue;
+    // An emitter that moves is at the end of paths, too, which next-event estimation finds.
+    if (!records_[t].has_gradient || (records_[t].hidden && !emits(t)) || records_[t].area == 0) continue;
     gradients_are_hidden = false;
-    first_gradients_are_hidden = captures() && !seen(t);
+    first_gradients_are_hidden = captures() && !emits(t) && !seen(t);
   }
 }
 
