@@ -143,7 +143,7 @@ void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const Tria
   for (int first = 0; first < edges.count; first += EightBoxes::kWidth) {
     const EightBoxes& boxes = edges.boxes[first / EightBoxes::kWidth];
     const unsigned used = (1u << std::min(edges.count - first, EightBoxes::kWidth)) - 1;
-    for (unsigned bits = EightBoxes::bits(boxes.overlapping(of_node)) & used; bits != 0; bits &= bits - 1) {
+    for (unsigned bits = boxes.overlapping(of_node) & used; bits != 0; bits &= bits - 1) {
       const int lane = std::countr_zero(bits);
       meet(scene, edges.number[first + lane], boxes.get(lane), node, hits);
     }

@@ -60,11 +60,17 @@ struct EightBoxes {
     }
     return box;
   }
-  /// -1 in the lanes of boxes that overlap the given one, else 0.
-  Ints overlapping(const FloatBox& box) const {
-    Ints lanes = (low[0] <= box.high[0]) & (high[0] >= box.low[0]);
+  /// Sets the lanes of boxes that overlap the given one to -1, others to 0. (How such a vector is returned by value depends on
+  /// the processor that one compiles for.)
+  void find_overlapping(const FloatBox& box, Ints& lanes) const {
+    lanes = (low[0] <= box.high[0]) & (high[0] >= box.low[0]);
     for (int axis = 1; axis < 3; ++axis) lanes &= (low[axis] <= box.high[axis]) & (high[axis] >= box.low[axis]);
-    return lanes;
+  }
+  /// A bit for each box that overlaps the given one.
+  unsigned overlapping(const FloatBox& box) const {
+    Ints lanes;
+    find_overlapping(box, lanes);
+    return bits(lanes);
   }
   static unsigned bits(const Ints& lanes) {
     const auto pairs = reinterpret_cast<Longs>(lanes & Ints{1, 2, 4, 8, 16, 32, 64, 128});
@@ -79,10 +85,11 @@ struct TriangleCluster : EightBoxes {
   std::array<int, kWidth> triangle;
   int used = 0;
 
-  bool may_meet(const FloatBox& box) const { return bits(overlapping(box)) != 0; }
+  bool may_meet(const FloatBox& box) const { return overlapping(box) != 0; }
   /// Those whose boxes overlap the given one and that share no vertex with the edge.
   unsigned may_cross(const FloatBox& box, const std::array<int, 2>& edge) const {
-    Ints lanes = overlapping(box);
+    Ints lanes;
+    find_overlapping(box, lanes);
     for (const Ints& v : vertex) lanes &= (v != edge[0]) & (v != edge[1]);
     return bits(lanes);
   }
