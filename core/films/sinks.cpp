@@ -1,11 +1,17 @@
 #include "core/films/sinks.h"
 
+#include <iterator>
+#include <numeric>
+
 namespace isochron {
 
 void PrimalSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
   const Rgb weighted = value * use.value;
   if (film_.channels() == 1) {
-    gates_.for_each_value(length, [&](int g, double w) { *film_.at(pixel, g) += w * weighted.r; });
+    gates_.for_each_run(length, [&](const GateSet::Run& run) {
+      double* out = film_.at(pixel, run.first, run.size);
+      for (int k = 0; k < run.size; ++k) out[k] += run.value[k] * weighted.r;
+    });
     return;
   }
   gates_.for_each_value(length, [&](int g, double w) {
@@ -65,13 +71,34 @@ void AdjointSink::add(int pixel, const Rgb& value, double length, GateWeights us
   // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
   Rgb weight;
   double slope_weight = 0;
-  gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-    const double* a = &adjoint_.data[adjoint_.index(pixel, g)];
-    for (int c = 0; c < adjoint_.channels; ++c) {
-      weight[c] += a[c] * w * value[c];
-      slope_weight += a[c] * slope * value[c];
-    }
-  });
+  if (adjoint_.channels == 1) {
+    double values[GateSet::kRun] = {}, slopes[GateSet::kRun] = {};
+    gates_.for_each_run(length, [&](const GateSet::Run& run) {
+      const double* a = &adjoint_.data[adjoint_.index(pixel, run.first)];
+      const auto accumulate = [&](int count) {
+        for (int k = 0; k < count; ++k) {
+          values[k] += a[k] * run.value[k];
+          slopes[k] += a[k] * run.slope[k];
+        }
+      };
+      // A number of turns that the compiler knows makes them one vector.
+      if (run.size == GateSet::kRun) {
+        accumulate(GateSet::kRun);
+      } else {
+        accumulate(run.size);
+      }
+    });
+    weight.r = std::accumulate(values, std::end(values), 0.0) * value.r;
+    slope_weight = std::accumulate(slopes, std::end(slopes), 0.0) * value.r;
+  } else {
+    gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+      const double* a = &adjoint_.data[adjoint_.index(pixel, g)];
+      for (int c = 0; c < adjoint_.channels; ++c) {
+        weight[c] += a[c] * w * value[c];
+        slope_weight += a[c] * slope * value[c];
+      }
+    });
+  }
   scatter(weight * use.value, slope_weight * use.slope);
 }
 

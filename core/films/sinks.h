@@ -54,10 +54,10 @@ class Film {
       : channels_(shape.channels), gates_(shape.gates), sum_(&sum), offset_(offset) {}
 
   int channels() const { return channels_; }
-  /// The channels' values.
-  double* at(int pixel, int gate) const {
+  /// The values of all channels of a gate and of those after it, up to GateSet::kRun gates in all.
+  double* at(int pixel, int gate, int count = 1) const {
     const std::size_t index = (static_cast<std::size_t>(pixel) * gates_ + gate) * channels_;
-    return values_ ? values_ + index : sum_->at(offset_ + index, channels_);
+    return values_ ? values_ + index : sum_->at(offset_ + index, count * channels_);
   }
 
  private:

@@ -90,6 +90,7 @@ GateSet::GateSet(GateShape shape, std::vector<double> centers)
   std::iota(order_.begin(), order_.end(), 0);
   std::stable_sort(order_.begin(), order_.end(), [this](int a, int b) { return centers_[a] < centers_[b]; });
   for (std::size_t i = 0; i < order_.size(); ++i) sorted_[i] = centers_[order_[i]];
+  in_order_ = std::is_sorted(order_.begin(), order_.end());
   lower_ = shape_.is_unbounded() ? 0 : sorted_.front() + shape_.lower();
   upper_ = sorted_.back() + shape_.upper();
   if (shape_.kind() == GateKind::bin) {
@@ -97,9 +98,10 @@ GateSet::GateSet(GateShape shape, std::vector<double> centers)
     const double width = shape_.end() - shape_.begin();
     const auto apart = [&](double a, double b) { return !(std::abs(b - a - width) <= kSameEdge * width); };
     contiguous_ = std::adjacent_find(sorted_.begin(), sorted_.end(), apart) == sorted_.end();
-    stride_ = shape_.response().stride(width);
+    if (contiguous_ && in_order_) bins_ = BinTable(shape_.response(), width);
+    bins_per_length_ = 1 / width;
   }
-  sorted_.insert(sorted_.end(), kBlock, sorted_.back());
+  sorted_.insert(sorted_.end(), kRun, sorted_.back());
 }
 
 GateSet GateSet::shifted(double by) const {

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/gates/bin_table.h"
 #include "core/gates/linear_density.h"
 #include "core/gates/normal.h"
 
@@ -180,30 +181,37 @@ class GateSet {
   /// Calls f(gate, W_g(l)) for every gate whose support holds l.
   template <class F>
   void for_each_value(double l, F&& f) const {
-    const auto [begin, end] = reaching(l);
-    if (shape_.is_gaussian_inside()) {
-      for_each_gaussian(l, begin, end, [&](int gate, double, double w) { f(gate, w); });
-    } else if (contiguous_) {
-      for_each_bin(l, begin, end, [&](int gate, const GateShape::ValueAndDerivative& w) { f(gate, w.value); });
-    } else {
-      for (int i = begin; i < end; ++i) f(order_[i], shape_.value(l - sorted_[i]));
-    }
+    for_each_run(l, [&](const Run& run) {
+      for (int k = 0; k < run.size; ++k) f(run.first + k, run.value[k]);
+    });
   }
   /// Calls f(gate, W_g(l), W_g'(l)) for every gate whose support holds l.
   template <class F>
   void for_each_derivative(double l, F&& f) const {
+    for_each_run(l, [&](const Run& run) {
+      for (int k = 0; k < run.size; ++k) f(run.first + k, run.value[k], run.slope[k]);
+    });
+  }
+  /// Gates first ... first + size - 1, what they make of a length, and zeros for what is left of `kRun`.
+  static constexpr int kRun = 8;
+  struct Run {
+    int first = 0, size = 0;
+    double value[kRun], slope[kRun];
+  };
+  /// The same in runs of neighbours, so that what is done with them can be vectorised.
+  template <class F>
+  void for_each_run(double l, F&& f) const {
+    if (!bins_.empty()) {
+      for_each_bin_run(l, f);
+      return;
+    }
     const auto [begin, end] = reaching(l);
     if (shape_.is_gaussian_inside()) {
-      const double factor = shape_.gaussian_slope_factor();
-      for_each_gaussian(l, begin, end, [&](int gate, double x, double w) { f(gate, w, factor * x * w); });
+      for_each_gaussian_run(l, begin, end, f);
     } else if (contiguous_) {
-      for_each_bin(l, begin, end,
-                   [&](int gate, const GateShape::ValueAndDerivative& w) { f(gate, w.value, w.derivative); });
+      for_each_neighbour(l, begin, end, f);
     } else {
-      for (int i = begin; i < end; ++i) {
-        const auto w = shape_.value_and_derivative(l - sorted_[i]);
-        f(order_[i], w.value, w.derivative);
-      }
+      for (int i = begin; i < end; ++i) single(i, shape_.value_and_derivative(l - sorted_[i]), f);
     }
   }
   /// Standard deviation of the gates over the mean of their centres, where those below zero count as zero; unbounded gates:
@@ -213,8 +221,6 @@ class GateSet {
   double relative_coverage() const;
 
  private:
-  static constexpr int kBlock = 8;
-
   /// Range in `sorted_` of the gates whose support holds l.
   std::pair<int, int> reaching(double l) const {
     const double first = l - shape_.upper(), last = l - shape_.lower();
@@ -236,46 +242,76 @@ class GateSet {
     return static_cast<int>(at - sorted_.data()) + (condition(*at) ? 1 : 0);
   }
 
-  /// Calls f(gate, x, W) over a range of gaussian gates, a block at a time so that the exponentials
-  /// vectorise.
   template <class F>
-  void for_each_gaussian(double l, int begin, int end, F&& f) const {
-    for (int i = begin; i < end; i += kBlock) {
-      double x[kBlock], w[kBlock];
-      for (int k = 0; k < kBlock; ++k) {
-        x[k] = l - sorted_[i + k];
-        w[k] = shape_.gaussian_value(x[k]);
+  void single(int i, const GateShape::ValueAndDerivative& w, F&& f) const {
+    f(Run{order_[i], 1, {w.value}, {w.derivative}});
+  }
+
+  /// A run at a time, so that the exponentials vectorise.
+  template <class F>
+  void for_each_gaussian_run(double l, int begin, int end, F&& f) const {
+    for (int i = begin; i < end; i += kRun) {
+      Run run;
+      for (int k = 0; k < kRun; ++k) {
+        const double x = l - sorted_[i + k];
+        run.value[k] = shape_.gaussian_value(x);
+        run.slope[k] = shape_.gaussian_slope_factor() * x * run.value[k];
       }
-      const int count = std::min(kBlock, end - i);
-      for (int k = 0; k < count; ++k) f(order_[i + k], x[k], w[k]);
+      run.first = order_[i];
+      run.size = std::min(kRun, end - i);
+      if (in_order_) {
+        for (int k = run.size; k < kRun; ++k) run.value[k] = run.slope[k] = 0;
+        f(run);
+      } else {
+        for (int k = 0; k < run.size; ++k) single(i + k, {run.value[k], run.slope[k]}, f);
+      }
     }
   }
 
-  /// Neighbours share an edge, at which the response is looked up once.
   template <class F>
-  void for_each_bin(double l, int begin, int end, F&& f) const {
+  void for_each_bin_run(double l, F&& f) const {
+    if (!(l >= lower_ && l <= upper_)) return;
+    // In widths of a bin, from the end of the first one to the earliest time at which light of length l may be counted.
+    const double earliest = (l - sorted_[0] - shape_.upper()) * bins_per_length_, first = std::ceil(earliest);
+    const BinTable::Row row = bins_.row((first - earliest) / bins_per_length_);
+    const int gate = static_cast<int>(first);
+    const int begin = std::max(0, -gate), end = std::min(row.size, size() - gate);
+    for (int i = begin; i < end; i += kRun) {
+      Run run;
+      run.first = gate + i;
+      run.size = std::min(kRun, end - i);
+      for (int k = 0; k < kRun; ++k) {
+        const double constant = row.constant[i + k], linear = row.linear[i + k], square = row.square[i + k];
+        // Where the response is all but over, rounding could make the sum negative: its maximum with zero, without a branch.
+        const double value = constant + row.along * linear + row.half_square * square;
+        run.value[k] = 0.5 * (value + std::abs(value));
+        run.slope[k] = -(linear + row.along * square);
+      }
+      for (int k = run.size; k < kRun; ++k) run.value[k] = run.slope[k] = 0;
+      f(run);
+    }
+  }
+
+  /// Bins of no common grid with the response's knots: neighbours share an edge, at which the response is looked up once.
+  template <class F>
+  void for_each_neighbour(double l, int begin, int end, F&& f) const {
     if (begin >= end) return;
     const LinearDensity& response = shape_.response();
-    const auto edge = [&](int i) { return sorted_[i] + shape_.end() - l; };
     auto before = response.cumulated(sorted_[begin] + shape_.begin() - l);
-    const auto visit = [&](int i, const LinearDensity::Cumulated& after) {
-      f(order_[i], shape_.between(before, after));
+    for (int i = begin; i < end; ++i) {
+      const auto after = response.cumulated(sorted_[i] + shape_.end() - l);
+      single(i, shape_.between(before, after), f);
       before = after;
-    };
-    if (stride_ > 0) {
-      // The first gate whose support holds l ends within the response or after it.
-      LinearDensity::Comb comb(response, edge(begin), stride_);
-      for (int i = begin; i < end; ++i) visit(i, comb.next());
-    } else {
-      for (int i = begin; i < end; ++i) visit(i, response.cumulated(edge(i)));
     }
   }
 
   GateShape shape_;
+  bool in_order_ = false;    ///< centres rise
   bool contiguous_ = false;  ///< bins with a response, each beginning where the one before ends
-  int stride_ = 0;           ///< of the response from one of these bins to the next
+  BinTable bins_;            ///< of these, in order
+  double bins_per_length_ = 0;
   std::vector<double> centers_;
-  std::vector<double> sorted_;  ///< padded by a block, so that blocks may run past the end
+  std::vector<double> sorted_;  ///< padded by a run, so that runs may go past the end
   std::vector<int> order_;
   double lower_ = 0, upper_ = 0;
 };

@@ -18,9 +18,6 @@ void check_table(const std::vector<double>& offsets, const std::vector<double>& 
   }
 }
 
-/// So much of a step knots may be off and still count as evenly spaced.
-constexpr double kEven = 1e-9;
-
 }  // namespace
 
 LinearDensity::LinearDensity(const std::vector<double>& offsets, const std::vector<double>& values,
@@ -90,13 +87,6 @@ void LinearDensity::index() {
     guide_[b] = knot;
   }
   guide_[buckets] = n;
-}
-
-int LinearDensity::stride(double length) const {
-  if (!even_) return 0;
-  const double steps = length * bucket_scale_, whole = std::round(steps);
-  const bool fits = whole >= 1 && whole < static_cast<double>(knots_.size());
-  return fits && std::abs(steps - whole) <= kEven ? static_cast<int>(whole) : 0;
 }
 
 double LinearDensity::quantile(double u) const {

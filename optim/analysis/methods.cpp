@@ -223,7 +223,7 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
   }
   const GatedImage adjoint = loss_adjoint(image, target, problem_.reading_loss(target));
   std::vector<double> penalty(theta.size(), 0.0);
-  problem_.penalty().add_gradient(theta, mean_square(target, problem_.readings()), penalty);
+  problem_.penalty().add_gradient(theta, problem_.penalty_scale(target), penalty);
   const double before_derivatives = cpu_seconds();
   Estimate result;
   for (int component : components_) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace isochron {
 namespace {
@@ -80,14 +81,13 @@ double ReadingLoss::third(double image, double target) const {
   return -4 * x * (3 - t) / ((1 + t) * (1 + t) * (1 + t)) / scale;
 }
 
-SplitImage join_halves(const GatedImage& first, int first_samples, const GatedImage& second, int second_samples) {
-  SplitImage joined{first, first, static_cast<double>(first_samples) / (first_samples + second_samples)};
+SplitImage join_halves(GatedImage first, int first_samples, GatedImage second, int second_samples) {
+  const double part = static_cast<double>(first_samples) / (first_samples + second_samples);
   for (std::size_t i = 0; i < first.data.size(); ++i) {
-    const double difference = first.data[i] - second.data[i];
-    joined.difference.data[i] = difference;
-    joined.image.data[i] = second.data[i] + joined.first * difference;
+    first.data[i] -= second.data[i];
+    second.data[i] += part * first.data[i];
   }
-  return joined;
+  return {std::move(second), std::move(first), part};
 }
 
 LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, const ReadingLoss& rho) {

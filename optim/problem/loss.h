@@ -57,7 +57,7 @@ struct SplitImage {
 };
 
 /// Images `first` and `second` of independent random numbers, with so many samples.
-SplitImage join_halves(const GatedImage& first, int first_samples, const GatedImage& second, int second_samples);
+SplitImage join_halves(GatedImage first, int first_samples, GatedImage second, int second_samples);
 
 /// Estimates of a loss from one image.
 struct LossEstimate {

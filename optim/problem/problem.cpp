@@ -276,14 +276,19 @@ void Problem::require_usable(const GatedImage& target, const std::string& what) 
 ReadingLoss Problem::reading_loss(const GatedImage& target) const {
   constexpr double kLeastMean = 0.02;  // see loss.h
   const LossSpec& loss = experiment_.loss;
+  if (loss.kind == LossKind::squared) return {LossKind::squared, 0, readings_};
   const double scale = loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings_)
                                                       : loss.scale * std::sqrt(mean_square(target, readings_));
   return scale > 0 ? ReadingLoss{loss.kind, scale, readings_} : ReadingLoss{LossKind::squared, 0, readings_};
 }
 
+double Problem::penalty_scale(const GatedImage& target) const {
+  return penalty_.empty() ? 0 : mean_square(target, readings_);
+}
+
 LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
   LossEstimate estimate = estimate_loss(image, target, reading_loss(target));
-  if (!penalty_.empty()) estimate.value += mean_square(target, readings_) * penalty_.value(theta);
+  if (!penalty_.empty()) estimate.value += penalty_scale(target) * penalty_.value(theta);
   return estimate;
 }
 
@@ -323,7 +328,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
         (*parts)[k / values % kGradientParts][i] += adjoint.data[k] * derivative.data[k];
       poll();
     }
-    penalty_.add_gradient(theta, mean_square(target, readings_), result.gradient);
+    penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
     return result;
   }
   std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
@@ -338,7 +343,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
     poll();
   }
   result.gradient = basis.transpose_apply(dof_gradient);
-  penalty_.add_gradient(theta, mean_square(target, readings_), result.gradient);
+  penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
   return result;
 }
 

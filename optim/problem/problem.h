@@ -64,6 +64,8 @@ class Problem {
   const Preconditioner& preconditioner() const { return preconditioner_; }
   /// Of the offsets' slopes, to be multiplied by the target's mean square.
   const PairPenalty& penalty() const { return penalty_; }
+  /// What the penalty's value is multiplied with: the target's mean square; 0 where there is no penalty.
+  double penalty_scale(const GatedImage& target) const;
 
   /// The experiment's options with the mix of techniques that automatic sampling chooses, once for all values of the parameters:
   /// by a trial at their initial values, whose work is in proportion to the work that the choice is for. For gradients that is a

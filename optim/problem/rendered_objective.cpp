@@ -106,11 +106,11 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
   for (int half : {0, 1}) add_half(problem_, theta, iteration, half, poll_, jacobian);
   gauss_newton(jacobian, loss_adjoint(image, target_, rho).data, curvature_weights(image.image, target_, rho), result);
   result.image = std::move(image.image);
-  const double mean = mean_square(target_, problem_.readings());
+  const double scale = problem_.penalty_scale(target_);
   const int unknowns = static_cast<int>(theta.size());
-  problem_.penalty().add_gradient(theta, mean, result.gradient);
-  problem_.penalty().add_curvature(unknowns, mean, result.curvature);
-  problem_.penalty().add_curvature(unknowns, mean, result.curvature_bound);
+  problem_.penalty().add_gradient(theta, scale, result.gradient);
+  problem_.penalty().add_curvature(unknowns, scale, result.curvature);
+  problem_.penalty().add_curvature(unknowns, scale, result.curvature_bound);
   return result;
 }
 
@@ -124,7 +124,7 @@ std::vector<double> RenderedObjective::probe_curvature(const std::vector<double>
   }
   std::vector<double> diagonal = problem_.transpose_apply(theta, signs, iteration, poll_);
   for (double& d : diagonal) d *= d;
-  problem_.penalty().add_diagonal(mean_square(target_, problem_.readings()), diagonal);
+  problem_.penalty().add_diagonal(problem_.penalty_scale(target_), diagonal);
   return diagonal;
 }
 

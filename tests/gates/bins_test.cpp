@@ -110,7 +110,7 @@ TEST(Bins, ContiguousOrNotTheSameGates) {
   std::mt19937 generator(3);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (const Response& r : kResponses)
-    for (const double width : {0.4, 0.37, 3.2}) {
+    for (const double width : {0.4, 0.37, 3.2, 0.1 * std::sqrt(2.0), 0.025}) {
       const GateShape bin = GateShape::bin(width, r.offsets, r.values);
       std::vector<double> gaps;
       for (int g = 0; g < 30; ++g) gaps.push_back(-2 + (1.5 * g + 0.5) * width);
