@@ -25,8 +25,9 @@ struct MeshIntersections::ClusterEdges {
   const int cluster;
   const bool only_piercing;  ///< not those that went through nothing of their own shape at first
   int count = -1;            ///< not filled yet
-  std::array<int, 3 * EightBoxes::kWidth> number;
-  std::array<EightBoxes, 3> boxes;
+  std::array<const ClusterEdge*, 3 * EightBoxes::kWidth> edge;
+  std::array<FloatBox, 3 * EightBoxes::kWidth> each;
+  std::array<EightBoxes, 3> boxes;  ///< the same side by side
 };
 
 MeshIntersections::MeshIntersections(const Scene& at_first, double touching)
@@ -44,7 +45,7 @@ MeshIntersections::MeshIntersections(const Scene& at_first, double touching)
   edges_.resize(at_first.edges.size());
   std::vector<int> next = first_edge_;
   for (std::size_t e = 0; e < at_first.edges.size(); ++e)
-    edges_[next[cluster_of[at_first.edges[e].face[0]]]++] = static_cast<int>(e);
+    edges_[next[cluster_of[at_first.edges[e].face[0]]]++] = {static_cast<int>(e), at_first.edges[e].vertex};
 
   find_hits(at_first, std::vector<char>(at_first.shapes.size(), 1), true);
   for (const EdgeHit& hit : hits_) {
@@ -107,7 +108,8 @@ void MeshIntersections::find_hits(const Scene& scene, const std::vector<char>& m
         for (const int other : partners_of[s]) {
           const bool only_piercing = other == s && !all_edges && !scene.shapes[s].deforms;
           ClusterEdges edges(clusters_.box_of_cluster(i).grown(static_cast<float>(touching_)), i, only_piercing);
-          meet(scene, edges, clusters_.root(other), found[chunk]);
+          if (edges.box.overlaps(clusters_.box(clusters_.root(other))))
+            meet(scene, edges, clusters_.root(other), found[chunk]);
         }
     });
     for (const auto& each : found) hits_.insert(hits_.end(), each.begin(), each.end());
@@ -118,13 +120,13 @@ void MeshIntersections::find_hits(const Scene& scene, const std::vector<char>& m
 void MeshIntersections::fill(const Scene& scene, ClusterEdges& edges) const {
   edges.count = 0;
   for (int i = first_edge_[edges.cluster]; i < first_edge_[edges.cluster + 1]; ++i) {
-    const int number = edges_[i];
-    if (edges.only_piercing && !through_own_shape_[number]) continue;
+    const ClusterEdge& edge = edges_[i];
+    if (edges.only_piercing && !through_own_shape_[edge.number]) continue;
     FloatBox box;
-    for (const int v : scene.edges[number].vertex) box.add(scene.positions[v]);
-    edges.number[edges.count] = number;
-    edges.boxes[edges.count / EightBoxes::kWidth].set(edges.count % EightBoxes::kWidth,
-                                                      box.grown(static_cast<float>(touching_)));
+    for (const int v : edge.vertex) box.add(scene.positions[v]);
+    edges.edge[edges.count] = &edge;
+    box = edges.each[edges.count] = box.grown(static_cast<float>(touching_));
+    edges.boxes[edges.count / EightBoxes::kWidth].set(edges.count % EightBoxes::kWidth, box);
     ++edges.count;
   }
 }
@@ -132,10 +134,10 @@ void MeshIntersections::fill(const Scene& scene, ClusterEdges& edges) const {
 void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
                              std::vector<EdgeHit>& hits) const {
   const FloatBox& of_node = clusters_.box(node);
-  if (!edges.box.overlaps(of_node)) return;
   // Of large edges among small triangles each goes down by itself.
   if (!node.is_cluster() && edges.box.size() <= of_node.size()) {
-    for (const auto& child : TriangleClusters::children(node)) meet(scene, edges, child, hits);
+    for (const auto& child : TriangleClusters::children(node))
+      if (edges.box.overlaps(clusters_.box(child))) meet(scene, edges, child, hits);
     return;
   }
   if (node.is_cluster() && !clusters_.cluster(node.first).may_meet(edges.box)) return;
@@ -144,26 +146,33 @@ void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const Tria
     const EightBoxes& boxes = edges.boxes[first / EightBoxes::kWidth];
     const unsigned used = (1u << std::min(edges.count - first, EightBoxes::kWidth)) - 1;
     for (unsigned bits = boxes.overlapping(of_node) & used; bits != 0; bits &= bits - 1) {
-      const int lane = std::countr_zero(bits);
-      meet(scene, edges.number[first + lane], boxes.get(lane), node, hits);
+      const int i = first + std::countr_zero(bits);
+      if (node.is_cluster())
+        meet(scene, *edges.edge[i], edges.each[i], clusters_.cluster(node.first), hits);
+      else
+        meet(scene, *edges.edge[i], edges.each[i], node, hits);
     }
   }
 }
 
-void MeshIntersections::meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,
-                             std::vector<EdgeHit>& hits) const {
-  if (!node.is_cluster()) {
-    for (const auto& child : TriangleClusters::children(node))
-      if (box.overlaps(clusters_.box(child))) meet(scene, edge, box, child, hits);
+void MeshIntersections::meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
+                             const TriangleClusters::Node& node, std::vector<EdgeHit>& hits) const {
+  if (node.is_cluster()) {
+    meet(scene, edge, box, clusters_.cluster(node.first), hits);
     return;
   }
-  const TriangleCluster& cluster = clusters_.cluster(node.first);
-  for (unsigned bits = cluster.may_cross(box, scene.edges[edge].vertex); bits != 0; bits &= bits - 1)
+  for (const auto& child : TriangleClusters::children(node))
+    if (box.overlaps(clusters_.box(child))) meet(scene, edge, box, child, hits);
+}
+
+void MeshIntersections::meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
+                             const TriangleCluster& cluster, std::vector<EdgeHit>& hits) const {
+  for (unsigned bits = cluster.may_cross(box, edge.vertex); bits != 0; bits &= bits - 1)
     try_edge(scene, edge, cluster.triangle[std::countr_zero(bits)], hits);
 }
 
-void MeshIntersections::try_edge(const Scene& scene, int number, int triangle, std::vector<EdgeHit>& hits) const {
-  const Edge& edge = scene.edges[number];
+void MeshIntersections::try_edge(const Scene& scene, const ClusterEdge& edge, int triangle,
+                                 std::vector<EdgeHit>& hits) const {
   const auto& v = scene.triangles[triangle].vertex;
   const Vec3 &from = scene.positions[edge.vertex[0]], d = scene.positions[edge.vertex[1]] - from;
   const Vec3 a = scene.positions[v[0]] - from, b = scene.positions[v[1]] - from, c = scene.positions[v[2]] - from;
@@ -185,8 +194,8 @@ void MeshIntersections::try_edge(const Scene& scene, int number, int triangle, s
   Bounds box;
   for (const Vec3& corner : {a, b, c}) box.add(corner);
   if (!box.grown(0.5 * touching_).holds(point)) return;
-  for (const int face : edge.face)
-    if (face >= 0) hits.push_back({{std::min(face, triangle), std::max(face, triangle)}, number, from + point});
+  for (const int face : scene.edges[edge.number].face)
+    if (face >= 0) hits.push_back({{std::min(face, triangle), std::max(face, triangle)}, edge.number, from + point});
 }
 
 void MeshIntersections::join(const Scene& scene) {

@@ -34,6 +34,10 @@ class MeshIntersections {
     Vec3 point;
   };
   /// Edges whose first face is in one cluster, with boxes that overlap those of the triangles that they go through.
+  struct ClusterEdge {
+    int number;  ///< of Scene::edges
+    std::array<int, 2> vertex;
+  };
   struct ClusterEdges;
 
   /// Those of shapes that have moved; `all_edges`: also within shapes that do not deform.
@@ -41,16 +45,18 @@ class MeshIntersections {
   /// For each shape, those that its edges are to be tried against.
   std::vector<std::vector<int>> partners(const Scene& scene, const std::vector<char>& moved, bool all_edges) const;
   void fill(const Scene& scene, ClusterEdges& edges) const;
-  /// Against the triangles below the node: all of them; one whose box overlaps the node's.
+  /// All of them, or one, against the triangles below the node, or of a cluster. Its box overlaps theirs.
   void meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
             std::vector<EdgeHit>& hits) const;
-  void meet(const Scene& scene, int edge, const FloatBox& box, const TriangleClusters::Node& node,
+  void meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box, const TriangleClusters::Node& node,
             std::vector<EdgeHit>& hits) const;
-  void try_edge(const Scene& scene, int number, int triangle, std::vector<EdgeHit>& hits) const;
+  void meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box, const TriangleCluster& cluster,
+            std::vector<EdgeHit>& hits) const;
+  void try_edge(const Scene& scene, const ClusterEdge& edge, int triangle, std::vector<EdgeHit>& hits) const;
   void join(const Scene& scene);
 
   TriangleClusters clusters_;
-  std::vector<int> edges_;                  ///< cluster by cluster
+  std::vector<ClusterEdge> edges_;          ///< cluster by cluster
   std::vector<int> first_edge_;             ///< of each cluster, and the end
   std::vector<char> through_own_shape_;     ///< of each edge: in the scene at first
   std::vector<char> shape_pierces_itself_;  ///< one of its edges does

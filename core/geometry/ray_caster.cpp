@@ -81,8 +81,8 @@ void RayCaster::fill_vertices(const Scene& scene, unsigned geometry, int first_v
 }
 
 void RayCaster::update(const Scene& scene, const std::vector<char>& moved_shapes) {
-  offset_ = ray_offset(scene);
   if (std::find(moved_shapes.begin(), moved_shapes.end(), 1) == moved_shapes.end()) return;
+  offset_ = ray_offset(scene);
   if (update_ == CasterUpdate::rebuild) {
     rtcReleaseScene(scene_);
     build(scene);

@@ -52,14 +52,6 @@ struct EightBoxes {
       high[axis][lane] = box.high[axis];
     }
   }
-  FloatBox get(int lane) const {
-    FloatBox box;
-    for (int axis = 0; axis < 3; ++axis) {
-      box.low[axis] = low[axis][lane];
-      box.high[axis] = high[axis][lane];
-    }
-    return box;
-  }
   /// Sets the lanes of boxes that overlap the given one to -1, others to 0. (How such a vector is returned by value depends on
   /// the processor that one compiles for.)
   void find_overlapping(const FloatBox& box, Ints& lanes) const {

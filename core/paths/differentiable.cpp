@@ -1,5 +1,10 @@
 #include "core/paths/differentiable.h"
 
+#include <algorithm>
+#include <utility>
+
+#include "core/base/parallel.h"
+
 namespace isochron {
 
 Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
@@ -25,9 +30,14 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
   }
   for (int s = 0; s < layout.shapes; ++s)
     for (int c = 0; c < 3; ++c) emission[s] |= basis->differentiates(layout.emission(s, c));
+  std::vector<char> is_corner(vertex.size(), 0);
   for (std::size_t t = 0; t < triangle.size(); ++t) {
-    for (int v : scene.triangles[t].vertex) triangle[t] |= vertex[v];
-    geometry |= triangle[t] != 0;
+    const auto& corner = scene.triangles[t].vertex;
+    for (const int v : corner) triangle[t] |= vertex[v];
+    if (!triangle[t]) continue;
+    geometry = true;
+    for (const int v : corner)
+      if (!std::exchange(is_corner[v], 1)) corners.push_back(v);
   }
   for (int v = 0; v < layout.textured; ++v) texture[v] = basis->differentiates(layout.texture(v));
   for (int i = 0; i < layout.lights; ++i)
@@ -45,13 +55,15 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
 }
 
 void Differentiable::find_bounds(const Scene& scene) {
-  std::vector<std::uint8_t> counts(scene.positions.size(), 0);  // each vertex once
-  for (std::size_t t = 0; t < triangle.size(); ++t)
-    if (triangle[t])
-      for (const int v : scene.triangles[t].vertex) counts[v] = 1;
+  constexpr int kChunk = 4096;
+  const int count = static_cast<int>(corners.size());
+  std::vector<Bounds> parts(static_cast<std::size_t>((count + kChunk - 1) / kChunk));
+  parallel(static_cast<int>(parts.size()), [&](int chunk) {
+    for (int i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, count); ++i)
+      parts[chunk].add(scene.positions[corners[i]]);
+  });
   bounds = {};
-  for (std::size_t v = 0; v < counts.size(); ++v)
-    if (counts[v]) bounds.add(scene.positions[v]);
+  for (const Bounds& part : parts) bounds.add(part);
 }
 
 }  // namespace isochron

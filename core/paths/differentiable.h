@@ -18,10 +18,12 @@ struct Differentiable {
   std::vector<std::uint8_t> light;     ///< any number of it
   bool gain = false, time_offset = false;
   bool any = false;
-  bool geometry = false;    ///< vertices, or lights without an extent
-  Bounds bounds;            ///< of the triangles with a vertex that moves
-  bool lengths = false;     ///< paths can change their length
-  bool every_path = false;  ///< every path has a derivative
+  bool geometry = false;     ///< vertices, or lights without an extent
+  Bounds bounds;             ///< of the triangles with a vertex that moves
+  bool lengths = false;      ///< paths can change their length
+  bool every_path = false;   ///< every path has a derivative
+  std::vector<int> corners;  ///< the vertices of triangles that have one that moves, each once
+
   Differentiable() = default;
   Differentiable(const Scene& scene, const TangentBasis* basis);
   /// Sets `bounds`; to be called again when vertices have moved.

@@ -17,7 +17,8 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
       flows(source),
       caster(source, of_caster),
       records_(source.triangles.size()),
-      changed_(source.triangles.size(), -1) {
+      changed_(source.triangles.size(), -1),
+      shape_changed_(source.shapes.size(), -1) {
   for (std::size_t i = 0; i < records_.size(); ++i) {
     records_[i].shape = scene.triangles[i].shape;
     records_[i].vertex = scene.triangles[i].vertex;
@@ -29,10 +30,14 @@ std::vector<char> PreparedScene::move_vertices(const std::vector<Vec3>& position
   std::vector<char> moved(positions.size());
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
     const Shape& shape = scene.shapes[s];
-    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v)
-      moved_shapes[s] |= moved[v] = !(positions[v] == scene.positions[v]);
+    const auto begin = positions.begin() + shape.first_vertex, end = begin + shape.vertex_count;
+    const auto old = scene.positions.begin() + shape.first_vertex;
+    if (std::equal(begin, end, old)) continue;
+    moved_shapes[s] = 1;
+    std::transform(begin, end, old, moved.begin() + shape.first_vertex,
+                   [](const Vec3& a, const Vec3& b) { return !(a == b); });
+    std::copy(begin, end, old);
   }
-  scene.positions = positions;
   caster.update(scene, moved_shapes);
   return moved;
 }
@@ -58,6 +63,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
     if (same_pattern && !moved_shapes[s]) continue;
     any_changed = true;
+    shape_changed_[s] = revision_;
     const Shape& shape = scene.shapes[s];
     constexpr int kChunk = 4096;
     parallel((shape.triangle_count + kChunk - 1) / kChunk, [&](int chunk) {

@@ -39,6 +39,8 @@ class PreparedScene {
   /// or its material began or ceased to be differentiable.
   int revision() const { return revision_; }
   int changed(int triangle) const { return changed_[triangle]; }
+  /// That of the last update in which any of the shape's triangles may have changed.
+  int shape_changed(int shape) const { return shape_changed_[shape]; }
 
   Scene scene;  ///< a copy
   CameraModel camera;
@@ -302,7 +304,7 @@ class PreparedScene {
   }
 
   LargeArray<TriangleRecord> records_;
-  std::vector<int> changed_;
+  std::vector<int> changed_, shape_changed_;
   int revision_ = 0;
   std::vector<int> pattern_;                                           ///< TangentBasis::row_begin: what moves
   mutable std::array<std::unique_ptr<LazyHierarchy>, 3> hierarchies_;  ///< by Part

@@ -45,7 +45,7 @@ Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
 bool is_flat(const PreparedScene& scene, const Edge& edge) {
   if (edge.face[1] < 0) return false;
   const Vec3 &a = scene.normal(edge.face[0]), &b = scene.normal(edge.face[1]);
-  return dot(a, b) > 0 && length(cross(a, b)) <= kCoplanarAngle;
+  return dot(a, b) > 0 && length_squared(cross(a, b)) <= kCoplanarAngle * kCoplanarAngle;
 }
 
 /// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat
@@ -53,18 +53,16 @@ bool is_flat(const PreparedScene& scene, const Edge& edge) {
 bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int>& body_of_vertex) {
   const Scene& scene = prepared.scene;
   const Differentiable& differentiable = prepared.differentiable;
-  int body = -1, shape = -1;
-  for (std::size_t t = 0; t < scene.triangles.size(); ++t) {
-    if (!differentiable.triangle[t]) continue;
-    const int i = static_cast<int>(t), own = body_of_vertex[scene.triangles[t].vertex[0]];
-    if (std::exchange(shape, scene.triangles[t].shape) != scene.triangles[t].shape &&
-        (prepared.two_sided(i) || prepared.transparent(i)))
-      return false;
-    if (body < 0) body = own;
-    if (own != body) return false;
-  }
+  if (differentiable.corners.empty()) return true;
+  const int first = differentiable.corners.front();
+  for (const int v : differentiable.corners)
+    if (body_of_vertex[v] != body_of_vertex[first]) return false;
+  const Shape& shape = *std::find_if(scene.shapes.begin(), scene.shapes.end(),
+                                     [first](const Shape& s) { return first < s.first_vertex + s.vertex_count; });
+  if (prepared.two_sided(shape.first_triangle) || prepared.transparent(shape.first_triangle)) return false;
   bool open = false, flat = true;
-  for (const Edge& edge : scene.edges) {
+  for (int e = shape.first_edge; e < shape.first_edge + shape.edge_count; ++e) {
+    const Edge& edge = scene.edges[e];
     const bool moves[2] = {differentiable.triangle[edge.face[0]] != 0,
                            edge.face[1] >= 0 && differentiable.triangle[edge.face[1]]};
     if (!moves[0] && !moves[1]) continue;
@@ -94,6 +92,10 @@ VertexFlows::VertexFlows(const Scene& scene) {
   for (const Triangle& t : scene.triangles)
     for (const int v : t.vertex) sets.join(v, t.vertex[0]);
   body_of_vertex_ = sets.numbered(bodies_);
+  shape_of_body_.resize(static_cast<std::size_t>(bodies_));
+  for (std::size_t s = 0; s < scene.shapes.size(); ++s)
+    for (int v = scene.shapes[s].first_vertex; v < scene.shapes[s].first_vertex + scene.shapes[s].vertex_count; ++v)
+      shape_of_body_[body_of_vertex_[v]] = static_cast<int>(s);
 }
 
 void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& options) {
@@ -106,6 +108,7 @@ void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& opt
   camera_possible_ = follows_bodies_ = false;
   near_ = differentiable.bounds;
   if (!differentiable.geometry) return;
+  update_bodies(prepared);
   if (options.radius_in_pixels > 0 && !prepared.captures()) {  // whose x1 no pixel holds
     // x1 is within s of the box, and its own depth enters s.
     constexpr double kLargest = 0.5;
@@ -117,74 +120,128 @@ void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& opt
         radius_ < kLargest ? radius_ * depth / (1 - radius_) : std::numeric_limits<double>::infinity();
     camera_near_ = differentiable.bounds.grown(margin);
     camera_possible_ = !sees_nothing_of_itself(prepared, body_of_vertex_);
-    for (std::size_t t = 0; t < scene.triangles.size() && !camera_possible_; ++t)
-      camera_possible_ = !differentiable.triangle[t] && bounds_of(scene, scene.triangles[t]).overlaps(camera_near_);
+    for (std::size_t s = 0; s < scene.shapes.size(); ++s)
+      camera_possible_ = camera_possible_ || has_still_triangle_in_reach(prepared, s);
   }
   if (options.bodies > 0) find_near_bodies(prepared, options.bodies);
 }
 
-void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies) {
-  const std::size_t count = static_cast<std::size_t>(bodies_);
-  const std::vector<Vec3>& positions = prepared.scene.positions;
-  std::vector<Bounds> bounds(count);
-  std::vector<char> moves(count, 0), near(count);
-  for (std::size_t v = 0; v < positions.size(); ++v) {
-    bounds[body_of_vertex_[v]].add(positions[v]);
-    moves[body_of_vertex_[v]] |= prepared.differentiable.vertex[v] != 0;
+bool VertexFlows::has_still_triangle_in_reach(const PreparedScene& prepared, std::size_t s) const {
+  if (!shape_bounds_[s].overlaps(camera_near_)) return false;
+  const Scene& scene = prepared.scene;
+  const auto begin = scene.triangles.begin() + scene.shapes[s].first_triangle;
+  return std::any_of(begin, begin + scene.shapes[s].triangle_count, [&](const Triangle& triangle) {
+    return !prepared.differentiable.triangle[&triangle - scene.triangles.data()] &&
+           bounds_of(scene, triangle).overlaps(camera_near_);
+  });
+}
+
+void VertexFlows::update_bodies(const PreparedScene& prepared) {
+  const Scene& scene = prepared.scene;
+  shape_bounds_.resize(scene.shapes.size());
+  body_bounds_.resize(static_cast<std::size_t>(bodies_));
+  body_moves_.resize(body_bounds_.size());
+  for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
+    if (prepared.shape_changed(static_cast<int>(s)) <= bodies_revision_) continue;
+    const int begin = scene.shapes[s].first_vertex, end = begin + scene.shapes[s].vertex_count;
+    for (int v = begin; v < end; ++v) {
+      body_bounds_[body_of_vertex_[v]] = {};
+      body_moves_[body_of_vertex_[v]] = 0;
+    }
+    for (int v = begin; v < end; ++v) {
+      body_bounds_[body_of_vertex_[v]].add(scene.positions[v]);
+      body_moves_[body_of_vertex_[v]] |= prepared.differentiable.vertex[v] != 0;
+    }
   }
+  for (Bounds& bounds : shape_bounds_) bounds = {};
+  for (std::size_t body = 0; body < body_bounds_.size(); ++body)
+    shape_bounds_[shape_of_body_[body]].add(body_bounds_[body]);
+  bodies_revision_ = prepared.revision();
+}
+
+void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies) {
+  const std::size_t count = body_bounds_.size();
   body_radius_.resize(count);
-  for (std::size_t i = 0; i < count; ++i) body_radius_[i] = bodies * 0.5 * length(bounds[i].high - bounds[i].low);
+  for (std::size_t i = 0; i < count; ++i)
+    body_radius_[i] = bodies * 0.5 * length(body_bounds_[i].high - body_bounds_[i].low);
   double largest = 0;
   for (std::size_t i = 0; i < count; ++i)
-    for (std::size_t j = 0; j < count && moves[i]; ++j) {
+    for (std::size_t j = 0; j < count && body_moves_[i]; ++j) {
       const double radius = std::min(body_radius_[i], body_radius_[j]);
-      if (j != i && largest < radius && bounds[j].grown(radius).overlaps(bounds[i])) largest = radius;
+      if (j != i && largest < radius && body_bounds_[j].grown(radius).overlaps(body_bounds_[i])) largest = radius;
     }
   if (!(largest > 0)) return;  // no two bodies are close enough
   follows_bodies_ = true;
   near_ = prepared.differentiable.bounds.grown(largest);
   // Of a pair within `largest` of each other one is in near_.
-  for (std::size_t i = 0; i < count; ++i) near[i] = bounds[i].overlaps(near_.grown(largest));
-  find_patches(prepared, near);
+  std::vector<char> near(count);
+  for (std::size_t i = 0; i < count; ++i) near[i] = body_bounds_[i].overlaps(near_.grown(largest));
+  find_patches(prepared, std::move(near));
 }
 
-void VertexFlows::find_patches(const PreparedScene& prepared, const std::vector<char>& near) {
+void VertexFlows::find_patches(const PreparedScene& prepared, std::vector<char> near_bodies) {
   const Scene& scene = prepared.scene;
-  const std::size_t edges = scene.edges.size();
-  constexpr std::size_t kChunk = 4096, kAhead = 8;
-  std::vector<char> joined(edges), near_triangle(scene.triangles.size());
-  parallel(static_cast<int>((edges + kChunk - 1) / kChunk), [&](int chunk) {
-    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk;
-    const std::size_t end = std::min(begin + kChunk, edges);
-    for (std::size_t e = begin; e < end; ++e) {
+  bool others = near_bodies != near_bodies_, moved = false;
+  near_bodies_ = std::move(near_bodies);
+  flat_.resize(scene.edges.size());
+  for (int s = 0; s < static_cast<int>(scene.shapes.size()); ++s) {
+    if (prepared.shape_changed(s) <= flat_revision_) continue;
+    moved = true;
+    others |= update_flat_edges(prepared, s);
+  }
+  flat_revision_ = prepared.revision();
+  if (others) make_patches(scene);
+  if (!others && !moved) return;
+  for (Patch& patch : patches_) {
+    if (patch.triangles < 2) continue;
+    patch.area = 0;
+    for (int i = patch.first_triangle; i < patch.first_triangle + patch.triangles; ++i)
+      patch.area += prepared.area(triangles_[i]);
+  }
+}
+
+bool VertexFlows::update_flat_edges(const PreparedScene& prepared, int shape) {
+  const Scene& scene = prepared.scene;
+  const int first = scene.shapes[shape].first_edge, count = scene.shapes[shape].edge_count;
+  constexpr int kChunk = 4096, kAhead = 8;
+  std::vector<char> others(static_cast<std::size_t>((count + kChunk - 1) / kChunk), 0);
+  parallel(static_cast<int>(others.size()), [&](int chunk) {
+    const int begin = first + chunk * kChunk, end = std::min(begin + kChunk, first + count);
+    for (int e = begin; e < end; ++e) {
       const Edge& edge = scene.edges[e];
       if (e + kAhead < end)
         for (const int t : scene.edges[e + kAhead].face) prepared.prefetch(std::max(t, 0));
-      joined[e] = near[body_of_vertex_[edge.vertex[0]]] && is_flat(prepared, edge);
+      const char flat = is_flat(prepared, edge);
+      others[chunk] |= std::exchange(flat_[e], flat) != flat && near_bodies_[body_of_vertex_[edge.vertex[0]]];
     }
   });
-  for (std::size_t t = 0; t < near_triangle.size(); ++t)
-    near_triangle[t] = near[body_of_vertex_[scene.triangles[t].vertex[0]]];
-  if (joined != joined_ || near_triangle != near_triangle_ || patch_.empty()) {
-    joined_ = std::move(joined);
-    near_triangle_ = std::move(near_triangle);
-    make_patches(scene);
-  }
-  for (Patch& patch : patches_) patch.area = 0;
-  for (std::size_t t = 0; t < patch_.size(); ++t)
-    if (patch_[t] >= 0) patches_[patch_[t]].area += prepared.area(static_cast<int>(t));
+  return std::find(others.begin(), others.end(), 1) != others.end();
 }
 
 void VertexFlows::make_patches(const Scene& scene) {
   DisjointSets sets(scene.triangles.size());
-  for (std::size_t e = 0; e < joined_.size(); ++e)
-    if (joined_[e]) sets.join(scene.edges[e].face[0], scene.edges[e].face[1]);
+  const auto near = [&](std::size_t vertex) { return near_bodies_[body_of_vertex_[vertex]] != 0; };
+  for (std::size_t e = 0; e < flat_.size(); ++e)
+    if (flat_[e] && near(scene.edges[e].vertex[0])) sets.join(scene.edges[e].face[0], scene.edges[e].face[1]);
   int count;
   patch_ = sets.numbered(count);
   patches_.assign(static_cast<std::size_t>(count), {});
   for (std::size_t t = 0; t < patch_.size(); ++t) {
-    if (!near_triangle_[t]) patch_[t] = -1;
-    if (patch_[t] >= 0) patches_[patch_[t]].body = body_of_vertex_[scene.triangles[t].vertex[0]];
+    if (!near(scene.triangles[t].vertex[0])) patch_[t] = -1;
+    if (patch_[t] < 0) continue;
+    patches_[patch_[t]].body = body_of_vertex_[scene.triangles[t].vertex[0]];
+    ++patches_[patch_[t]].triangles;
+  }
+  int first_triangle = 0;
+  for (Patch& patch : patches_) {
+    patch.first_triangle = first_triangle;
+    first_triangle += std::exchange(patch.triangles, 0);
+  }
+  triangles_.resize(static_cast<std::size_t>(first_triangle));
+  for (std::size_t t = 0; t < patch_.size(); ++t) {
+    if (patch_[t] < 0) continue;
+    Patch& patch = patches_[patch_[t]];
+    triangles_[patch.first_triangle + patch.triangles++] = static_cast<int>(t);
   }
   const auto for_each_crease = [&](auto&& f) {
     for (std::size_t e = 0; e < scene.edges.size(); ++e) {
@@ -254,7 +311,10 @@ VertexFlows::Pair VertexFlows::pair(const PreparedScene& scene, const SurfacePoi
             w.missing += w.value * first.value;
             w.value *= first.missing;
           };
-          if (patches_[patch_x].area >= patches_[patch_y].area)
+          const auto area = [&](const Patch& patch, int triangle) {
+            return patch.triangles < 2 ? scene.area(triangle) : patch.area;
+          };
+          if (area(patches_[patch_x], x.triangle) >= area(patches_[patch_y], y.triangle))
             second(result.far, result.near, gradient_far);
           else
             second(result.near, result.far, gradient_near);

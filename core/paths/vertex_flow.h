@@ -78,13 +78,18 @@ class VertexFlows {
  private:
   struct Patch {
     int body = -1;
-    int first_crease = 0, creases = 0;
-    double area = 0;
+    int first_triangle = 0, triangles = 0;  ///< in `triangles_`
+    int first_crease = 0, creases = 0;      ///< in `creases_`
+    double area = 0;                        ///< of more than one triangle
   };
-  /// Sets `possible_patches_` and what depends on it.
+  /// Sets `follows_bodies_` and what depends on it.
   void find_near_bodies(const PreparedScene& scene, double bodies);
-  /// `near`: of each body, whether it may follow or be followed.
-  void find_patches(const PreparedScene& scene, const std::vector<char>& near);
+  void update_bodies(const PreparedScene& scene);
+  /// Whether a part of it that stands still reaches into `camera_near_`.
+  bool has_still_triangle_in_reach(const PreparedScene& scene, std::size_t shape) const;
+  void find_patches(const PreparedScene& scene, std::vector<char> near_bodies);
+  /// Whether an edge of a body near others is no longer what it was.
+  bool update_flat_edges(const PreparedScene& scene, int shape);
   void make_patches(const Scene& scene);
   Pair::Weight weight(const PreparedScene& scene, const Vec3& x, int patch, const Vec3& y, double largest,
                       Vec3& gradient_other) const;
@@ -96,13 +101,18 @@ class VertexFlows {
   Bounds near_;         ///< holds what moves and all others that may
   bool follows_bodies_ = false;
   std::vector<int> body_of_vertex_;  ///< connected meshes, which do not change when vertices move
+  std::vector<int> shape_of_body_;
   int bodies_ = 0;
+  std::vector<Bounds> shape_bounds_, body_bounds_;
+  std::vector<char> body_moves_;
+  int bodies_revision_ = 0;          ///< of the scene that these are of
   std::vector<double> body_radius_;  ///< times `follow`
-  std::vector<char> joined_;         ///< of each edge: its faces are one plane, and near other bodies
-  std::vector<char> near_triangle_;  ///< its body is near others
+  std::vector<char> near_bodies_;    ///< of each body, whether it may follow or be followed
+  std::vector<char> flat_;           ///< of each edge: its faces are one plane
+  int flat_revision_ = 0;            ///< of the scene that this is of
   std::vector<int> patch_;  ///< of each triangle that is: coplanar triangles of one mesh that share edges; else -1
   std::vector<Patch> patches_;
-  std::vector<int> creases_;  ///< edges, patch by patch
+  std::vector<int> triangles_, creases_;  ///< patch by patch; creases are edges
 };
 
 /// Adds g . (velocity of x1 along its pixel ray) to `out`.

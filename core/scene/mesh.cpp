@@ -125,4 +125,22 @@ std::vector<Edge> build_edges(const Mesh& mesh) {
   return edges;
 }
 
+int add_shape(Scene& scene, Shape shape, const Mesh& mesh, const std::vector<Edge>& edges) {
+  const int index = static_cast<int>(scene.shapes.size());
+  const int v = shape.first_vertex = static_cast<int>(scene.positions.size());
+  const int t = shape.first_triangle = static_cast<int>(scene.triangles.size());
+  shape.first_edge = static_cast<int>(scene.edges.size());
+  shape.vertex_count = static_cast<int>(mesh.positions.size());
+  shape.triangle_count = static_cast<int>(mesh.faces.size());
+  shape.edge_count = static_cast<int>(edges.size());
+  scene.positions.insert(scene.positions.end(), mesh.positions.begin(), mesh.positions.end());
+  for (const auto& f : mesh.faces) scene.triangles.push_back({{f[0] + v, f[1] + v, f[2] + v}, index});
+  for (const Edge& e : edges) {
+    const int other = e.face[1] < 0 ? -1 : e.face[1] + t;
+    scene.edges.push_back({{e.vertex[0] + v, e.vertex[1] + v}, {e.face[0] + t, other}});
+  }
+  scene.shapes.push_back(std::move(shape));
+  return index;
+}
+
 }  // namespace isochron

@@ -36,4 +36,7 @@ Mesh clean_mesh(const Mesh& mesh);
 /// faces.
 std::vector<Edge> build_edges(const Mesh& mesh);
 
+/// Adds a shape of the mesh as it is, whose edges these are; sets the shape's ranges. Returns its index.
+int add_shape(Scene& scene, Shape shape, const Mesh& mesh, const std::vector<Edge>& edges);
+
 }  // namespace isochron

@@ -30,7 +30,7 @@ struct Edge {
   std::array<int, 2> face;
 };
 
-/// One mesh: contiguous ranges of Scene::positions and Scene::triangles.
+/// One mesh: contiguous ranges of Scene::positions, Scene::triangles and Scene::edges.
 struct Shape {
   std::string name;
   std::string file;
@@ -38,6 +38,7 @@ struct Shape {
   AreaEmitter emission;
   int first_vertex = 0, vertex_count = 0;
   int first_triangle = 0, triangle_count = 0;
+  int first_edge = 0, edge_count = 0;
   bool deforms = false;   ///< parameters may move its vertices otherwise than as a rigid body
   bool textured = false;  ///< what Scene::texture says multiplies its material's BSDF
   bool hidden = false;    ///< points of paths are drawn on it, see HiddenGeometry

@@ -132,20 +132,7 @@ void add_shape(const ShapeKeys& keys, Scene& scene) {
   constexpr std::size_t kMost = std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
   if (scene.positions.size() + mesh.positions.size() > kMost || scene.triangles.size() + mesh.faces.size() > kMost)
     file.fail("the scene has too many vertices or triangles", fmt::format("at most {} of each", kMost));
-
-  shape.first_vertex = static_cast<int>(scene.positions.size());
-  shape.vertex_count = static_cast<int>(mesh.positions.size());
-  shape.first_triangle = static_cast<int>(scene.triangles.size());
-  shape.triangle_count = static_cast<int>(mesh.faces.size());
-  const int index = static_cast<int>(scene.shapes.size());
-  const int v = shape.first_vertex, t = shape.first_triangle;
-  scene.positions.insert(scene.positions.end(), mesh.positions.begin(), mesh.positions.end());
-  for (const auto& f : mesh.faces) scene.triangles.push_back({{f[0] + v, f[1] + v, f[2] + v}, index});
-  for (const Edge& e : edges) {
-    const int other = e.face[1] < 0 ? -1 : e.face[1] + t;
-    scene.edges.push_back({{e.vertex[0] + v, e.vertex[1] + v}, {e.face[0] + t, other}});
-  }
-  scene.shapes.push_back(std::move(shape));
+  add_shape(scene, std::move(shape), mesh, edges);
 }
 
 /// The name of one of the scene's materials.

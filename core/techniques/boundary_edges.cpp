@@ -1,7 +1,9 @@
 #include "core/techniques/boundary_edges.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "core/base/fast_angle.h"
 #include "core/base/parallel.h"
 #include "core/geometry/mesh_intersections.h"
 
@@ -46,22 +48,45 @@ BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Scene
 BoundaryEdges::~BoundaryEdges() = default;
 
 void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
-  const std::size_t count = scene.scene.edges.size();
+  const std::size_t shapes = scene.scene.shapes.size();
+  const int count = static_cast<int>(scene.scene.edges.size());
   // Which edges the camera samples depends on whether points may follow others.
   const bool all = revision_ == 0 || wedge != wedge_ || camera_possible_ != scene.flows.camera_possible();
-  const auto keep_edges_of_scene = [&] {
-    edges_.resize(count);
-    moves_.resize(count);
-    primary_.weights.resize(count);
-    secondary_.weights.resize(count);
+  const auto resize = [this](std::size_t edges) {
+    edges_.resize(edges);
+    moves_.resize(edges);
+    for (Weighted* each : {&primary_, &secondary_}) each->weights.resize(edges);
   };
-  if (revision_ == 0) keep_edges_of_scene();
-  constexpr std::size_t kChunk = 4096, kAhead = 8;
-  std::vector<char> changed((count + kChunk - 1) / kChunk, 0);
-  parallel(static_cast<int>(changed.size()), [&](int chunk) {
-    const std::size_t begin = static_cast<std::size_t>(chunk) * kChunk, end = std::min(begin + kChunk, count);
-    std::vector<std::size_t> edges;
-    for (std::size_t i = begin; i < end; ++i) {
+  if (revision_ == 0) {
+    resize(static_cast<std::size_t>(count));
+    for (Weighted* each : {&primary_, &secondary_}) each->choice.resize(shapes + 1);
+  }
+  bool changed = false;
+  for (std::size_t s = 0; s < shapes; ++s) {
+    if (!update_shape(scene, static_cast<int>(s), all, wedge)) continue;
+    changed = true;
+    set_group(s, scene.scene.shapes[s].first_edge, scene.scene.shapes[s].edge_count);
+  }
+  if (changed) {
+    resize(static_cast<std::size_t>(count));  // without the intersections of before
+    if (scene.differentiable.geometry) add_mesh_intersections(scene, wedge);
+    set_group(shapes, count, static_cast<int>(edges_.size()) - count);
+    for (Weighted* each : {&primary_, &secondary_}) each->choice.finish();
+  }
+  // Last: an interrupted update is made again.
+  revision_ = scene.revision();
+  wedge_ = wedge;
+  camera_possible_ = scene.flows.camera_possible();
+}
+
+bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all, bool wedge) {
+  if (!all && scene.shape_changed(shape) <= revision_) return false;
+  const int first = scene.scene.shapes[shape].first_edge, last = first + scene.scene.shapes[shape].edge_count;
+  constexpr int kChunk = 4096, kAhead = 8;
+  parallel((last - first + kChunk - 1) / kChunk, [&](int chunk) {
+    const int begin = first + chunk * kChunk, end = std::min(begin + kChunk, last);
+    std::vector<int> edges;
+    for (int i = begin; i < end; ++i) {
       const auto& face = scene.scene.edges[i].face;
       if (all || scene.changed(face[0]) > revision_ || (face[1] >= 0 && scene.changed(face[1]) > revision_))
         edges.push_back(i);
@@ -69,19 +94,20 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
     for (std::size_t k = 0; k < edges.size(); ++k) {
       if (k + kAhead < edges.size())
         for (const int t : scene.scene.edges[edges[k + kAhead]].face) scene.prefetch(std::max(t, 0));
-      update_edge(scene, edges[k], wedge);
+      update_edge(scene, static_cast<std::size_t>(edges[k]), wedge);
     }
-    changed[chunk] = !edges.empty();
   });
-  if (std::find(changed.begin(), changed.end(), 1) != changed.end()) {
-    keep_edges_of_scene();  // without the intersections of before
-    if (scene.differentiable.geometry) add_mesh_intersections(scene, wedge);
-    parallel(2, [&](int i) { finish(i == 0 ? primary_ : secondary_); });
-  }
-  // Last: an interrupted update is made again.
-  revision_ = scene.revision();
-  wedge_ = wedge;
-  camera_possible_ = scene.flows.camera_possible();
+  return true;
+}
+
+void BoundaryEdges::set_group(std::size_t group, int first, int count) {
+  parallel(2, [&](int i) {
+    Weighted& each = i == 0 ? primary_ : secondary_;
+    const auto of_group = [&](const auto& all) {
+      return std::span(all).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
+    };
+    each.choice.set_group(group, first, of_group(std::as_const(each.weights)), of_group(std::as_const(moves_)));
+  });
 }
 
 void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool wedge) {
@@ -97,7 +123,7 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
   Vec3 inward[2];
   for (int k = 0; k < faces; ++k) inward[k] = inward_direction(scene, e.face[k], e, tangent);
   double angle = degenerate ? 0 : kPi;
-  if (faces == 2 && !degenerate) angle -= std::atan2(length(cross(inward[0], inward[1])), dot(inward[0], inward[1]));
+  if (faces == 2 && !degenerate) angle -= fast_angle(length(cross(inward[0], inward[1])), dot(inward[0], inward[1]));
   const bool sharp = angle >= kCoplanarAngle;
   // Field by field: a copy of a whole edge would wait for the memory of those before.
   BoundaryEdge& b = edges_[i];
@@ -162,21 +188,11 @@ void BoundaryEdges::add_velocity(const PreparedScene& scene, const Sample& point
   }
 }
 
-void BoundaryEdges::finish(Choice& choice) const {
-  const std::vector<double>& weights = choice.weights;
-  double still = 0, moving = 0;
-  for (std::size_t i = 0; i < weights.size(); ++i) (moves_[i] ? moving : still) += weights[i];
-  if (still > 0 && moving > 0)
-    choice.distribution =
-        DiscreteDistribution(weights.size(), [&](std::size_t i) { return weights[i] / (moves_[i] ? moving : still); });
-  else
-    choice.distribution = DiscreteDistribution(weights);
-}
-
-BoundaryEdges::Pick BoundaryEdges::pick(const Choice& choice, double u) const {
-  const int i = choice.distribution.sample(u);
-  prefetch(edges_[i]);
-  return {&edges_[i], u, choice.distribution.below(i), choice.distribution.probability(i)};
+BoundaryEdges::Pick BoundaryEdges::pick(const EdgeChoice& choice, double u) const {
+  const EdgeChoice::Pick picked = choice.pick(u);
+  const BoundaryEdge& edge = edges_[picked.edge];
+  prefetch(edge);
+  return {&edge, u, picked.begin, picked.share};
 }
 
 BoundaryEdges::Sample::Sample(const Pick& picked) : Pick(picked), y(edge->point(s)), tangent(edge->end - edge->origin) {

@@ -3,10 +3,10 @@
 #include <memory>
 #include <vector>
 
-#include "core/base/discrete_distribution.h"
 #include "core/base/large_array.h"
 #include "core/paths/path_differential.h"
 #include "core/paths/prepared_scene.h"
+#include "core/techniques/edge_choice.h"
 
 namespace isochron {
 
@@ -61,14 +61,14 @@ class BoundaryEdges {
   /// Edges and intersections of meshes that the camera may see moving, by their length in the image and, inside of an
   /// outline, the angle between their faces; the same of static ones where points beside them may follow others, in equal
   /// shares. `u` in (0, 1).
-  bool has_primary() const { return !primary_.distribution.empty(); }
-  Sample sample_primary(double u) const { return Sample(pick(primary_, u)); }
+  bool has_primary() const { return !primary_.choice.empty(); }
+  Sample sample_primary(double u) const { return Sample(pick(primary_.choice, u)); }
   /// Edges that may come between two surfaces, by length times wedge; moving edges and static ones (which count
   /// where what lies behind or before them moves) get equal shares.
-  bool has_secondary() const { return !secondary_.distribution.empty(); }
+  bool has_secondary() const { return !secondary_.choice.empty(); }
   Sample sample_secondary(double u) const { return Sample(pick_secondary(u)); }
   /// The same in two steps, for callers with other work to do while the edge is read from memory.
-  Pick pick_secondary(double u) const { return pick(secondary_, u); }
+  Pick pick_secondary(double u) const { return pick(secondary_.choice, u); }
 
   /// Which side of the plane through the edge with unit normal n_b its faces lie on: +1, -1, or 0 when they lie on
   /// both (no boundary) or the plane holds a face.
@@ -78,21 +78,22 @@ class BoundaryEdges {
   static void add_velocity(const PreparedScene& scene, const Sample& point, const Vec3& n_b, LocalDifferential& out);
 
  private:
-  /// How often each of edges_ is picked: in proportion to a weight; where there are both, moving and static ones get equal
-  /// shares.
-  struct Choice {
+  /// How often each of edges_ is picked.
+  struct Weighted {
     std::vector<double> weights;
-    DiscreteDistribution distribution;
+    EdgeChoice choice;
   };
   /// The weights of an edge of the scene, which becomes edges_[i].
   void update_edge(const PreparedScene& scene, std::size_t i, bool wedge);
   void add_mesh_intersections(const PreparedScene& scene, bool wedge);
-  void finish(Choice& choice) const;
-  Pick pick(const Choice& choice, double u) const;
+  /// Makes the edges of a shape anew that have changed; false where none has.
+  bool update_shape(const PreparedScene& scene, int shape, bool all, bool wedge);
+  void set_group(std::size_t group, int first, int count);
+  Pick pick(const EdgeChoice& choice, double u) const;
 
   LargeArray<BoundaryEdge> edges_;   ///< those of the scene, then intersections of meshes
   std::vector<std::uint8_t> moves_;  ///< of each
-  Choice primary_, secondary_;
+  Weighted primary_, secondary_;     ///< a group per shape, and one of the intersections
   const Scene* at_first_;
   std::unique_ptr<MeshIntersections> intersections_;  ///< made when first asked for
   int revision_ = 0;                                  ///< of the scene

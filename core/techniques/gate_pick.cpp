@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/parallel.h"
+
 namespace isochron {
 
 GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint) : gates_(gates) {
@@ -18,15 +20,20 @@ GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint) : gates_(gat
     return sum;
   };
   rate_.assign(pixels, 0.0);
-  double* image = &below_[row(kImage)];
-  for (int pixel = 0; pixel < pixels; ++pixel) {
-    double* p = &below_[row(pixel)];
-    for (int g = 0; g < count; ++g) {
-      for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
-      image[g + 1] += p[g + 1];
+  constexpr int kChunk = 1024;  // pixels; sums do not depend on the number of threads
+  std::vector<std::vector<double>> of_chunk((pixels + kChunk - 1) / kChunk, std::vector<double>(count + 1, 0.0));
+  parallel(static_cast<int>(of_chunk.size()), [&](int chunk) {
+    for (int pixel = chunk * kChunk; pixel < std::min((chunk + 1) * kChunk, pixels); ++pixel) {
+      double* p = &below_[row(pixel)];
+      for (int g = 0; g < count; ++g) {
+        for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
+        of_chunk[chunk][g + 1] += p[g + 1];
+      }
+      rate_[pixel] = accumulate(pixel);
     }
-    rate_[pixel] = accumulate(pixel);
-  }
+  });
+  for (const std::vector<double>& each : of_chunk)
+    for (int g = 1; g <= count; ++g) below_[row(kImage) + g] += each[g];
   const double all = accumulate(kImage);
   if (all > 0)
     for (double& rate : rate_) rate *= pixels / all;

@@ -50,27 +50,13 @@ inline Mesh bumpy_ball(const Vec3& center, double radius) {
 /// The reference box with its block, the last shape, replaced by the bumpy ball.
 inline Scene large_scene() {
   Scene scene = small_scene();
-  Shape& block = scene.shapes.back();
+  const Shape block = scene.shapes.back();
+  scene.shapes.pop_back();
   scene.positions.resize(block.first_vertex);
   scene.triangles.resize(block.first_triangle);
-  std::erase_if(scene.edges, [&](const Edge& e) { return e.vertex[1] >= block.first_vertex; });
-
+  scene.edges.resize(block.first_edge);
   const Mesh ball = clean_mesh(bumpy_ball({-0.2, -0.4, 0.15}, 0.45));
-  const int shape = static_cast<int>(scene.shapes.size()) - 1;
-  block.vertex_count = static_cast<int>(ball.positions.size());
-  block.triangle_count = static_cast<int>(ball.faces.size());
-  scene.positions.insert(scene.positions.end(), ball.positions.begin(), ball.positions.end());
-  for (const auto& face : ball.faces) {
-    Triangle t{face, shape};
-    for (int& v : t.vertex) v += block.first_vertex;
-    scene.triangles.push_back(t);
-  }
-  for (Edge e : build_edges(ball)) {
-    for (int& v : e.vertex) v += block.first_vertex;
-    for (int& f : e.face)
-      if (f >= 0) f += block.first_triangle;
-    scene.edges.push_back(e);
-  }
+  add_shape(scene, block, ball, build_edges(ball));
   return scene;
 }
 

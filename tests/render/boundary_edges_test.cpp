@@ -120,6 +120,47 @@ TEST(BoundaryEdges, DensityIsTheFrequency) {
   }
 }
 
+// Static edges weigh 1 + 3 + 2, moving ones 4 + 5 + 5; either kind gets half. Group 1 has both, group 2 none of a weight.
+TEST(EdgeChoice, MovingAndStaticEdgesInEqualShares) {
+  const std::vector<double> weights{1, 3, 0, 4, 2, 5, 0, 0, 5};
+  const std::vector<std::uint8_t> moves{0, 0, 0, 1, 0, 1, 0, 1, 1};
+  EdgeChoice choice;
+  choice.resize(4);
+  const auto set_group = [&](std::size_t group, std::size_t first, std::size_t count) {
+    choice.set_group(group, static_cast<int>(first), std::span(weights).subspan(first, count),
+                     std::span(moves).subspan(first, count));
+  };
+  EXPECT_TRUE(choice.empty());
+  set_group(0, 0, 3);
+  set_group(1, 3, 3);
+  set_group(2, 6, 2);
+  set_group(3, 8, 1);
+  choice.finish();
+  constexpr int kDraws = 12000;
+  std::vector<int> counts(weights.size());
+  double last = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const double u = (i + 0.5) / kDraws;
+    double rest = u;
+    const EdgeChoice::Pick pick = choice.pick(rest);
+    ++counts[pick.edge];
+    EXPECT_NEAR(pick.begin + rest * pick.share, u, 1e-14);
+    EXPECT_NEAR(pick.share, weights[pick.edge] / (moves[pick.edge] ? 14 : 6) / 2, 1e-15);
+    EXPECT_GE(pick.begin, last);
+    last = pick.begin;
+  }
+  for (std::size_t i = 0; i < weights.size(); ++i)
+    EXPECT_NEAR(counts[i], kDraws * weights[i] / (moves[i] ? 14 : 6) / 2, 1) << i;
+  // Without static edges.
+  set_group(0, 2, 1);
+  set_group(1, 5, 1);
+  choice.finish();
+  double u = 0.3;
+  const EdgeChoice::Pick pick = choice.pick(u);
+  EXPECT_EQ(pick.edge, 5);
+  EXPECT_NEAR(pick.share, 0.5, 1e-15);
+}
+
 /// A camera sees three faces of a cube from a corner, and one from straight ahead; what it cannot see is not looked at, save
 /// where its back reflects or lets light through. No edge is lost that is partly in the image.
 TEST(BoundaryEdges, OnlyThoseThatTheCameraCanSee) {

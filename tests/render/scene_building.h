@@ -57,24 +57,8 @@ inline int add_shape(Scene& scene, const std::string& name, const Mesh& mesh, Ma
   shape.name = name;
   shape.material = static_cast<int>(scene.materials.size());
   shape.emission = emission;
-  shape.first_vertex = static_cast<int>(scene.positions.size());
-  shape.vertex_count = static_cast<int>(mesh.positions.size());
-  shape.first_triangle = static_cast<int>(scene.triangles.size());
-  shape.triangle_count = static_cast<int>(mesh.faces.size());
-  const int index = static_cast<int>(scene.shapes.size());
-  for (Edge e : build_edges(mesh)) {
-    for (int& v : e.vertex) v += shape.first_vertex;
-    for (int& f : e.face)
-      if (f >= 0) f += shape.first_triangle;
-    scene.edges.push_back(e);
-  }
-  for (const auto& f : mesh.faces)
-    scene.triangles.push_back(
-        {{f[0] + shape.first_vertex, f[1] + shape.first_vertex, f[2] + shape.first_vertex}, index});
-  scene.positions.insert(scene.positions.end(), mesh.positions.begin(), mesh.positions.end());
   scene.materials.push_back(std::move(material));
-  scene.shapes.push_back(std::move(shape));
-  return index;
+  return add_shape(scene, std::move(shape), mesh, build_edges(mesh));
 }
 
 /// Counter-clockwise seen from the side it faces.

@@ -62,8 +62,8 @@ inline Scene subdivided(const Scene& scene, int n, const std::string& whole = {}
   fine.positions.clear();
   fine.triangles.clear();
   fine.edges.clear();
-  for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
-    const Shape& shape = scene.shapes[s];
+  fine.shapes.clear();
+  for (const Shape& shape : scene.shapes) {
     Mesh coarse;
     coarse.positions.assign(scene.positions.begin() + shape.first_vertex,
                             scene.positions.begin() + shape.first_vertex + shape.vertex_count);
@@ -73,22 +73,7 @@ inline Scene subdivided(const Scene& scene, int n, const std::string& whole = {}
       coarse.faces.push_back(face);
     }
     const Mesh mesh = shape.name == whole ? coarse : subdivided(coarse, n);
-    Shape& out = fine.shapes[s];
-    out.first_vertex = static_cast<int>(fine.positions.size());
-    out.vertex_count = static_cast<int>(mesh.positions.size());
-    out.first_triangle = static_cast<int>(fine.triangles.size());
-    out.triangle_count = static_cast<int>(mesh.faces.size());
-    for (Edge e : build_edges(mesh)) {
-      for (int& v : e.vertex) v += out.first_vertex;
-      for (int& f : e.face)
-        if (f >= 0) f += out.first_triangle;
-      fine.edges.push_back(e);
-    }
-    for (auto f : mesh.faces) {
-      for (int& v : f) v += out.first_vertex;
-      fine.triangles.push_back({f, static_cast<int>(s)});
-    }
-    fine.positions.insert(fine.positions.end(), mesh.positions.begin(), mesh.positions.end());
+    add_shape(fine, shape, mesh, build_edges(mesh));
   }
   return fine;
 }
