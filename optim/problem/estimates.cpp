@@ -110,7 +110,7 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
   require_replicates("primal", samples);
   const Scene scene = problem.parameters().apply(theta);
   const Renderer renderer = problem.renderer(scene, problem.image_estimator());
-  const Stream stream = problem.stream(Pass::primal, iteration);
+  const Stream stream = problem.stream(Pass::render, iteration);
   const bool independent = renderer.pixels_are_independent();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
   DerivativeEstimate result = collect("image", samples, replicates, independent, 1, poll, [&](SampleRange range) {

@@ -34,9 +34,10 @@ enum class Pass : std::uint32_t {
   finite_difference = 5,
   photon_noise = 6,
   mix = 7,
+  other_side = 8,  ///< of a finite difference, where its images take random numbers of their own
   probe = 9,
-  histograms = 9,  ///< of final.h5
-  other_side = 8   ///< of a finite difference, where its images take random numbers of their own
+  histograms = 10,  ///< of final.h5
+  render = 11       ///< images by themselves: targets of other runs, whose noise must not be that of these
 };
 
 /// Part `index` of `parts` equal parts of an estimate's samples; parts are independent of each other.

@@ -52,6 +52,19 @@ TEST_F(Estimates, FewReplicatesKeepTheGainOfLowDiscrepancy) {
   EXPECT_LT(pixel_variance(ours), 0.75 * pixel_variance(batches));
 }
 
+// An image that is rendered to be another run's target has noise of its own: with that of the run's first iteration the loss
+// there would be minus the variance of the noise; else it is plus that of the target, half of what is summed here.
+TEST_F(Estimates, ImagesAreTargetsOfRunsWithTheSameSeed) {
+  const Problem tiny = problem(1);
+  const std::vector<double> theta = tiny.parameters().initial();
+  const GatedImage target = estimate_image(tiny, theta, [] {}).image;
+  const Evaluation at = tiny.evaluate(theta, target, 0, [] {});
+  double variance = 0;
+  for (std::size_t i = 0; i < target.data.size(); ++i)
+    variance += (at.image.data[i] - target.data[i]) * (at.image.data[i] - target.data[i]) / target.data.size();
+  EXPECT_GT(at.loss, 0.1 * variance);
+}
+
 TEST_F(Estimates, ReportedErrorsAreThoseOfRepeats) {
   constexpr int kSeeds = 200;
   const double limit = 4.5 * std::sqrt(2.0 / kSeeds);
