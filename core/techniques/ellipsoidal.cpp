@@ -95,22 +95,25 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
       if (target.present[i] && ellipsoids[i].valid())
         surface_arc_point(ellipsoids[i], triangle, t, y, along, pixel, factor, arcs.side[i]);
   });
-  for (const Choice& choice : choices) {
+  for_each_seen(choices, [&](int i, const ArcPoint& q, double inverse_probability) {
+    if (!path.retraces(y) && !worker_.visible(q.point, y)) return;
+    worker_.path.push(scene_, y);
+    deliver(target, i, q, inverse_probability, &ArcDensities::surface);
+    worker_.path.pop();
+  });
+}
+
+template <class F>
+void EllipsoidalConnections::for_each_seen(std::span<const Choice> choices, F&& f) {
+  const SurfacePoint x = worker_.path.back();
+  for (const Choice& choice : choices)
     for (int i = 0; i < 2; ++i) {
       const ArcPoint& q = arcs_[choice.arc].side[i];
-      if (q.value.is_black()) continue;
-      if (!worker_.visible(x, q.point)) continue;
+      if (q.value.is_black() || !worker_.visible(x, q.point)) continue;
       worker_.path.push(scene_, q.point);
-      if (!path.retraces(y) && !worker_.visible(q.point, y)) {
-        worker_.path.pop();
-        continue;
-      }
-      worker_.path.push(scene_, y);
-      deliver(target, i, q, choice.inverse_probability, &ArcDensities::surface);
-      worker_.path.pop();
+      f(i, q, choice.inverse_probability);
       worker_.path.pop();
     }
-  }
 }
 
 void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low,
@@ -171,16 +174,9 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
       if (target.present[i] && spheres[i].valid())
         emitter_arc_point(spheres[i], triangle, t, along, pixel, throughput, arcs.side[i]);
   });
-  for (const Choice& choice : choices) {
-    for (int i = 0; i < 2; ++i) {
-      const ArcPoint& y = arcs_[choice.arc].side[i];
-      if (y.value.is_black()) continue;
-      if (!worker_.visible(x, y.point)) continue;
-      worker_.path.push(scene_, y.point);
-      deliver(target, i, y, choice.inverse_probability, &ArcDensities::emitter);
-      worker_.path.pop();
-    }
-  }
+  for_each_seen(choices, [&](int i, const ArcPoint& y, double inverse_probability) {
+    deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
+  });
 }
 
 template <class F>

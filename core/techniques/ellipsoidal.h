@@ -84,6 +84,10 @@ class EllipsoidalConnections {
   /// evaluate. One random number does for all. Arcs that carry nothing are left out.
   template <class F>
   std::span<const Choice> choose(double pick, int rays, F&& sample);
+  /// f(side, point, inverse probability) for each chosen point that carries something and that the last vertex sees, while it is
+  /// at the end of the path.
+  template <class F>
+  void for_each_seen(std::span<const Choice> choices, F&& f);
 
   /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.
   void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, const SurfacePoint& y,
