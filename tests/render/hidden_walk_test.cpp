@@ -59,6 +59,24 @@ Scene board_in_room() {
   return scene;
 }
 
+// Named shapes alone, or in a capture without names all of them; by area: the density is one over it.
+TEST(HiddenGeometry, IsWhatIsNamed) {
+  for (const bool named : {true, false}) {
+    Scene scene = board_in_room();
+    const int board = scene.find_shape("board");
+    scene.shapes[board].hidden = named;
+    const PreparedScene prepared(scene, nullptr);
+    EXPECT_EQ(prepared.hidden_is_all, !named);
+    EXPECT_NEAR(1 / prepared.hidden.pdf(), named ? 0.16 : 0.16 + 2 * 1.6 * 1.6 + 4 * 1.6 * 1.1, 1e-12);
+    constexpr int kDraws = 1000;
+    int on_board = 0;
+    for (int i = 0; i < kDraws; ++i)
+      on_board += prepared.shape_index(prepared.sample_hidden((i + 0.5) / kDraws, 0.5).triangle) == board;
+    EXPECT_NEAR(on_board, kDraws * 0.16 * prepared.hidden.pdf(), 2);
+  }
+}
+
+
 /// Three bounces, with and without unknowns that every path changes: then the last step may have to lead to the board.
 TEST(HiddenGeometry, LeavesCapturesUnbiased) {
   Scene scene = board_in_room();
