@@ -6,7 +6,6 @@
 namespace isochron {
 namespace {
 
-constexpr int kLanes = 8;
 /// Tables of so many rows, three numbers each, still lie in the second-level cache (1.5 MB).
 constexpr double kMostRows = 1 << 16;
 
@@ -19,7 +18,7 @@ std::optional<Refinement> refinement(const LinearDensity& response, double width
   if (!response.even()) return std::nullopt;
   const double intervals = static_cast<double>(response.knots().size()) - 1;
   const double steps = width / (response.upper() - response.lower()) * intervals;
-  for (int parts = 1; parts * (intervals + kLanes * steps) <= kMostRows; ++parts) {
+  for (int parts = 1; parts * (intervals + BinTable::kRun * steps) <= kMostRows; ++parts) {
     const double stride = std::round(parts * steps);
     if (stride >= 1 && std::abs(parts * steps - stride) <= LinearDensity::kEven)
       return Refinement{parts, static_cast<int>(stride)};
@@ -55,7 +54,7 @@ BinTable::BinTable(const LinearDensity& response, double width) {
   last_phase_ = grid->stride - 1;
   for (int phase = 0; phase < grid->stride; ++phase) {
     const int ends = phase < refined.size() ? (refined.size() - 1 - phase) / grid->stride + 1 : 0;
-    const int size = ends + 1, padded = (size + kLanes - 1) / kLanes * kLanes;
+    const int size = ends + 1, padded = size + kRun - 1;
     rows_.push_back({values_.size(), size, padded});
     values_.resize(values_.size() + 3 * static_cast<std::size_t>(padded));
     double* row = &values_[rows_.back().begin];

@@ -10,10 +10,11 @@ namespace isochron {
 
 class BinTable {
  public:
+  static constexpr int kRun = 8;  ///< bins that are read together, from any of them on
   /// Where the readings of one length are found, from the first bin on that counts light of it:
   ///   W = constant + along linear + half_square square,      dW / dlength = -(linear + along square).
   struct Row {
-    const double *constant, *linear, *square;  ///< followed by zeros up to a multiple of 8
+    const double *constant, *linear, *square;  ///< followed by kRun - 1 zeros
     int size;
     double along, half_square;
   };

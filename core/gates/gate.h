@@ -193,7 +193,7 @@ class GateSet {
     });
   }
   /// Gates first ... first + size - 1, what they make of a length, and zeros for what is left of `kRun`.
-  static constexpr int kRun = 8;
+  static constexpr int kRun = BinTable::kRun;
   struct Run {
     int first = 0, size = 0;
     double value[kRun], slope[kRun];
