@@ -1,6 +1,7 @@
 #include "core/paths/prepared_scene.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -19,6 +20,10 @@ PreparedScene::PreparedScene(const Scene& source, const TangentBasis* basis, con
       records_(source.triangles.size()),
       changed_(source.triangles.size(), -1),
       shape_changed_(source.shapes.size(), -1) {
+  // They are looked at shape by shape.
+  std::size_t edges = 0;
+  for (const Shape& shape : source.shapes) edges += static_cast<std::size_t>(shape.edge_count);
+  if (edges != source.edges.size()) throw std::logic_error("a scene has edges of no shape");
   for (std::size_t i = 0; i < records_.size(); ++i) {
     records_[i].shape = scene.triangles[i].shape;
     records_[i].vertex = scene.triangles[i].vertex;
