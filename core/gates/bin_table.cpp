@@ -61,7 +61,8 @@ BinTable::BinTable(const LinearDensity& response, double width) {
     for (int i = 0; i < size; ++i) {
       // A bin's end where the response is not over; after the last of them all light has been counted.
       const int end = phase + i * grid->stride, begin = end - grid->stride;
-      const bool has_end = i<ends, has_begin = i> 0;
+      const bool has_begin = i > 0;
+      const bool has_end = i < ends;
       const auto difference = [&](const std::vector<double>& of, double after) {
         return ((has_end ? of[end] : after) - (has_begin ? of[begin] : 0)) / width;
       };

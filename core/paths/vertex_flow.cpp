@@ -181,17 +181,17 @@ void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies)
 
 void VertexFlows::find_patches(const PreparedScene& prepared, std::vector<char> near_bodies) {
   const Scene& scene = prepared.scene;
-  bool others = near_bodies != near_bodies_, moved = false;
+  bool differs = near_bodies != near_bodies_, moved = false;
   near_bodies_ = std::move(near_bodies);
   flat_.resize(scene.edges.size());
   for (int s = 0; s < static_cast<int>(scene.shapes.size()); ++s) {
     if (prepared.shape_changed(s) <= flat_revision_) continue;
     moved = true;
-    others |= update_flat_edges(prepared, s);
+    differs |= update_flat_edges(prepared, s);
   }
   flat_revision_ = prepared.revision();
-  if (others) make_patches(scene);
-  if (!others && !moved) return;
+  if (differs) make_patches(scene);
+  if (!differs && !moved) return;
   for (Patch& patch : patches_) {
     if (patch.triangles < 2) continue;
     patch.area = 0;
@@ -204,18 +204,18 @@ bool VertexFlows::update_flat_edges(const PreparedScene& prepared, int shape) {
   const Scene& scene = prepared.scene;
   const int first = scene.shapes[shape].first_edge, count = scene.shapes[shape].edge_count;
   constexpr int kChunk = 4096, kAhead = 8;
-  std::vector<char> others(static_cast<std::size_t>((count + kChunk - 1) / kChunk), 0);
-  parallel(static_cast<int>(others.size()), [&](int chunk) {
+  std::vector<char> differs(static_cast<std::size_t>((count + kChunk - 1) / kChunk), 0);
+  parallel(static_cast<int>(differs.size()), [&](int chunk) {
     const int begin = first + chunk * kChunk, end = std::min(begin + kChunk, first + count);
     for (int e = begin; e < end; ++e) {
       const Edge& edge = scene.edges[e];
       if (e + kAhead < end)
         for (const int t : scene.edges[e + kAhead].face) prepared.prefetch(std::max(t, 0));
       const char flat = is_flat(prepared, edge);
-      others[chunk] |= std::exchange(flat_[e], flat) != flat && near_bodies_[body_of_vertex_[edge.vertex[0]]];
+      differs[chunk] |= std::exchange(flat_[e], flat) != flat && near_bodies_[body_of_vertex_[edge.vertex[0]]];
     }
   });
-  return std::find(others.begin(), others.end(), 1) != others.end();
+  return std::find(differs.begin(), differs.end(), 1) != differs.end();
 }
 
 void VertexFlows::make_patches(const Scene& scene) {

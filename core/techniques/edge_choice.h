@@ -19,15 +19,10 @@ class EdgeChoice {
   void set_group(std::size_t group, int first, std::span<const double> weights, std::span<const std::uint8_t> moves) {
     Group& g = groups_[group];
     g.first = first;
-    const auto all = [&](int moving) { return std::ranges::find(moves, 1 - moving) == moves.end(); };
     for (const int moving : {0, 1}) {
-      g.of[moving] = {};
-      if (all(1 - moving)) continue;
-      if (all(moving))
-        g.of[moving] = DiscreteDistribution(weights.size(), [&](std::size_t i) { return weights[i]; });
-      else
-        g.of[moving] =
-            DiscreteDistribution(weights.size(), [&](std::size_t i) { return moves[i] == moving ? weights[i] : 0; });
+      const bool any = std::ranges::find(moves, moving) != moves.end();
+      const auto weight_of = [&](std::size_t i) { return moves[i] == moving ? weights[i] : 0; };
+      g.of[moving] = any ? DiscreteDistribution(weights.size(), weight_of) : DiscreteDistribution();
     }
   }
   void finish() {

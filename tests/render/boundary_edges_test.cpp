@@ -120,6 +120,13 @@ TEST(BoundaryEdges, DensityIsTheFrequency) {
   }
 }
 
+// They are looked at shape by shape: those of none would be passed over.
+TEST(BoundaryEdges, BelongToShapes) {
+  Scene scene = cube_scene();
+  scene.edges.push_back(scene.edges.back());
+  EXPECT_THROW(PreparedScene(scene, nullptr), std::logic_error);
+}
+
 // Static edges weigh 1 + 3 + 2, moving ones 4 + 5 + 5; either kind gets half. Group 1 has both, group 2 none of a weight.
 TEST(EdgeChoice, MovingAndStaticEdgesInEqualShares) {
   const std::vector<double> weights{1, 3, 0, 4, 2, 5, 0, 0, 5};
