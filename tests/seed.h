@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-namespace isochron::testing {
+namespace isochron {
 
 /// `seed` as it stands, or shifted by ISOCHRON_TEST_SEED. Below 2^31, as experiment files want it.
 inline std::uint32_t test_seed(std::uint32_t seed) {
@@ -14,4 +14,4 @@ inline std::uint32_t test_seed(std::uint32_t seed) {
   return static_cast<std::uint32_t>(shifted % 0x7fffffff);
 }
 
-}  // namespace isochron::testing
+}  // namespace isochron
