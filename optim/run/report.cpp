@@ -9,6 +9,8 @@
 #include <initializer_list>
 #include <iterator>
 
+#include "optim/run/bounds.h"
+
 namespace isochron {
 namespace {
 
@@ -63,20 +65,6 @@ std::string table(const std::vector<Row>& rows) {
   return text;
 }
 
-/// Where unknowns want to be larger than their upper bounds allow: those of one parameter a line.
-std::string bounds_reached(const Parameters& parameters, const std::vector<double>& theta) {
-  std::string text;
-  for (const Parameters::Block& block : parameters.blocks()) {
-    int reached = 0;
-    for (int i = block.begin; i < block.begin + block.count; ++i) reached += theta[i] >= parameters.upper()[i];
-    if (reached > 0)
-      text += block.count == 1
-                  ? fmt::format("  {} is at its upper bound\n", block.name)
-                  : fmt::format("  {}: {} of {} are at their upper bounds\n", block.name, reached, block.count);
-  }
-  return text;
-}
-
 }  // namespace
 
 std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
@@ -86,7 +74,7 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
                                  name(result.status), state.iteration, std::max(state.seconds, last.seconds),
                                  rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice),
                                  last.iteration);
-  text += table(rows_of(parameters, state.theta)) + bounds_reached(parameters, state.theta);
+  text += table(rows_of(parameters, state.theta)) + bounds_report(find_at_bounds(parameters, state.theta));
   auto out = std::back_inserter(text);
   if (!std::isnan(last.loss)) {
     fmt::format_to(out, "  loss {:.3g} +- {:.2g} (at the start {:.3g} +- {:.2g}){}\n", last.loss, last.loss_noise,

@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "optim/experiment/files.h"
+#include "optim/run/bounds.h"
 
 namespace isochron {
 namespace {
@@ -37,6 +38,7 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
     fmt::format_to(out, "  {}: {{initial: {}, final: {}}}\n", block.name,
                    optional_number(parameters.distance_to_target(parameters.initial(), block)),
                    optional_number(parameters.distance_to_target(state.theta, block)));
+  text += bounds_yaml(find_at_bounds(parameters, state.theta));
   if (!errors.values.empty()) {
     fmt::format_to(out, "standard_errors_from: {}\nstandard_errors:\n", errors.from);  // in units of the parameter
     for (const Parameters::Block& block : parameters.blocks()) {

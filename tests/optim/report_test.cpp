@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "optim/run/bounds.h"
 #include "optim/run/summary.h"
 #include "tests/optim/temporary_folder.h"
 
@@ -67,15 +68,39 @@ TEST_F(Report, ShowsParametersErrorsAndNoise) {
       << summary;
 }
 
-TEST_F(Report, TellsWhichUnknownsReachedTheirUpperBounds) {
-  ParameterSpec free = albedo("thing", {0.25}, {});
-  free.upper = {0.375};
-  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), free});
+TEST_F(Report, TellsWhichUnknownsEndedAtABound) {
+  ParameterSpec bounded = albedo("thing", {0.25}, {});
+  bounded.lower = {0.125};
+  bounded.upper = {0.375};
+  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), bounded});
+  const auto screen = [&] { return run_report({}, state_, last_, parameters); };
+  const auto summary = [&] { return summary_yaml({}, state_, last_, parameters); };
   state_.theta = {0.6875, 0.375};
-  const std::string line = "  thing is at its upper bound\n";
-  EXPECT_NE(run_report({}, state_, last_, parameters).find(line), std::string::npos);
+  EXPECT_NE(screen().find("  thing ended at its upper bound 0.375\n"), std::string::npos) << screen();
+  EXPECT_NE(summary().find("\nat_bounds:\n  thing:\n    upper: {bound: 0.375, count: 1, first: [0]}\n"),
+            std::string::npos)
+      << summary();
+  state_.theta = {0.6875, 0.125 * (1 + 1e-15)};  // a mean of values at the bound, rounded
+  EXPECT_NE(screen().find("  thing ended at its lower bound 0.125\n"), std::string::npos) << screen();
   state_.theta = {0.6875, 0.374};
-  EXPECT_EQ(run_report({}, state_, last_, parameters).find("upper"), std::string::npos);
+  EXPECT_EQ(screen().find("bound"), std::string::npos);
+  EXPECT_NE(summary().find("\nat_bounds: {}\n"), std::string::npos) << summary();
+}
+
+TEST_F(Report, BoundsOfManyUnknownsAreCounted) {
+  scene_.materials[0] = Material("diffuse", "wall");
+  scene_.grey = false;
+  ParameterSpec colour = albedo("wall", {0.5}, {});
+  const Parameters parameters(scene_, {colour});
+  ASSERT_EQ(parameters.size(), 3);
+  state_.theta = {1e-4, 1, 1e-4};
+  const std::vector<AtBound> found = find_at_bounds(parameters, state_.theta);
+  EXPECT_EQ(bounds_report(found),
+            "  wall: 2 of 3 ended at their lower bound 0.0001 (0, 2)\n"
+            "  wall: 1 of 3 ended at their upper bound 1 (1)\n");
+  EXPECT_EQ(bounds_yaml(found),
+            "at_bounds:\n  wall:\n    lower: {bound: 0.0001, count: 2, first: [0, 2]}\n"
+            "    upper: {bound: 1, count: 1, first: [1]}\n");
 }
 
 TEST_F(Report, SummaryHasErrorsAndCost) {

@@ -157,6 +157,16 @@ class ReportTest(unittest.TestCase):
         self.assertIn("0 of 20 iterations so far", page.words)
         self.assertIn("±", page.words)
 
+    def test_unknowns_at_bounds(self):
+        write_run(self.folder)
+        self.assertNotIn("bound", self.page().words)
+        with open(self.folder / "summary.yaml", "a") as summary:
+            summary.write("at_bounds:\n  height:\n    lower: {bound: -0.5, count: 1, first: [0]}\n"
+                          "  colour:\n    upper: {bound: 1, count: 2, first: [0, 2]}\n")
+        words = self.page().words
+        self.assertIn("height ended at its lower bound −0.5", words)
+        self.assertIn("colour: 2 of 3 ended at their upper bound 1 (0, 2)", words)
+
     def test_diverged(self):
         write_run(self.folder, status="diverged")
         (self.folder / "checkpoint.yaml").unlink()

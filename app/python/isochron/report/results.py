@@ -229,7 +229,22 @@ def ending(run):
     if run.ended and isinstance(share, float):
         words.append(f"Noise makes {100 * share:.0f} % of the loss's variance over the last rows.")
     badge = element("span", run.state, class_=f"badge {run.state}")
-    return join([element("p", badge, " ", " ".join(words), class_="ending"), notes(run)])
+    return join([element("p", badge, " ", " ".join(words), class_="ending"), bounds(run), notes(run)])
+
+
+def bounds(run):
+    """Which unknowns ended at a bound, a line each."""
+    found = run.summary.get("at_bounds") if run.ended else None
+    lines = []
+    for name, kinds in (found.items() if isinstance(found, dict) else ()):
+        count = next((p.count for p in run.parameters if p.name == name), 1)
+        for kind, at in kinds.items():
+            if count == 1:
+                lines.append(f"{name} ended at its {kind} bound {number(at['bound'], 5)}")
+                continue
+            shown = ", ".join(map(str, at["first"])) + (", …" if at["count"] > len(at["first"]) else "")
+            lines.append(f"{name}: {at['count']} of {count} ended at their {kind} bound {number(at['bound'], 5)} ({shown})")
+    return element("ul", *(element("li", line) for line in lines), class_="bounds") if lines else ""
 
 
 def notes(run):

@@ -1,0 +1,54 @@
+#include "optim/run/bounds.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+
+namespace isochron {
+
+std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vector<double>& theta) {
+  constexpr std::size_t kMostIndices = 10;
+  constexpr double kRounding = 1e-12;  // of a mean over some hundred rows, relative to the bound
+  std::vector<AtBound> found;
+  for (const Parameters::Block& block : parameters.blocks())
+    for (const bool upper : {false, true}) {
+      AtBound at{block.name, upper, 0, 0, block.count, {}};
+      for (int i = 0; i < block.count; ++i) {
+        const double bound = (upper ? parameters.upper() : parameters.lower())[block.begin + i];
+        const double beyond = upper ? theta[block.begin + i] - bound : bound - theta[block.begin + i];
+        if (!std::isfinite(bound) || !(beyond >= -kRounding * std::abs(bound))) continue;
+        if (at.count++ == 0) at.bound = bound;
+        if (at.first.size() < kMostIndices) at.first.push_back(i);
+      }
+      if (at.count > 0) found.push_back(std::move(at));
+    }
+  return found;
+}
+
+std::string bounds_report(const std::vector<AtBound>& found) {
+  std::string text;
+  for (const AtBound& at : found) {
+    const char* kind = at.upper ? "upper" : "lower";
+    text += at.of == 1 ? fmt::format("  {} ended at its {} bound {:.5g}\n", at.name, kind, at.bound)
+                       : fmt::format("  {}: {} of {} ended at their {} bound {:.5g} ({}{})\n", at.name, at.count, at.of,
+                                     kind, at.bound, fmt::join(at.first, ", "),
+                                     at.count > static_cast<int>(at.first.size()) ? ", ..." : "");
+  }
+  return text;
+}
+
+std::string bounds_yaml(const std::vector<AtBound>& found) {
+  if (found.empty()) return "at_bounds: {}\n";
+  std::string text = "at_bounds:\n";
+  std::string name;
+  for (const AtBound& at : found) {
+    if (at.name != name) fmt::format_to(std::back_inserter(text), "  {}:\n", at.name);
+    name = at.name;
+    fmt::format_to(std::back_inserter(text), "    {}: {{bound: {}, count: {}, first: [{}]}}\n",
+                   at.upper ? "upper" : "lower", at.bound, at.count, fmt::join(at.first, ", "));
+  }
+  return text;
+}
+
+}  // namespace isochron
