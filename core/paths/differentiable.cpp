@@ -47,7 +47,7 @@ Differentiable::Differentiable(const Scene& scene, const TangentBasis* basis)
       geometry |= moves && k < 3;
     }
   gain = basis->differentiates(layout.gain());
-  time_offset = basis->differentiates(layout.time_offset());
+  for (int i = 0; i < layout.time_offsets; ++i) time_offset |= basis->differentiates(layout.time_offset(i));
   every_path = gain || time_offset;
   lengths |= geometry || time_offset;
   any = !basis->entries.empty();

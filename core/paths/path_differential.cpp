@@ -173,7 +173,7 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
 
 }  // namespace
 
-void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int count, bool length_only,
+void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoint* x, int count, bool length_only,
                         LocalDifferential& out) {
   out.clear();
   thread_local std::vector<Accumulated> g;
@@ -212,7 +212,10 @@ void differentiate_path(const PreparedScene& scene, const SurfacePoint* x, int c
     g[k + 1].position += g_d;
     g[k].normal += d / cos_near;
   }
-  if (scene.differentiable.time_offset) out.scalars.push_back({scene.layout.time_offset(), -1, 0, 1});
+  if (scene.differentiable.time_offset) {
+    const int offset = scene.scene.detector.time_offset_of(scene.scene.capture, pixel);
+    out.scalars.push_back({scene.layout.time_offset(offset), -1, 0, 1});
+  }
   if (scene.differentiable.gain && !length_only)
     out.scalars.push_back({scene.layout.gain(), -1, 1 / scene.scene.detector.gain});
   // Where colours differ, what is theirs alone.

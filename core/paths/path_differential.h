@@ -34,11 +34,11 @@ struct LocalDifferential {
   bool empty() const { return vertices.empty() && scalars.empty(); }
 };
 
-/// Differentiates the path vertex[0..count-1], vertex[0] the camera or sensor point and vertex[count-1] on an emitter (or, where
+/// Differentiates the path vertex[0..count-1] of a pixel, vertex[0] the camera or sensor point and vertex[count-1] on an emitter (or, where
 /// `length_only`, only its length). Vertices flow as VertexFlows says; area factors of material points, and what F gains
 /// where the flow spreads, count in ln F. Static vertices are left out. Empty where a segment lies exactly in a surface that it ends at:
 /// F is zero there, or by rounding next to it, and ln F has no derivative.
-void differentiate_path(const PreparedScene& scene, const SurfacePoint* vertex, int count, bool length_only,
+void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoint* vertex, int count, bool length_only,
                         LocalDifferential& out);
 
 /// Adds g . (velocity of the material point x) to `out`: entries on the triangle's three vertices, or

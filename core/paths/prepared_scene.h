@@ -99,8 +99,13 @@ class PreparedScene {
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
   /// Length that every path of a pixel has besides the way from its sensor point to the laser's spot: from the laser to the
-  /// spot and from the sensor point to the detector. 0 of a camera.
-  double extra_length(int pixel) const { return captures() ? scene.capture->extra_length(pixel) : 0; }
+  /// spot and from the sensor point to the detector, and a time offset of its own (one that all share shifts the gates).
+  /// 0 of a camera.
+  double extra_length(int pixel) const {
+    if (!captures()) return 0;
+    const std::vector<double>& offsets = scene.detector.time_offset;
+    return scene.capture->extra_length(pixel) + (offsets.size() == 1 ? 0 : offsets[scene.capture->sensor_index(pixel)]);
+  }
   /// Whether light of one bounce returns along the way that it came.
   bool confocal() const { return captures() && scene.capture->confocal(); }
   /// The index k by which the rules for flows treat x_k. x1 of a camera keeps to its pixel's ray; x1 of a capture does not, so

@@ -30,8 +30,10 @@ std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis*
 Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator,
                const TangentBasis* tangent, SceneCache* cache)
     : ready(ready_scene(source, tangent, {estimator.follow_radius, estimator.follow}, cache)),
-      // What is counted later by t meets a gate of length l + t.
-      gates(source.detector.time_offset == 0 ? gate_set : gate_set.shifted(-source.detector.time_offset)),
+      // What is counted later by t meets a gate of length l + t. Offsets of single pixels are in their paths' lengths.
+      gates(source.detector.time_offset.size() > 1 || source.detector.time_offset[0] == 0
+                ? gate_set
+                : gate_set.shifted(-source.detector.time_offset[0])),
       options(estimator),
       basis(tangent),
       scene(ready->scene),

@@ -39,6 +39,7 @@ DofLayout::DofLayout(const Scene& scene)
       shapes(static_cast<int>(scene.shapes.size())),
       textured(static_cast<int>(scene.texture.size())),
       lights(static_cast<int>(scene.lights.size())),
+      time_offsets(static_cast<int>(scene.detector.time_offset.size())),
       backgrounds(static_cast<int>(scene.detector.background.size())) {
   first_number.push_back(3 * vertices);
   for (const Material& material : scene.materials) first_number.push_back(first_number.back() + material.numbers());
@@ -48,8 +49,8 @@ void set_value(Scene& scene, int dof, double value) {
   const DofLayout layout(scene);
   if (dof >= layout.background(0)) {
     scene.detector.background[dof - layout.background(0)] = value;
-  } else if (dof == layout.time_offset()) {
-    scene.detector.time_offset = value;
+  } else if (dof >= layout.time_offset(0)) {
+    scene.detector.time_offset[dof - layout.time_offset(0)] = value;
   } else if (dof == layout.gain()) {
     scene.detector.gain = value;
   } else if (dof >= layout.light_position(0, 0)) {

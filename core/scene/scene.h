@@ -48,11 +48,16 @@ struct Shape {
 struct Detector {
   double gain = 1;
   std::vector<double> background{0};  ///< of every pixel, or one for each sensor point of a capture
-  double time_offset = 0;             ///< light is counted later by it: as if paths were longer; scene units
+  /// Light is counted later by it: as if paths were longer; scene units. Of every pixel, or one for each sensor point.
+  std::vector<double> time_offset{0};
 
   /// Which of the backgrounds is the pixel's.
   int background_of(const std::optional<Capture>& capture, int pixel) const {
     return background.size() == 1 ? 0 : capture->sensor_index(pixel);
+  }
+  /// Which of the time offsets.
+  int time_offset_of(const std::optional<Capture>& capture, int pixel) const {
+    return time_offset.size() == 1 ? 0 : capture->sensor_index(pixel);
   }
 };
 
@@ -80,9 +85,9 @@ bool coordinates_fit(const Scene& scene);
 
 /// Numbers every scalar of the scene that can be differentiated ("degree of freedom"): three per vertex, then those of
 /// each material (Bsdf::quantities), three per shape (emission r g b), the texture of each vertex where shapes are textured, nine
-/// per light (position, direction, intensity), and what the detector has: gain, time offset, backgrounds.
+/// per light (position, direction, intensity), and what the detector has: gain, time offsets, backgrounds.
 struct DofLayout {
-  int vertices = 0, shapes = 0, textured = 0, lights = 0, backgrounds = 1;
+  int vertices = 0, shapes = 0, textured = 0, lights = 0, time_offsets = 1, backgrounds = 1;
   std::vector<int> first_number;  ///< of each material, and where emissions begin
   explicit DofLayout(const Scene& scene);
   int materials() const { return static_cast<int>(first_number.size()) - 1; }
@@ -95,8 +100,8 @@ struct DofLayout {
   int light_direction(int i, int axis) const { return light_position(i, 3 + axis); }
   int light_intensity(int i, int channel) const { return light_position(i, 6 + channel); }
   int gain() const { return light_position(lights, 0); }
-  int time_offset() const { return gain() + 1; }
-  int background(int i) const { return gain() + 2 + i; }
+  int time_offset(int i) const { return gain() + 1 + i; }
+  int background(int i) const { return time_offset(time_offsets) + i; }
   int size() const { return background(backgrounds); }
 };
 

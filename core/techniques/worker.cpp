@@ -56,7 +56,7 @@ double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
 void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use) {
   sink.note_path(p);
   if (differential_sink) {
-    differentiate_path(scene, p.vertex.data(), p.size(), false, differential);
+    differentiate_path(scene, pixel, p.vertex.data(), p.size(), false, differential);
     if (differential.empty()) return;
     sink.bind(differential);
   }
@@ -65,7 +65,7 @@ void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, Gat
 
 void Worker::emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value) {
   sink.note_path(p);
-  differentiate_path(scene, p.vertex.data(), p.size(), true, differential);
+  differentiate_path(scene, pixel, p.vertex.data(), p.size(), true, differential);
   if (differential.empty()) return;
   sink.bind(differential);
   sink.add_length_rate(pixel, gate, value);

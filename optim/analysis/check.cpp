@@ -56,7 +56,8 @@ double top_speed(const Problem& problem, const std::vector<double>& theta, int c
       square += basis.entries[e].coefficient * basis.entries[e].coefficient;
     return std::sqrt(square);
   };
-  double fastest = speed(layout.time_offset(), 1);
+  double fastest = 0;
+  for (int i = 0; i < layout.time_offsets; ++i) fastest = std::max(fastest, speed(layout.time_offset(i), 1));
   for (int v = 0; v < layout.vertices; ++v) fastest = std::max(fastest, speed(layout.vertex(v, 0), 3));
   for (int i = 0; i < layout.lights; ++i) fastest = std::max(fastest, speed(layout.light_position(i, 0), 3));
   return fastest;

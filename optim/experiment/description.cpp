@@ -142,7 +142,8 @@ void describe(Keys& keys, GradientSpec& gradient) {
 void describe(Keys& keys, LossSpec& loss) {
   keys.value("kind", field::choice(loss.kind), "what counts of a pixel's residual", {.required = true});
   keys.value("scale", field::positive(loss.scale), "residuals beyond it count for less",
-             {.only = only(loss.kind, {LossKind::huber, LossKind::cauchy}), .unit = "RMS of the target"});
+             {.only = only(loss.kind, {LossKind::huber, LossKind::cauchy}),
+              .unit = "RMS of a typical pixel of the target (the median over those that hold anything)"});
 }
 
 void check_parameters(const Experiment& experiment) {

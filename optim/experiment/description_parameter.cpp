@@ -134,7 +134,8 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   keys.value("type", type(spec), "what changes, in which unit", {.required = true});
   const bool albedo = (spec.type == material && spec.quantity == "albedo") || spec.type == texture;
   keys.value("per", per(spec), "how many unknowns there are",
-             {.only = {albedo || spec.type == background, "albedo and background", type_name(spec)},
+             {.only = {albedo || spec.type == background || spec.type == time_offset,
+                       "albedo, background and time_offset", type_name(spec)},
               .unset = spec.per == Per::all});
   keys.value("light", field::text(spec.light), "which moves, turns about its position or changes; in place of a shape",
              {.required = spec.type == intensity,
@@ -170,9 +171,19 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0});
-  keys.value("initial", folder.values(spec.initial),
-             "where the optimisation starts; of what moves, offsets from the scene file",
-             {.required = true, .unit = own});
+  keys.value(
+      "prior_width", field::non_negative(spec.prior_width),
+      "standard deviation of a normal prior about `initial`, for `loss: {kind: poisson}`. Offsets of single sensor "
+      "points need one: what all of them have in common, distance explains as well; 0: none",
+      {.only = of({time_offset}), .unit = own});
+  keys.value(
+      "initial", folder.values(spec.initial),
+      "where the optimisation starts; of what moves, offsets from the scene file. Backgrounds per sensor point of a "
+      "measurement's counts start at their dark bins unless a list is given",
+      {.required = spec.type != background,
+       .unit = own,
+       .unset = spec.initial.empty(),
+       .otherwise = "required; backgrounds of a measurement's counts: its dark bins"});
   keys.value("target", folder.values(spec.target), "where the target is rendered, or known to be",
              {.required = target_required,
               .unit = own,

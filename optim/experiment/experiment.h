@@ -100,7 +100,7 @@ enum class LossKind { squared, huber, cauchy, poisson };
 /// What is minimised: see ReadingLoss.
 struct LossSpec {
   LossKind kind = LossKind::squared;
-  double scale = 1;  ///< in units of the target's root mean square
+  double scale = 1;  ///< in units of the root mean square of a typical pixel of the target
 };
 
 struct Experiment {
@@ -116,7 +116,7 @@ struct Experiment {
   /// Of hidden geometry sampling (Shape::hidden), by name; none: those that parameters change.
   std::vector<std::string> hidden_shapes;
   Keys::Places estimator_keys;  ///< where the file has them
-  bool guiding = true;  ///< of the visibility term; see Problem::estimator
+  bool guiding = true;          ///< of the visibility term; see Problem::estimator
   std::vector<ParameterSpec> parameters;
   TargetSpec target;
   SampleSpec samples;

@@ -60,6 +60,8 @@ struct ParameterSpec {
   /// Of types vertices and texture, see smoothing.h; 0: none.
   double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
   double slopes = 0;     ///< weight of the penalty on uneven values, in units of the target's mean square
+  /// Of type time_offset: standard deviation of a normal prior about the initial values; 0: none.
+  double prior_width = 0;
 
   /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
   std::map<std::string, YamlValue> where;
@@ -87,10 +89,10 @@ inline constexpr auto kChoices<ParameterType> = std::to_array<Choice<ParameterTy
       "points)"}});
 
 template <>
-inline constexpr auto kChoices<Per> =
-    std::to_array<Choice<Per>>({{Per::all, "all", "one unknown"},
-                                {Per::vertex, "vertex", "an albedo for each vertex of `shape`, linear over triangles"},
-                                {Per::pixel, "pixel", "a background for each sensor point of a capture"}});
+inline constexpr auto kChoices<Per> = std::to_array<Choice<Per>>(
+    {{Per::all, "all", "one unknown"},
+     {Per::vertex, "vertex", "an albedo for each vertex of `shape`, linear over triangles"},
+     {Per::pixel, "pixel", "a background or time offset for each sensor point of a capture"}});
 
 template <>
 inline constexpr auto kChoices<VertexDirection> =

@@ -82,7 +82,9 @@ std::optional<std::pair<double, double>> path_length_range(const Problem& proble
     width = std::max(1, static_cast<int>(width * shrink));
     height = std::max(1, static_cast<int>(height * shrink));
   }
-  scene.detector = {.gain = 1, .background = std::vector<double>(scene.detector.background.size()), .time_offset = 0};
+  scene.detector = {.gain = 1,
+                    .background = std::vector<double>(scene.detector.background.size()),
+                    .time_offset = std::vector<double>(scene.detector.time_offset.size())};
   // A path of n bounces has n + 1 segments or, seen directly, one; none is longer than the scene.
   Bounds box;
   box.add(scene.camera.position);

@@ -154,18 +154,28 @@ double root_mean_square_error(double mean_squared_error) {
   return mean_squared_error <= 0 ? 0 : std::sqrt(mean_squared_error);
 }
 
-double mean_of(const GatedImage& image, const Readings& readings) {
-  double sum = 0;
-  for (int pixel = 0; pixel < image.pixels(); ++pixel)
-    for_each_reading(image, readings, pixel, [&](std::size_t i) { sum += image.data[i]; });
-  return sum / readings.count(image);
-}
-
 double mean_square(const GatedImage& image, const Readings& readings) {
   double sum = 0;
   for (int pixel = 0; pixel < image.pixels(); ++pixel)
     for_each_reading(image, readings, pixel, [&](std::size_t i) { sum += image.data[i] * image.data[i]; });
   return sum / readings.count(image);
+}
+
+double typical_power(const GatedImage& image, const Readings& readings, int power) {
+  std::vector<double> pixels;
+  for (int pixel = 0; pixel < image.pixels(); ++pixel) {
+    double sum = 0;
+    int count = 0;
+    for_each_reading(image, readings, pixel, [&](std::size_t i) {
+      sum += std::pow(std::abs(image.data[i]), power);
+      ++count;
+    });
+    if (sum > 0) pixels.push_back(sum / count);
+  }
+  if (pixels.empty()) return 0;
+  const auto middle = pixels.begin() + static_cast<std::ptrdiff_t>(pixels.size() / 2);
+  std::nth_element(pixels.begin(), middle, pixels.end());
+  return *middle;
 }
 
 double inner_product(const GatedImage& a, const GatedImage& b) {

@@ -16,7 +16,7 @@
 // Counts N of mean mu: half the deviance, mu - N ln mu - (N - N ln N), 0 where mu = N, the negative logarithm of the
 // likelihood but for a constant. About 1/2 per reading is left of a perfect model where counts are many, less below one.
 // Its slope is (mu - N) / V(mu) with the variance V(mu) = mu. An image of a few samples can hold a zero where photons were
-// counted, which no likelihood forgives: below a `scale` of 2 % of the target's mean count, V stays what it is there, and
+// counted, which no likelihood forgives: below a `scale` of 2 % of a typical pixel's mean count, V stays what it is there, and
 // the loss is the integral of (m - N) / V(m) from N to mu, finite for any mu.
 // The mean of (I - N) / V(I) is not 0 where that of I is N, as the same noise makes both; so the residual of one half is
 // divided by the V of the other: (I1 - N) / V(I2) and (I2 - N) / V(I1), weighted by the halves' samples. Whatever V, the
@@ -92,8 +92,10 @@ std::vector<double> curvature_weights(const GatedImage& image, const GatedImage&
 double root_mean_square_error(double mean_squared_error);
 
 /// Over the readings that count.
-double mean_of(const GatedImage& image, const Readings& readings);
 double mean_square(const GatedImage& image, const Readings& readings = {});
+/// The median, over the pixels that hold anything, of a pixel's mean of |value|^power: what half of all pixels, however hot,
+/// do not move. 0 of a black image.
+double typical_power(const GatedImage& image, const Readings& readings, int power);
 
 /// Sum over all entries of a * b.
 double inner_product(const GatedImage& a, const GatedImage& b);

@@ -48,9 +48,11 @@ void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
   for (const ParameterSpec& spec : specs) {
     const int index = scene.find_shape(spec.shape);
     if (index >= 0) scene.shapes[index].hidden = true;
-    if (spec.type == ParameterType::background && spec.per == Per::pixel) {
-      if (!scene.capture) spec.fail("per", "the scene has a camera", "captures alone have backgrounds per pixel");
-      scene.detector.background.assign(scene.capture->sensor.size(), 0.0);
+    if (spec.per == Per::pixel) {
+      if (!scene.capture)
+        spec.fail("per", "the scene has a camera", fmt::format("captures alone have a {} per pixel", type_name(spec)));
+      const bool offset = spec.type == ParameterType::time_offset;
+      (offset ? scene.detector.time_offset : scene.detector.background).assign(scene.capture->sensor.size(), 0.0);
     }
     if (spec.type != ParameterType::texture || index < 0) continue;
     Shape& shape = scene.shapes[index];
@@ -147,7 +149,9 @@ int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_uni
       value.dof = layout.gain();
       break;
     case ParameterType::time_offset:
-      value.dof = layout.time_offset();
+      value.dof = layout.time_offset(0);
+      value.numbers = layout.time_offsets;
+      value.count = spec.per == Per::pixel ? layout.time_offsets : 1;
       value.factor = gate_unit;
       break;
     default:

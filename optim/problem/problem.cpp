@@ -11,6 +11,7 @@
 #include "core/scene/coincidence.h"
 #include "core/scene/scene_loader.h"
 #include "optim/problem/capture_data.h"
+#include "optim/problem/dark_bins.h"
 #include "optim/problem/loss.h"
 #include "optim/problem/photon_noise.h"
 
@@ -28,6 +29,15 @@ Scene load_scene_at(const Experiment& experiment) {
     scene.camera.height = experiment.resolution[1];
   }
   return scene;
+}
+
+/// The bound parameters; backgrounds of counts begin at their dark bins.
+std::unique_ptr<Parameters> bind_parameters(Experiment& experiment, const Scene& scene,
+                                            const std::optional<GatedImage>& counts, const Readings& readings) {
+  const bool likelihood = experiment.loss.kind == LossKind::poisson;
+  begin_at_dark_bins(experiment.parameters, counts && likelihood ? &*counts : nullptr, readings,
+                     scene.capture ? static_cast<int>(scene.capture->sensor.size()) : 1);
+  return std::make_unique<Parameters>(scene, experiment.parameters, length_unit(experiment.gates));
 }
 
 /// How the rays' hierarchy follows the parameters. Making it anew takes about as long as kRaysPerTriangle rays for each
@@ -87,11 +97,11 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       scene_(load_scene_at(experiment_)),
       counts_(read_counts(experiment_, scene_)),
       gates_(make_gates(experiment_.gates)),
-      parameters_(std::make_unique<Parameters>(scene_, experiment_.parameters, length_unit(experiment_.gates))),
-      caster_update_(caster_update(experiment_, scene_)),
-      cache_(std::make_unique<SceneCache>(scene_, caster_update_)),
       readings_(make_readings(experiment_, gates_, scene_.camera.width, scene_.camera.height,
                               scene_.capture ? scene_.camera.height / scene_.capture->rows : 1)),
+      parameters_(bind_parameters(experiment_, scene_, counts_, readings_)),
+      caster_update_(caster_update(experiment_, scene_)),
+      cache_(std::make_unique<SceneCache>(scene_, caster_update_)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
   const SampleSpec& samples = experiment_.samples;
   choice_ = {
@@ -101,6 +111,11 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     const Parameters::Block& block = parameters_->blocks()[i];
     if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
     if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
+    if (spec.prior_width > 0) {
+      if (experiment_.loss.kind != LossKind::poisson)
+        spec.fail("prior_width", "the loss is no likelihood", "loss: {kind: poisson}");
+      penalty_.add_prior(block, parameters_->initial(), spec.prior_width);
+    }
   }
   if (!can_render(parameters_->initial()) || (parameters_->target_known() && !can_render(parameters_->target())))
     throw InputError(
@@ -277,18 +292,19 @@ ReadingLoss Problem::reading_loss(const GatedImage& target) const {
   constexpr double kLeastMean = 0.02;  // see loss.h
   const LossSpec& loss = experiment_.loss;
   if (loss.kind == LossKind::squared) return {LossKind::squared, 0, readings_};
-  const double scale = loss.kind == LossKind::poisson ? kLeastMean * mean_of(target, readings_)
-                                                      : loss.scale * std::sqrt(mean_square(target, readings_));
+  const double scale = loss.kind == LossKind::poisson ? kLeastMean * typical_power(target, readings_, 1)
+                                                      : loss.scale * std::sqrt(typical_power(target, readings_, 2));
   return scale > 0 ? ReadingLoss{loss.kind, scale, readings_} : ReadingLoss{LossKind::squared, 0, readings_};
 }
 
-double Problem::penalty_scale(const GatedImage& target) const {
-  return penalty_.empty() ? 0 : mean_square(target, readings_);
+PenaltyScale Problem::penalty_scale(const GatedImage& target) const {
+  if (penalty_.empty()) return {};
+  return {mean_square(target, readings_), 1 / readings_.count(target)};
 }
 
 LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
   LossEstimate estimate = estimate_loss(image, target, reading_loss(target));
-  if (!penalty_.empty()) estimate.value += penalty_scale(target) * penalty_.value(theta);
+  if (!penalty_.empty()) estimate.value += penalty_.value(theta, penalty_scale(target));
   return estimate;
 }
 

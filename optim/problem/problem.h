@@ -63,10 +63,10 @@ class Problem {
   const GateSet& gates() const { return gates_; }
   const Parameters& parameters() const { return *parameters_; }
   const Preconditioner& preconditioner() const { return preconditioner_; }
-  /// Of the offsets' slopes, to be multiplied by the target's mean square.
-  const PairPenalty& penalty() const { return penalty_; }
-  /// What the penalty's value is multiplied with: the target's mean square; 0 where there is no penalty.
-  double penalty_scale(const GatedImage& target) const;
+  const QuadraticPenalty& penalty() const { return penalty_; }
+  /// Of slopes: the target's mean square; of priors: one over the number of readings, as the loss is a mean. 0 where
+  /// there is no penalty.
+  PenaltyScale penalty_scale(const GatedImage& target) const;
 
   /// The experiment's options with the mix of techniques that automatic sampling chooses, once for all values of the parameters:
   /// by a trial at their initial values, whose work is in proportion to the work that the choice is for. For gradients that is a
@@ -131,8 +131,8 @@ class Problem {
   /// Throws InputError, which begins with `what`, where the loss has no use for a target.
   void require_usable(const GatedImage& target, const std::string& what) const;
 
-  /// The experiment's loss, made absolute by the target's root mean square, for counts by their mean. Squared where the
-  /// target is black.
+  /// The experiment's loss, made absolute by the root mean square of a typical pixel of the target, for counts by its mean, so
+  /// that single hot pixels count for nothing. Squared where the target is black.
   ReadingLoss reading_loss(const GatedImage& target) const;
 
   /// Loss of an image rendered at theta, the penalty included.
@@ -171,12 +171,12 @@ class Problem {
   Scene scene_;
   std::optional<GatedImage> counts_;  ///< of the target's file; reading them may set the gates' bins
   GateSet gates_;
+  Readings readings_;
   std::unique_ptr<Parameters> parameters_;
   CasterUpdate caster_update_;
   std::unique_ptr<SceneCache> cache_;
-  Readings readings_;
   Preconditioner preconditioner_;
-  PairPenalty penalty_;
+  QuadraticPenalty penalty_;
   int evaluations_;  ///< of the loss gradient
   mutable Settled settled_;
   using Choice = std::tuple<std::array<int, 4>, std::uint64_t, int>;

@@ -106,7 +106,7 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
   for (int half : {0, 1}) add_half(problem_, theta, iteration, half, poll_, jacobian);
   gauss_newton(jacobian, loss_adjoint(image, target_, rho).data, curvature_weights(image.image, target_, rho), result);
   result.image = std::move(image.image);
-  const double scale = problem_.penalty_scale(target_);
+  const PenaltyScale scale = problem_.penalty_scale(target_);
   const int unknowns = static_cast<int>(theta.size());
   problem_.penalty().add_gradient(theta, scale, result.gradient);
   problem_.penalty().add_curvature(unknowns, scale, result.curvature);

@@ -74,7 +74,7 @@ void Preconditioner::apply(std::vector<double>& values) const {
     }
 }
 
-void PairPenalty::add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight) {
+void QuadraticPenalty::add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight) {
   const auto edges = edges_of(scene, field);
   for (const auto& [a, b] : edges) {
     const Vec3 along = scene.positions[field.vertices[a]] - scene.positions[field.vertices[b]];
@@ -84,35 +84,44 @@ void PairPenalty::add_slopes(const Scene& scene, const Parameters::VertexField& 
   }
 }
 
-double PairPenalty::value(const std::vector<double>& theta) const {
-  double sum = 0;
-  for (const Pair& p : pairs_) sum += p.weight * (theta[p.a] - theta[p.b]) * (theta[p.a] - theta[p.b]);
-  return sum;
+void QuadraticPenalty::add_prior(const Parameters::Block& block, const std::vector<double>& means, double width) {
+  for (int i = block.begin; i < block.begin + block.count; ++i) priors_.push_back({i, means[i], 0.5 / (width * width)});
 }
 
-void PairPenalty::add_gradient(const std::vector<double>& theta, double scale, std::vector<double>& gradient) const {
+double QuadraticPenalty::value(const std::vector<double>& theta, PenaltyScale scale) const {
+  double slopes = 0, priors = 0;
+  for (const Pair& p : pairs_) slopes += p.weight * (theta[p.a] - theta[p.b]) * (theta[p.a] - theta[p.b]);
+  for (const Prior& p : priors_) priors += p.weight * (theta[p.i] - p.mean) * (theta[p.i] - p.mean);
+  return scale.slopes * slopes + scale.priors * priors;
+}
+
+void QuadraticPenalty::add_gradient(const std::vector<double>& theta, PenaltyScale scale,
+                                    std::vector<double>& gradient) const {
   for (const Pair& p : pairs_) {
-    const double slope = 2 * scale * p.weight * (theta[p.a] - theta[p.b]);
+    const double slope = 2 * scale.slopes * p.weight * (theta[p.a] - theta[p.b]);
     gradient[p.a] += slope;
     gradient[p.b] -= slope;
   }
+  for (const Prior& p : priors_) gradient[p.i] += 2 * scale.priors * p.weight * (theta[p.i] - p.mean);
 }
 
-void PairPenalty::add_diagonal(double scale, std::vector<double>& diagonal) const {
+void QuadraticPenalty::add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const {
   for (const Pair& p : pairs_)
-    for (const int i : {p.a, p.b}) diagonal[i] += 2 * scale * p.weight;
+    for (const int i : {p.a, p.b}) diagonal[i] += 2 * scale.slopes * p.weight;
+  for (const Prior& p : priors_) diagonal[p.i] += 2 * scale.priors * p.weight;
 }
 
-void PairPenalty::add_curvature(int unknowns, double scale, std::vector<double>& curvature) const {
+void QuadraticPenalty::add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const {
   const auto n = static_cast<std::size_t>(unknowns);
   for (const Pair& p : pairs_) {
     const auto a = static_cast<std::size_t>(p.a), b = static_cast<std::size_t>(p.b);
-    const double w = 2 * scale * p.weight;
+    const double w = 2 * scale.slopes * p.weight;
     curvature[a * n + a] += w;
     curvature[b * n + b] += w;
     curvature[a * n + b] -= w;
     curvature[b * n + a] -= w;
   }
+  for (const Prior& p : priors_) curvature[p.i * n + p.i] += 2 * scale.priors * p.weight;
 }
 
 }  // namespace isochron

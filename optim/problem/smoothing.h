@@ -1,4 +1,5 @@
-// For offsets or albedos of many vertices: a penalty on uneven ones, and diffusion of gradients over the mesh.
+// For many unknowns of one kind: a penalty on uneven ones, a prior about their first values, and diffusion of gradients over
+// the mesh.
 #pragma once
 #include <memory>
 #include <vector>
@@ -30,28 +31,40 @@ class Preconditioner {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Sum over pairs of weight (theta_a - theta_b)^2.
-class PairPenalty {
+/// What the two sums of a QuadraticPenalty are multiplied with, in units of the loss.
+struct PenaltyScale {
+  double slopes = 0, priors = 0;
+};
+
+/// Sum over pairs of weight (theta_a - theta_b)^2, and over unknowns with a prior of (theta_i - mean)^2 / (2 width^2), which
+/// is a normal prior's negative logarithm.
+class QuadraticPenalty {
  public:
   /// Adds `weight` times the mean, over the mesh's edges between selected vertices, of (change of offset /
   /// length)^2, with the lengths of the loaded mesh: the squared slope of the offsets, dimensionless. Albedos likewise, per
   /// squared scene unit.
   void add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight);
-  bool empty() const { return pairs_.empty(); }
-  double value(const std::vector<double>& theta) const;
-  /// Adds scale times the gradient.
-  void add_gradient(const std::vector<double>& theta, double scale, std::vector<double>& gradient) const;
-  /// Adds scale times the second derivative, n x n row after row.
-  void add_curvature(int unknowns, double scale, std::vector<double>& curvature) const;
+  /// Of each unknown of the block, about its value in `means`; width > 0, in the unknowns' unit.
+  void add_prior(const Parameters::Block& block, const std::vector<double>& means, double width);
+  bool empty() const { return pairs_.empty() && priors_.empty(); }
+  double value(const std::vector<double>& theta, PenaltyScale scale) const;
+  void add_gradient(const std::vector<double>& theta, PenaltyScale scale, std::vector<double>& gradient) const;
+  /// Adds the second derivative, n x n row after row.
+  void add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const;
   /// The diagonal of that.
-  void add_diagonal(double scale, std::vector<double>& diagonal) const;
+  void add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const;
 
  private:
   struct Pair {
     int a, b;
     double weight;
   };
+  struct Prior {
+    int i;
+    double mean, weight;
+  };
   std::vector<Pair> pairs_;
+  std::vector<Prior> priors_;
 };
 
 }  // namespace isochron

@@ -121,6 +121,7 @@ class LevenbergMarquardt : public Optimizer {
     options.jacobi_scaling = false;  // the model is scaled already, and without any absolute term
     options.initial_trust_region_radius = radius_;
     options.max_num_iterations = kMostTrials;
+    options.min_relative_decrease = kLeastOfPredictedFall;
     options.max_num_line_search_step_size_iterations = 0;  // steps over a bound end on it
     options.function_tolerance = options.parameter_tolerance = options.gradient_tolerance = 0;
     options.num_threads = 1;
@@ -147,6 +148,9 @@ class LevenbergMarquardt : public Optimizer {
   /// Of the trust region, relative to the model's unit diagonal: damping is 1 / radius. The first hardly damps,
   /// the least halves a step: noise can make all trials of an iteration fail, which must not stop the next.
   static constexpr double kFirstRadius = 1e4, kLeastRadius = 1;
+  /// A step is taken where the loss falls by more than this part of what the model says. Where it falls by less the model does
+  /// not hold that far: a step that loses sight of all light, say, may lower the loss of a wrong start.
+  static constexpr double kLeastOfPredictedFall = 0.25;
   double radius_ = kFirstRadius;
   bool rejected_ = false;
 };

@@ -135,7 +135,7 @@ void BM_PathDifferential(benchmark::State& state) {
   LocalDifferential differential;
   std::size_t i = 0;
   for (auto _ : state) {
-    differentiate_path(four.prepared, four.paths[i].data(), 4, false, differential);
+    differentiate_path(four.prepared, 0, four.paths[i].data(), 4, false, differential);
     benchmark::DoNotOptimize(differential.vertices.data());
     i = (i + 1) % four.paths.size();
   }
@@ -148,7 +148,7 @@ void BM_AdjointScatter(benchmark::State& state) {
   const GateSet gates = wide_gates();
   std::vector<LocalDifferential> differentials(four.paths.size());
   for (std::size_t i = 0; i < four.paths.size(); ++i)
-    differentiate_path(four.prepared, four.paths[i].data(), 4, false, differentials[i]);
+    differentiate_path(four.prepared, 0, four.paths[i].data(), 4, false, differentials[i]);
   const TangentBasis basis = all_vertices(scene);
   GatedImage adjoint(scene.camera.width, scene.camera.height, gates.size(), 1);
   std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);

@@ -93,7 +93,8 @@ std::vector<double> dofs(const Scene& scene) {
     for (const Vec3& v :
          {light.position, light.direction, Vec3{light.intensity.r, light.intensity.g, light.intensity.b}})
       all.insert(all.end(), {v.x, v.y, v.z});
-  all.insert(all.end(), {scene.detector.gain, scene.detector.time_offset});
+  all.push_back(scene.detector.gain);
+  all.insert(all.end(), scene.detector.time_offset.begin(), scene.detector.time_offset.end());
   all.insert(all.end(), scene.detector.background.begin(), scene.detector.background.end());
   return all;
 }
@@ -256,12 +257,13 @@ TEST(Parameters, TangentIsTheDerivativeOfApplyForDetectorLightsAndPaint) {
   specs.push_back(spec("dark", ParameterType::background, "", 0.5));
   specs.back().per = Per::pixel;
   specs.push_back(spec("late", ParameterType::time_offset, "", 0.1));
+  specs.back().per = Per::pixel;
   make_room(scene, specs);
   EXPECT_TRUE(scene.shapes[0].hidden && scene.shapes[1].hidden && scene.shapes[1].textured);
   const Parameters parameters(scene, specs, 0.3);
-  ASSERT_EQ(parameters.size(), 4 + 4 + 2 + 1 + 1 + 3 + 1);
+  ASSERT_EQ(parameters.size(), 4 + 4 + 2 + 1 + 1 + 3 + 3);
   const std::vector<double> theta = point_near_initial(parameters, 5);
-  EXPECT_EQ(parameters.apply(theta).detector.time_offset, 0.3 * theta.back());
+  EXPECT_EQ(parameters.apply(theta).detector.time_offset[2], 0.3 * theta.back());
   expect_central_differences(parameters, theta, parameters.tangent(theta));
 }
 

@@ -91,37 +91,49 @@ TEST(Preconditioner, IsSymmetricPositiveDefiniteAndKeepsConstants) {
   }
 }
 
-TEST(PairPenalty, IsTheMeanSquaredSlope) {
+TEST(QuadraticPenalty, IsTheMeanSquaredSlope) {
   // Two vertices 2 apart with offsets 1 and 4, of which each unit is a length of 3: the slope is 4.5.
   Scene scene;
   scene.positions = {{0, 0, 0}, {2, 0, 0}, {2, 5, 0}};
   scene.edges = {{{0, 1}, {0, -1}}, {{1, 2}, {0, -1}}};
-  PairPenalty penalty;
+  QuadraticPenalty penalty;
   penalty.add_slopes(scene, {"dent", 1, 1, 3, {0, 1}}, 0.5);
-  EXPECT_NEAR(penalty.value({100, 1, 4}), 0.5 * 4.5 * 4.5, 1e-13);
+  EXPECT_NEAR(penalty.value({100, 1, 4}, {.slopes = 1}), 0.5 * 4.5 * 4.5, 1e-13);
   // All three: the mean over two edges.
-  PairPenalty both;
+  QuadraticPenalty both;
   both.add_slopes(scene, {"dent", 0, 1, 1, {0, 1, 2}}, 1);
-  EXPECT_NEAR(both.value({0, 2, 2}), 0.5, 1e-15);
+  EXPECT_NEAR(both.value({0, 2, 2}, {.slopes = 1}), 0.5, 1e-15);
 }
 
-TEST(PairPenalty, DerivativesAgreeWithFiniteDifferences) {
+TEST(QuadraticPenalty, PriorIsANormalsNegativeLogarithm) {
+  QuadraticPenalty penalty;
+  penalty.add_prior({"late", 1, 2}, {9, 1, 2}, 0.5);
+  // Two and four standard deviations off.
+  EXPECT_NEAR(penalty.value({0, 2, 4}, {.slopes = 7, .priors = 3}), 3 * (4.0 / 2 + 16.0 / 2), 1e-13);
+}
+
+TEST(QuadraticPenalty, DerivativesAgreeWithFiniteDifferences) {
   const Scene scene = grid();
   const Parameters::VertexField f = field(3);
-  PairPenalty penalty;
+  QuadraticPenalty penalty;
   penalty.add_slopes(scene, f, 0.8);
+  penalty.add_prior({"late", 0, 2}, {0.3, -0.2}, 0.7);
+  constexpr PenaltyScale kScale{.slopes = 2, .priors = 3};
   const int size = 1 + 3 * static_cast<int>(f.vertices.size());
-  std::vector<double> theta(size), gradient(size, 1.0), curvature(static_cast<std::size_t>(size) * size, 0.0);
+  std::vector<double> theta(size), gradient(size, 1.0), curvature(static_cast<std::size_t>(size) * size, 0.0),
+      diagonal(size, 0.0);
   for (int i = 0; i < size; ++i) theta[i] = std::sin(3.0 * i);
-  penalty.add_gradient(theta, 2, gradient);
-  penalty.add_curvature(size, 2, curvature);
+  penalty.add_gradient(theta, kScale, gradient);
+  penalty.add_curvature(size, kScale, curvature);
+  penalty.add_diagonal(kScale, diagonal);
   for (int i = 0; i < size; ++i) {
     // Quadratic: central differences are exact but for round-off.
     std::vector<double> up = theta, down = theta, slope_up(size, 0.0), slope_down(size, 0.0);
     up[i] += 0.5, down[i] -= 0.5;
-    EXPECT_NEAR(gradient[i] - 1, 2 * (penalty.value(up) - penalty.value(down)), 1e-12);
-    penalty.add_gradient(up, 2, slope_up);
-    penalty.add_gradient(down, 2, slope_down);
+    EXPECT_NEAR(gradient[i] - 1, penalty.value(up, kScale) - penalty.value(down, kScale), 1e-12);
+    EXPECT_NEAR(diagonal[i], curvature[i * size + i], 1e-12);
+    penalty.add_gradient(up, kScale, slope_up);
+    penalty.add_gradient(down, kScale, slope_down);
     for (int j = 0; j < size; ++j) EXPECT_NEAR(curvature[i * size + j], slope_up[j] - slope_down[j], 1e-12);
   }
 }

@@ -86,7 +86,7 @@ LogAndLength by_textbook(const CaptureCase& c, const std::vector<Jet>& dofs) {
     }
   }
   result.log_f += log(dofs[layout.gain()]);
-  result.length += dofs[layout.time_offset()];
+  result.length += dofs[layout.time_offset(0)];
   return result;
 }
 
@@ -171,7 +171,7 @@ void expect_right(const CaptureCase& c) {
   std::vector<Jet> dofs(values.begin(), values.end());
   for (const bool length_only : {false, true}) {
     LocalDifferential raw;
-    differentiate_path(prepared, x.data(), 4, length_only, raw);
+    differentiate_path(prepared, 0, x.data(), 4, length_only, raw);
     std::vector<double> log_f(values.size(), 0.0), length(values.size(), 0.0);
     for (const VertexGradient& v : raw.vertices)
       for (int axis = 0; axis < 3; ++axis) {

@@ -102,7 +102,7 @@ TangentBasis basis_of(const Scene& scene, bool occluded, bool time_offset = true
       ++column;
     }
   for (int c = 0; c < 3; ++c) rows[layout.number(0, c)].push_back({column, 1.0});
-  if (time_offset) rows[layout.time_offset()].push_back({column + 1, 1.0});
+  if (time_offset) rows[layout.time_offset(0)].push_back({column + 1, 1.0});
   TangentBasis basis;
   basis.columns = column + (time_offset ? 2 : 1);
   for (const auto& row : rows) {
@@ -282,13 +282,63 @@ TEST(CaptureReadings, GradientsAreSumsOfDerivatives) {
 TEST(CaptureReadings, TimeOffset) {
   const CaptureSetup setup{.confocal = true, .occluded = false};
   Scene scene = setup.scene();
-  scene.detector.time_offset = 0.07;
+  scene.detector.time_offset = {0.07};
   const Renderer renderer(scene, kWide, {.max_bounces = 1});
   expect_means(over_replicates(kWide.size(),
                                [&](int r) {
                                  return renderer.render({static_cast<std::uint64_t>(r + 1), 0, 0}, {0, 1024});
                                }),
                setup.readings(kWide, {.length = 0.07}), setup.quadrature.error, 0.003, "readings");
+}
+
+/// Offsets of single points, exactly: each pixel is that of an offset which all have, and so is its derivative by its own.
+TEST(CaptureReadings, TimeOffsetsOfSinglePoints) {
+  for (const bool confocal : {true, false}) {
+    Scene scene = CaptureSetup{.confocal = confocal, .occluded = false}.scene();
+    const int points = static_cast<int>(scene.capture->sensor.size());
+    const SampleRange range{0, 64};
+    const GateSet boxes(GateShape::boxcar(0.1), {1.0, 1.1});
+    const auto all_terms = [&](const Renderer& renderer, int columns) {
+      std::vector<GatedImage> sum;
+      for (const Term term : {Term::interior, Term::path_length}) {
+        const auto part = renderer.derive(term, {3, 0, 0}, range);
+        for (int i = 0; i < columns; ++i) {
+          if (static_cast<int>(sum.size()) <= i)
+            sum.push_back(part[i]);
+          else
+            for (std::size_t k = 0; k < part[i].data.size(); ++k) sum[i].data[k] += part[i].data[k];
+        }
+      }
+      return sum;
+    };
+    for (const Sampling sampling : {Sampling::standard, Sampling::ellipsoidal}) {
+      const EstimatorOptions options{.max_bounces = 1, .sampling = sampling};
+      std::vector<double> offsets;
+      for (int i = 0; i < points; ++i) offsets.push_back(0.03 * (i + 1) - 0.05);
+      Scene own = scene;
+      own.detector.time_offset = offsets;
+      std::vector<int> dofs;
+      for (int i = 0; i < points; ++i) dofs.push_back(DofLayout(own).time_offset(i));
+      const TangentBasis basis = free_dofs(own, dofs);
+      const Renderer renderer(own, boxes, options, &basis);
+      const GatedImage image = renderer.render({3, 0, 0}, range);
+      const auto derivatives = all_terms(renderer, points);
+      for (int i = 0; i < points; ++i) {
+        Scene common = scene;
+        common.detector.time_offset = {offsets[i]};
+        const TangentBasis one = free_dofs(common, {DofLayout(common).time_offset(0)});
+        const Renderer of_all(common, boxes, options, &one);
+        const GatedImage expected = of_all.render({3, 0, 0}, range);
+        const GatedImage slope = all_terms(of_all, 1)[0];
+        for (int g = 0; g < boxes.size(); ++g) {
+          EXPECT_NEAR(image.at(i, g, 0), expected.at(i, g, 0), 1e-9 * expected.mean(g));
+          for (int column = 0; column < points; ++column)
+            EXPECT_NEAR(derivatives[column].at(i, g, 0), column == i ? slope.at(i, g, 0) : 0,
+                        1e-9 * std::abs(slope.at(i, g, 0)));
+        }
+      }
+    }
+  }
 }
 
 /// Gain and backgrounds of single points, exactly: readings are gain x light + background. The parts of a gradient add up to it.

@@ -104,7 +104,7 @@ PathValue<T> evaluate(const Scene& scene, const PathSpec& spec, const std::vecto
   const int emitter = scene.triangles[spec.triangle.back()].shape;
   for (int c = 0; c < 3; ++c)
     result.log_f[c] += log_all + log(dofs[layout.emission(emitter, c)]) + log(dofs[layout.gain()]);
-  result.length += dofs[layout.time_offset()];
+  result.length += dofs[layout.time_offset(0)];
   return result;
 }
 

@@ -52,7 +52,7 @@ std::vector<SurfacePoint> surface_points(const PreparedScene& scene, const PathS
 
 Gradients by_hand(const PreparedScene& scene, const PathSpec& spec, bool length_only, LocalDifferential& raw) {
   const std::vector<SurfacePoint> x = surface_points(scene, spec);
-  differentiate_path(scene, x.data(), static_cast<int>(x.size()), length_only, raw);
+  differentiate_path(scene, 0, x.data(), static_cast<int>(x.size()), length_only, raw);
   Gradients result;
   for (auto& g : result.log_f) g.assign(scene.layout.size(), 0.0);
   result.length.assign(scene.layout.size(), 0.0);
@@ -295,9 +295,9 @@ TEST(EdgeOnPath, HasNoDifferential) {
       lamp{{0.5, 2, 0.5}, prepared.normal(4), 4};
   LocalDifferential differential;
   const std::vector<SurfacePoint> along{eye, floor, corner, lamp}, above{eye, floor, wall, lamp};
-  differentiate_path(prepared, along.data(), 4, false, differential);
+  differentiate_path(prepared, 0, along.data(), 4, false, differential);
   EXPECT_TRUE(differential.empty());
-  differentiate_path(prepared, above.data(), 4, false, differential);
+  differentiate_path(prepared, 0, above.data(), 4, false, differential);
   EXPECT_FALSE(differential.empty());
 }
 

@@ -119,7 +119,7 @@ TEST(VertexFlows, DifferentialOfX1IsThatOfTheFlow) {
                    path_length = (above[1] - below[1]) / (2 * kStep);
 
       LocalDifferential differential;
-      differentiate_path(prepared, x, 3, false, differential);
+      differentiate_path(prepared, 0, x, 3, false, differential);
       double ours = 0, our_length = 0;
       for (const VertexGradient& g : differential.vertices)
         if (g.vertex == moved) ours += g.log_f[axis], our_length += g.length[axis];
@@ -237,7 +237,7 @@ TEST(VertexFlows, DifferentialOfAPathIsThatOfTheFlow) {
     if (too_close) continue;
 
     LocalDifferential differential;
-    differentiate_path(prepared, x, 5, false, differential);
+    differentiate_path(prepared, 0, x, 5, false, differential);
     for (int dof = 0; dof < 36; ++dof) {
       const auto positions = [&](double t) {
         std::vector<Vec3> p = scene.positions;
