@@ -1,11 +1,12 @@
 #!/usr/bin/python3
-"""Turns a scene of Mitsuba 3 or of mitransient, an XML file, into a folder with a scene, its meshes and an experiment.
+"""Turns a scene of Mitsuba (3, 0.5, 0.6) or of mitransient, an XML file, into a folder with a scene, its meshes and an experiment.
 
   scripts/import_scene.py cbox.xml -o my/cbox -D res=64
   build/isochron render my/cbox/experiment.yaml
 
 What it cannot turn it names, each with its line, and writes nothing (exit status 2). With --skip it goes on without it: a
-material becomes a diffuse one of albedo 0.5, all else is left out. scenes/README.md says what becomes of what.
+material becomes a diffuse one of albedo 0.5, all else is left out, as long as a camera and a shape remain. scenes/README.md says what becomes
+of what.
 """
 
 import argparse
@@ -32,8 +33,8 @@ def write_folder(folder, files, force):
         folder.parent.mkdir(parents=True, exist_ok=True)
         new = pathlib.Path(tempfile.mkdtemp(prefix=f".{folder.name}.", dir=folder.parent))
         new.chmod(0o777 & ~umask())
-        for name, text in files.items():
-            (new / name).write_text(text, encoding="utf-8")
+        for name, content in files.items():
+            (new / name).write_bytes(content.encode() if isinstance(content, str) else content)
         replace(folder, new)
     except OSError as error:
         raise SceneError(folder, f"cannot be written: {error.strerror}") from None
@@ -135,7 +136,7 @@ def import_scene(options):
     write_folder(options.output, files, options.force)
     for line in report.by_line(report.notes):
         print(line)
-    print(f"{options.output}: scene.yaml, experiment.yaml; OBJ files: {len(files) - 2}")
+    print(f"{options.output}: scene.yaml, experiment.yaml; OBJ files: {sum(name.endswith('.obj') for name in files)}")
     return 0
 
 

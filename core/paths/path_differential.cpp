@@ -91,7 +91,8 @@ void to_light(const PreparedScene& scene, const SurfacePoint& y, const Accumulat
   const Vec3 turn = light.derivative(w).direction;
   for (int axis = 0; axis < 3; ++axis)
     if (turn[axis] != 0) out.scalars.push_back({scene.layout.light_direction(i, axis), -1, turn[axis]});
-  for (int c = 0; c < 3; ++c) out.scalars.push_back({scene.layout.light_intensity(i, c), c, 1 / light.intensity[c]});
+  for (int c = 0; c < 3; ++c)
+    if (light.intensity[c] > 0) out.scalars.push_back({scene.layout.light_intensity(i, c), c, 1 / light.intensity[c]});
 }
 
 /// Carries position and normal gradients of a vertex to its triangle's vertices.

@@ -10,18 +10,13 @@ from xml.parsers import expat
 
 import numpy as np
 
-from . import matrices
+from . import values
+from .values import SceneError, Value
 
 OBJECTS = {"bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "scene", "sensor", "shape",
-           "texture", "volume"}
+           "subsurface", "texture", "volume"}
+STRUCTURE = {*OBJECTS, "ref", "default", "include", "alias", "path", "transform"}
 MOST_INCLUDES = 15
-
-
-class SceneError(Exception):
-    """What cannot be turned, and where it stands."""
-
-    def __init__(self, place, message):
-        super().__init__(f"{place}: {message}")
 
 
 @dataclass
@@ -32,13 +27,6 @@ class Element:
     attributes: dict
     place: str
     children: list
-
-
-@dataclass
-class Value:
-    kind: str  # float, integer, boolean, string, rgb, spectrum, point, vector, transform
-    value: object
-    place: str
 
 
 @dataclass
@@ -69,18 +57,6 @@ def read_elements(path):
     return root.children[0]
 
 
-def numbers(text, place, counts):
-    """Numbers between commas or blanks, as many as one of `counts` says."""
-    words = text.replace(",", " ").split()
-    try:
-        values = [float(word) for word in words]
-    except ValueError:
-        raise SceneError(place, f"'{text}' is not made of numbers") from None
-    if len(values) not in counts or not np.isfinite(values).all():
-        raise SceneError(place, f"'{text}' is not {' or '.join(map(str, counts))} finite numbers")
-    return values
-
-
 def snake_case(name):
     """Names of scenes before version 2 are in camelCase."""
     return re.sub(r"(?<=[a-z0-9])([A-Z])", r"_\1", name).lower()
@@ -89,8 +65,8 @@ def snake_case(name):
 class Node:
     """An object: a shape, a material, a sensor ..."""
 
-    def __init__(self, document, tag, kind, place, folders):
-        self.document, self.tag, self.type, self.place, self.folders = document, tag, kind, place, folders
+    def __init__(self, context, tag, kind, place):
+        self.context, self.document, self.tag, self.type, self.place = context, context.document, tag, kind, place
         self.id, self.values, self.children, self.used = "", {}, [], set()
 
     def __str__(self):
@@ -105,6 +81,8 @@ class Node:
         if name not in self.values:
             return default
         value = self.values[name]
+        if isinstance(value.value, SceneError):
+            raise value.value
         if value.kind not in kinds:
             self.fail(f"{name} is a {value.kind}, not a {' or '.join(kinds)}", name)
         return value.value
@@ -152,10 +130,7 @@ class Node:
         text = self.text(name)
         if not text:
             self.fail(f"{name} is missing")
-        for folder in self.folders:
-            if (folder / text).is_file():
-                return folder / text
-        return self.fail(f"there is no file {text}", name)
+        return self.context.found(text, self.values[name].place, f"{self}: ")
 
     def rest(self):
         """What nobody asked for, as errors."""
@@ -173,7 +148,7 @@ class Document:
 
     def __init__(self, path, definitions):
         self.parameters, self.ids, self.used_parameters = dict(definitions), {}, set()
-        self.folder = pathlib.Path(path).parent
+        self.folders = [pathlib.Path(path).parent]  # where files are looked for; those of <path> come first
         self.root = self._read(pathlib.Path(path), 0)
         if self.root.tag != "scene":
             raise SceneError(self.root.place, f"is a {self.root.tag}, not a scene")
@@ -198,7 +173,7 @@ class Document:
         major = version.split(".")[0]
         if not major.isdigit():
             raise SceneError(element.place, f"'{version}' is no version")
-        context = Context(self, path, [path.parent, self.folder], int(major) < 2, depth)
+        context = Context(self, path, int(major) < 2, depth)
         return context.node(element)
 
     def substituted(self, text, place):
@@ -221,15 +196,14 @@ class Context:
 
     document: Document
     path: pathlib.Path
-    folders: list
-    camel_case: bool
+    old: bool  # of before version 2: names in camelCase, three numbers or one as a spectrum are RGB
     depth: int
 
     def node(self, element):
         attributes = self.attributes(element)
         kind = attributes.get("type", "scene" if element.tag == "scene" else "")
         tag = "texture" if element.tag == "spectrum" else element.tag
-        node = Node(self.document, tag, kind, element.place, self.folders)
+        node = Node(self, tag, kind.lower() if tag == "shape" else kind, element.place)
         node.id = attributes.get("id", "")
         if node.id:
             if node.id in self.document.ids:
@@ -243,37 +217,57 @@ class Context:
         return {name: self.document.substituted(text, element.place) for name, text in element.attributes.items()}
 
     def add(self, node, element):
-        tag, place, attributes = element.tag, element.place, self.attributes(element)
+        tag, place = element.tag, element.place
+        try:
+            attributes = self.attributes(element)
+        except SceneError as error:  # what nobody asks for may lack a value
+            name = element.attributes.get("name", "")
+            if tag in STRUCTURE or not name:
+                raise
+            node.values[self.name(name)] = Value(tag, error, place)
+            return
 
-        def required(name):
-            if name not in attributes:
-                raise SceneError(place, f"<{tag}> without {name}")
-            return attributes[name]
+        def needed(name):
+            return values.required(attributes, name, tag, place)
 
-        name = attributes.get("name", "")
-        name = snake_case(name) if self.camel_case else name
+        name = self.name(attributes.get("name", ""))
         if tag in OBJECTS or tag == "spectrum" and "type" in attributes:
             node.children.append((name, self.node(element)))
         elif tag == "ref":
-            node.children.append((name, Reference(required("id"), place)))
+            node.children.append((name, Reference(needed("id"), place)))
         elif tag == "default":
-            self.document.parameters.setdefault(required("name"), required("value"))
+            self.document.parameters.setdefault(needed("name"), needed("value"))
             self.document.used_parameters.add(name)
         elif tag == "include":
-            self.include(node, self.found(required("filename"), place))
+            self.include(node, self.found(needed("filename"), place))
         elif tag == "alias":
-            self.document.ids[required("as")] = self.document.resolve(Reference(required("id"), place))
+            self.document.ids[needed("as")] = self.document.resolve(Reference(needed("id"), place))
         elif tag == "path":
-            self.folders.insert(0, self.path.parent / required("value"))
+            self.document.folders.insert(0, self.path.parent / needed("value"))
         else:
-            required("name")
-            node.values[name] = Value(tag, self.value(element, attributes, required), place)
+            needed("name")
+            node.values[name] = self.value(element, attributes)
 
-    def found(self, filename, place):
-        for folder in self.folders:
+    def name(self, text):
+        return snake_case(text) if self.old else text
+
+    def value(self, element, attributes):
+        if element.tag == "transform":
+            return Value(element.tag, self.transform(element), element.place)
+        return Value(*values.value_of(element.tag, attributes, element.place), element.place)
+
+    def transform(self, element):
+        result = np.eye(4)
+        for step in element.children:
+            result = values.step(step.tag, self.attributes(step), step.place) @ result
+        return result
+
+    def found(self, filename, place, whose=""):
+        folders = self.document.folders
+        for folder in [*folders[:-1], self.path.parent, folders[-1], pathlib.Path()]:
             if (folder / filename).is_file():
                 return folder / filename
-        raise SceneError(place, f"there is no file {filename}")
+        raise SceneError(place, f"{whose}there is no file {filename}")
 
     def include(self, node, path):
         included = self.document._read(path, self.depth + 1)
@@ -281,58 +275,3 @@ class Context:
             node.children += included.children
         else:
             node.children.append(("", included))
-
-    def value(self, element, attributes, required):
-        tag, place = element.tag, element.place
-        if tag == "transform":
-            return self.transform(element)
-        if tag in ("point", "vector"):
-            if "value" in attributes:
-                return np.array(numbers(attributes["value"], place, (3,)))
-            return np.array([numbers(required(axis), place, (1,))[0] for axis in "xyz"])
-        if tag == "spectrum":
-            return attributes.get("value", attributes.get("filename", ""))
-        text = required("value").strip()
-        if tag == "string":
-            return text
-        if tag == "float":
-            return numbers(text, place, (1,))[0]
-        if tag == "rgb":
-            return np.broadcast_to(numbers(text, place, (1, 3)), 3)
-        if tag == "integer" and re.fullmatch(r"[+-]?\d+", text):
-            return int(text)
-        if tag == "boolean" and text.lower() in ("true", "false"):
-            return text.lower() == "true"
-        if tag in ("integer", "boolean"):
-            raise SceneError(place, f"'{text}' is no {tag}")
-        raise SceneError(place, f"<{tag}> is not understood")
-
-    def transform(self, element):
-        result = np.eye(4)
-        for step in element.children:
-            result = self.step(step.tag, self.attributes(step), step.place) @ result
-        return result
-
-    def step(self, tag, attributes, place):
-        def vector(otherwise):
-            if "value" in attributes:
-                return np.broadcast_to(numbers(attributes["value"], place, (1, 3)), 3)
-            return np.array([numbers(attributes.get(axis, otherwise), place, (1,))[0] for axis in "xyz"])
-
-        def listed(name, counts, otherwise=""):
-            return np.array(numbers(attributes.get(name, otherwise), place, counts))
-
-        try:
-            if tag == "translate":
-                return matrices.translation(vector("0"))
-            if tag == "scale":
-                return matrices.scaling(vector("1"))
-            if tag == "rotate":
-                return matrices.rotation(vector("0"), listed("angle", (1,))[0])
-            if tag in ("lookat", "lookAt"):
-                return matrices.look_at(listed("origin", (3,)), listed("target", (3,)), listed("up", (3,), "0 0 0"))
-            if tag == "matrix":
-                return matrices.from_numbers(listed("value", (9, 16)))
-        except ValueError as error:
-            raise SceneError(place, f"<{tag}> {error}") from None
-        raise SceneError(place, f"<{tag}> is no step of a transform")

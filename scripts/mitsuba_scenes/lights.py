@@ -5,11 +5,17 @@ import numpy as np
 from . import matrices
 from .writing import colour_text, quoted, vector_text
 
+AROUND = ("constant", "envmap", "sky", "sun", "sunsky", "directional")
 
-def lights(scene, report, colours):
-    """Lines of our file."""
+
+def lights(scene, report, colours, lamps):
+    """Lines of our file. `lamps`: ids of emitters that shapes refer to."""
     lines = []
     for _, node in scene.objects("emitter"):
+        if node.type == "area":
+            if id(node) not in lamps:
+                report.note(node.place, f"{node}: lights nothing, no shape refers to it")
+            continue
         name = node.id or f"light_{len(lines) + 1}"
         text = report.attempt(light, node, report, colours)
         if text:
@@ -18,6 +24,8 @@ def lights(scene, report, colours):
 
 
 def light(node, report, colours):
+    if node.type in AROUND:
+        node.fail("no light from all around here: its ways would have no length (--skip leaves it out)")
     if node.type not in ("point", "spot"):
         node.fail("no such emitter here (allowed: area, point, spot; in captures a projector)")
     matrix = node.transform()
@@ -34,7 +42,7 @@ def light(node, report, colours):
                  f"blend: {1 - beam / cutoff:.9g}")
         report.note(node.place, f"{node}: fades by smoothstep, not linearly, from {beam:g} to {cutoff:g} degrees")
     intensity = colours.colour(node, "intensity", 1.0, emission=True)
-    if not intensity.min() > 0:
+    if intensity.min() < 0 or not intensity.max() > 0:
         node.fail(f"intensity {colour_text(intensity)} is not above 0", "intensity")
     node.ignore("sampling_weight")
     report.refuse_rest(node)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from . import coated
 from .writing import colour_text
-
 
 # At 589 nm, between 0 and 20 degrees Celsius.
 IOR = {"vacuum": 1, "air": 1.000277, "water": 1.333, "acetone": 1.36, "ethanol": 1.361, "glycerol": 1.4729,
@@ -12,6 +12,7 @@ IOR = {"vacuum": 1, "air": 1.000277, "water": 1.333, "acetone": 1.36, "ethanol":
 # Reflectance at normal incidence, linear RGB.
 METALS = {"Ag": (0.972, 0.960, 0.915), "Al": (0.913, 0.922, 0.924), "Au": (1.0, 0.766, 0.336),
           "Cr": (0.550, 0.556, 0.554), "Cu": (0.955, 0.638, 0.538)}
+COVERS = ("bumpmap", "normalmap", "mask", "coating", "roughcoating")
 DEFAULT = "{type: diffuse, albedo: 0.5}"  # Mitsuba's, too
 
 
@@ -36,8 +37,13 @@ class Materials:
         return self.names[key]
 
     def text_of(self, node, two_sided=False):
-        kinds = {"diffuse": self.diffuse, "conductor": self.conductor, "roughconductor": self.conductor,
-                 "dielectric": self.dielectric, "roughdielectric": self.dielectric, "twosided": self.twosided}
+        gloss = coated.Coated(self)
+        kinds = {"diffuse": self.diffuse, "roughdiffuse": self.diffuse, "conductor": self.conductor,
+                 "roughconductor": self.conductor, "dielectric": self.dielectric, "roughdielectric": self.dielectric,
+                 "plastic": gloss.plastic, "roughplastic": gloss.plastic, "pplastic": gloss.plastic, "phong": gloss.phong,
+                 "principled": gloss.principled, "twosided": self.twosided}
+        if node.type in COVERS:
+            return self.covered(node, two_sided)
         if node.type not in kinds:
             node.fail("no such material here (allowed: " + ", ".join(kinds) + ")")
         text = kinds[node.type](node, ", two_sided: true" if two_sided else "")
@@ -48,15 +54,27 @@ class Materials:
         inside = [inner for _, inner in node.objects("bsdf")]
         if len(inside) != 1:
             node.fail("has another material on its back" if inside else "has no bsdf inside")
-        if inside[0].type in ("dielectric", "roughdielectric", "twosided"):
+        if inside[0].type in ("dielectric", "roughdielectric"):
             node.fail(f"has a {inside[0]} inside")
         return self.text_of(inside[0], two_sided=True)
 
+    def covered(self, node, two_sided):
+        """Something about another material: that alone, with --skip."""
+        inside = node.only("bsdf")
+        if inside is None:
+            node.fail("has no bsdf inside")
+        self.report.attempt(node.fail, f"no such material here (--skip takes the {inside} inside)")
+        return self.text_of(inside, two_sided)
+
     def diffuse(self, node, sides):
-        return f"{{type: diffuse, albedo: {colour_text(self.colours.reflectance(node, 'reflectance', 0.5))}{sides}}}"
+        if node.type != "diffuse":
+            self.report.note(node.place, f"{node}: diffuse in the sense of Lambert")
+            node.ignore("alpha", "use_fast_approx")
+        name = "diffuse_reflectance" if "diffuse_reflectance" in node.values else "reflectance"
+        return f"{{type: diffuse, albedo: {colour_text(self.colours.reflectance(node, name, 0.5))}{sides}}}"
 
     def roughness(self, node):
-        if not node.type.startswith("rough"):
+        if not node.type.startswith("rough") and node.type != "pplastic":
             self.report.note(node.place, f"{node}: no smooth surfaces here; with the roughness {self.smooth:g} (--smooth)")
             return self.smooth
         node.ignore("sample_visible")
@@ -69,6 +87,7 @@ class Materials:
             alpha = alphas[0]
         else:
             alpha = self.colours.colour(node, "alpha", 0.1)[0]
+        node.ignore("specular_sampling_weight")
         if not 0 < alpha <= 1:
             node.fail(f"alpha {alpha:g} is not above 0 and at most 1", "alpha")
         return alpha
@@ -80,7 +99,8 @@ class Materials:
 
     def metal(self, node):
         """Reflectance at normal incidence."""
-        material = node.text("material", "none")
+        material = node.text("material", "Cu" if node.context.old else "none")
+        node.ignore("ext_eta")
         if material == "none" or "eta" in node.values:
             eta, k = self.colours.colour(node, "eta", 0.0), self.colours.colour(node, "k", 1.0)
             reflectance = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)

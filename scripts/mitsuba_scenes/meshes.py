@@ -77,7 +77,10 @@ def sphere(fineness):
 
 def read(path, kind):
     """A file of Mitsuba's shapes `obj` and `ply`. Raises InputError."""
-    found = read_polygons(path, kind)
+    return of_polygons(read_polygons(path, kind))
+
+
+def of_polygons(found):
     faces = [list(face) for face in found.faces]
     return Mesh(found.points, faces, found.normals, faces if found.corners is found.faces else found.corners)
 

@@ -23,6 +23,7 @@ class Capture:
         self.kind = self.capture_type()
         self.projector = self.find_projector(scene)
         self.laser_origin, self.laser_matrix = self.laser()
+        self.mask = None if wall.seen is None else wall.seen.reshape(-1, 1)  # [columns, rows] of a list of points
         self.spots = self.find_spots()
         self.lines = self.written_lines()
         self.max_bounces = self.bounces()

@@ -6,11 +6,11 @@ import numpy as np
 
 from .writing import vector_text
 
-
-PATHS = ("path", "direct", "prb", "prb_basic", "prbvolpath", "volpath", "volpathmis", "transient_path",
-         "transient_prbvolpath")
+LIGHT = ("path", "direct", "volpath", "prb", "bdpt", "ptracer", "transient")  # how their names begin
 WITHOUT_EFFECT = ("rr_depth", "block_size", "samples_per_pass", "temporal_filter", "gaussian_stddev", "emitter_samples",
                   "bsdf_samples", "shading_samples", "timeout")
+METRES_PER_NS = 0.299792458
+FILMS = ("hdrfilm", "ldrfilm", "tiledhdrfilm", "mfilm", "transient_hdr_film")
 
 
 @dataclass
@@ -25,7 +25,10 @@ def film_of(sensor, report):
     sensor.objects("sampler")
     if node is None:
         return Film(768, 576)
-    node.ignore("pixel_format", "component_format", "file_format", "compensate", "banner", "high_quality_edges")
+    node.ignore("pixel_format", "component_format", "file_format", "compensate", "banner", "high_quality_edges", "gamma",
+                "tonemap_method", "exposure", "attach_log", "channel_names")
+    if node.type not in FILMS:
+        node.fail("no such film here (allowed: " + ", ".join(FILMS) + ")")
     for _, filter_node in node.objects("rfilter"):
         if filter_node.type != "box":
             report.note(filter_node.place, f"{filter_node}: pixels are boxes here")
@@ -33,15 +36,31 @@ def film_of(sensor, report):
     if node.boolean("sample_border"):
         node.fail("sample_border", "sample_border")
     if node.type == "transient_hdr_film":
-        width, count = node.number("bin_width_opl", 0.003), node.integer("temporal_bins", 2048)
-        film.bins = node.number("start_opl", 0.0), width, count
-        if not (width > 0 and count > 0):
-            node.fail("has no bins")
-    elif node.type != "hdrfilm":
-        node.fail("no such film here (allowed: hdrfilm, transient_hdr_film)")
+        film.bins = node.number("start_opl", 0.0), node.number("bin_width_opl", 0.003), node.integer("temporal_bins", 2048)
+    else:
+        film.bins = bins_of_peers(node, report)
+    if film.bins and not (film.bins[1] > 0 and film.bins[2] > 0):
+        node.fail("has no bins")
     if min(film.width, film.height) < 1:
         node.fail("has no pixels")
     return film
+
+
+def bins_of_peers(node, report):
+    """Bins in the films of MitsubaToF (path lengths) and of dtransient (nanoseconds, a scene unit being a metre)."""
+    if node.text("decomposition", "none").lower().startswith("transient"):
+        start, end, width = (node.number(name, 0.0) for name in ("min_bound", "max_bound", "bin_width"))
+        return start, width, round((end - start) / width) if width > 0 else 0
+    node.ignore("min_bound", "max_bound", "bin_width")
+    if node.boolean("transient"):
+        start, end, width = (node.number(name, 0.0) for name in ("path_min", "path_max", "path_sample"))
+        return start, width, round((end - start) / width) if width > 0 else 0
+    if "tresolution" not in node.values:
+        return None
+    width, pulse = node.number("tresolution") * METRES_PER_NS, node.number("tresolution_light", 0.0)
+    if pulse > 0:
+        report.note(node.place, f"{node}: flashes are short here; a pulse of {pulse:g} ns is a `response` of the gates")
+    return node.number("tstart", 0.0) * METRES_PER_NS, width, node.integer("duration", 1)
 
 
 def crop_of(sensor, film):
@@ -60,16 +79,20 @@ def crop_of(sensor, film):
 
 def slope(sensor, film, report):
     """Half the image's width at the distance 1. Fails where the camera is none of ours."""
-    if sensor.type != "perspective":
+    if sensor.type == "thinlens":
+        sensor.ignore("aperture_radius")
+        report.attempt(sensor.fail, "cameras are pinholes here (--skip makes it one)")
+    elif sensor.type != "perspective":
         sensor.fail("no such sensor here (allowed: perspective, or an nlos_capture_meter on a rectangle)")
     axes = sensor.transform()[:3, :3]
     sensor.ignore("near_clip", "far_clip", "focus_distance", "shutter_open", "shutter_close")
+    axes = axes / np.linalg.norm(axes, axis=0)[2]  # a scale in all directions leaves the rays as they are
     if not np.allclose(axes.T @ axes, np.eye(3), atol=1e-5):
         sensor.fail("its to_world scales", "to_world")
     if np.linalg.det(axes) < 0:
-        sensor.fail("its to_world mirrors the image", "to_world")
+        report.attempt(sensor.fail, "its to_world mirrors the image", "to_world")
     if sensor.number("principal_point_offset_x", 0) or sensor.number("principal_point_offset_y", 0):
-        sensor.fail("its principal point is not in the middle")
+        report.attempt(sensor.fail, "its principal point is not in the middle")
     result = np.tan(np.radians(field_of_view(sensor, film)) / 2) * crop_of(sensor, film)
     report.refuse_rest(sensor)
     return result
@@ -83,7 +106,7 @@ def camera(sensor, film, report):
                     f"plane, {near:g} less in the middle of the image")
     fov = 2 * np.degrees(np.arctan(slope(sensor, film, report)))
     to_world = sensor.transform()
-    position, axes = to_world[:3, 3], to_world[:3, :3]
+    position, axes = to_world[:3, 3], to_world[:3, :3] / np.linalg.norm(to_world[:3, 2])
     return [f"  position: {vector_text(position)}", f"  look_at: {vector_text(position + axes[:, 2])}",
             f"  up: {vector_text(axes[:, 1])}", f"  fov: {fov:.10g}", f"  resolution: [{film.width}, {film.height}]"]
 
@@ -112,22 +135,24 @@ def field_of_view(sensor, film):
 
 
 def bounces(integrator, report, most):
-    """Scattering vertices on a path, at most."""
+    """Scattering vertices on a path, at most: all that an integrator says here."""
     if integrator is None:
         return most
-    if integrator.type not in PATHS:
-        integrator.fail("no such integrator here (allowed: " + ", ".join(PATHS) + ")")
-    integrator.ignore(*WITHOUT_EFFECT)
     if integrator.boolean("hide_emitters"):
         report.attempt(integrator.fail, "the camera sees the emitters here", "hide_emitters")
     if integrator.boolean("camera_unwarp"):
         report.attempt(integrator.fail, "no camera_unwarp: paths begin at the pinhole here", "camera_unwarp")
     if integrator.boolean("discard_direct_light"):
         report.attempt(integrator.fail, "light that comes straight from a lamp counts here", "discard_direct_light")
+    if not integrator.type.startswith(LIGHT):
+        report.note(integrator.place, f"{integrator}: its depth alone is taken; images are of light here")
+    own = "max_depth" in integrator.values
     depth = integrator.integer("max_depth", 6 if integrator.type.startswith(("transient", "prb")) else -1)
-    report.refuse_rest(integrator)
-    if integrator.type == "direct":
+    inside = [node for _, node in integrator.objects("integrator")]
+    if integrator.type.startswith("direct"):
         return 1
+    if inside and not own:
+        return max(bounces(node, report, most) for node in inside)
     return limited(integrator, report, depth - 1 if depth >= 0 else None, most)
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from isochron.errors import InputError
 
-from . import matrices, meshes
+from . import matrices, meshes, serialized
 from .document import SceneError
 from .writing import colour_text
 
-WITHOUT_EFFECT = ("silhouette_sampling_weight", "flip_tex_coords")
+WITHOUT_EFFECT = ("silhouette_sampling_weight", "flip_tex_coords", "max_smooth_angle", "srgb", "collapse")
 
 MOST_NAMES = 8  # in a line
 
@@ -28,6 +28,7 @@ class Shapes:
         self.report, self.materials, self.colours, self.fineness = report, materials, colours, fineness
         self.found, self.names, self.curved = [], set(), []
         self.walls = []  # rectangles that a capture looks at
+        self.lamps = set()  # ids of the emitters that shapes have
 
     def add_all(self, scene):
         for _, node in scene.objects("shape"):
@@ -48,9 +49,11 @@ class Shapes:
             return self.report.refuse_rest(node)
         name = self.free_name(prefix + (node.id or f"shape_{len(self.names) + 1}"))
         node.ignore(*WITHOUT_EFFECT)
-        if node.only("medium"):
-            node.fail("no media")
+        if node.objects("medium", "subsurface"):
+            self.report.attempt(node.fail, "no media")
         bsdf, emitter, sensor = node.only("bsdf"), node.only("emitter"), node.only("sensor")
+        if bsdf and bsdf.type == "null":
+            bsdf.fail("surfaces that nobody sees are left out")
         mesh, to_world = self.mesh_of(node), outer @ node.transform()
         mesh = meshes.transformed(mesh, to_world, node.boolean("flip_normals"))
         if not mesh.flat:
@@ -62,6 +65,7 @@ class Shapes:
             if node.type != "rectangle":
                 node.fail("captures are of rectangles alone")
             self.walls.append((shape, sensor, to_world))
+        node.ignore("face_normals")
         self.report.refuse_rest(node)
         self.found.append(shape)
         return None
@@ -83,6 +87,7 @@ class Shapes:
         return name
 
     def emission(self, emitter):
+        self.lamps.add(id(emitter))
         if emitter.type != "area":
             emitter.fail("no such emitter on a shape (allowed: area)")
         radiance = self.colours.colour(emitter, "radiance", 1.0, emission=True)
@@ -94,7 +99,7 @@ class Shapes:
 
     def mesh_of(self, node):
         """In its own space, before to_world."""
-        kinds = {"obj": self.file, "ply": self.file, "rectangle": lambda node: meshes.rectangle(),
+        kinds = {"obj": self.file, "ply": self.file, "serialized": self.serialized, "rectangle": lambda node: meshes.rectangle(),
                  "cube": lambda node: meshes.cube(), "disk": lambda node: meshes.disk(self.fineness),
                  "sphere": self.sphere, "cylinder": self.cylinder}
         if node.type not in kinds:
@@ -108,6 +113,15 @@ class Shapes:
         except InputError as error:
             raise SceneError(node.values["filename"].place, str(error)) from None
         return mesh if node.boolean("face_normals") else meshes.shaded_by_its_normals(mesh)
+
+    def serialized(self, node):
+        path, index = node.file(), node.integer("shape_index", 0)
+        try:
+            found, flat = serialized.read(path, index)
+        except InputError as error:
+            raise SceneError(node.values["filename"].place, str(error)) from None
+        mesh = meshes.of_polygons(found)
+        return mesh if node.boolean("face_normals") or flat else meshes.shaded_by_its_normals(mesh)
 
     def sphere(self, node):
         matrix = matrices.translation(node.point("center", np.zeros(3))) @ self.radius(node)

@@ -1,6 +1,9 @@
 """A scene of Mitsuba as the files of ours: their names and texts."""
 
+import io
 import re
+
+import numpy as np
 
 from . import materials, meshes, relay, sensors, shapes, spectra, walls
 from .document import Document
@@ -9,31 +12,35 @@ from .writing import quoted
 
 
 def turned(path, options, report):
-    """Files by name."""
+    """Files by name: texts or bytes."""
     document = Document(path, options.define)
     for name in document.unused_definitions(options.define):
         report.note(path, f"-D {name}: no ${name} here")
     scene = document.root
-    scene.objects("bsdf", "texture")  # what shapes refer to
+    scene.objects("bsdf", "medium", "texture", "sampler", "film", "rfilter")  # what shapes and sensors refer to
     colours = spectra.Colours(report, options.mean_textures)
     found = shapes.Shapes(report, materials.Materials(report, colours, options.smooth), colours, options.fineness)
     found.add_all(scene)
+    if not found.found and (options.skip or not report.refused):
+        scene.fail("has no shape that could be turned")
     sensor = chosen_sensor(scene, found, options, report)
     film = sensors.film_of(sensor, report)
     title = f"from {path.name} of Mitsuba by scripts/import_scene.py"
     if is_capture(scene, sensor):
-        view, most, comment = captured(scene, sensor, film, found, report, colours, options)
+        view, most, comments, more = captured(scene, sensor, film, found, report, colours, options)
         shining = []
     else:
         view = ["camera:", *sensors.camera(sensor, film, report)]
         most = sensors.bounces(scene.only("integrator"), report, options.max_bounces)
-        shining = lights(scene, report, colours)
-        comment = f"Times {film.bins[1]:.10g}, the bins' width, these are mitransient's values." if film.bins else None
+        more, shining = {}, lights(scene, report, colours, found.lamps)
+        if not shining and not any(shape.emission for shape in found.found):
+            report.note(scene.place, f"{scene}: nothing lights it")
+        comments = [f"Times {film.bins[1]:.10g}, the bins' width, these are mitransient's values."] if film.bins else []
     report.refuse_rest(sensor)
     report.refuse_rest(sensor.only("film")) if sensor.only("film") else None
     report.refuse_rest(scene)
-    return {**mesh_files(found.found, title), "scene.yaml": scene_text(title, view, found, shining),
-            "experiment.yaml": experiment_text(path, title, film, most, comment)}
+    return {**mesh_files(found.found, title), **more, "scene.yaml": scene_text(title, view, found, shining),
+            "experiment.yaml": experiment_text(path, title, film, most, comments)}
 
 
 def is_capture(scene, sensor):
@@ -45,7 +52,7 @@ def is_capture(scene, sensor):
 
 
 def captured(scene, sensor, film, found, report, colours, options):
-    """The capture's lines, its bounces and a comment. The wall is taken away unless it reflects in between."""
+    """The capture's lines, its bounces, comments and files. The wall is taken away unless it reflects in between."""
     if not film.bins:
         sensor.fail("the film of a capture is a transient_hdr_film")
     if sensor.type == "nlos_capture_meter":
@@ -55,14 +62,19 @@ def captured(scene, sensor, film, found, report, colours, options):
     capture = relay.Capture(scene, sensor, wall, film, report, colours, options)
     if not capture.reflects:
         found.found.remove(wall.shape)
+        if not found.found:
+            sensor.fail("there is nothing but its wall")
     emitters = [node for _, node in scene.objects("emitter") if node.type != "projector"]
     for node in emitters + [shape.node for shape in found.found if shape.emission]:
         report.attempt(node.fail, "nothing but the laser lights a capture")
     for shape in found.found:
         shape.emission = ""
     factors = "the bins' width x albedo of the wall^2 x pi x irradiance x cos / r^2"
-    comment = capture.scale and f"Times {capture.scale} these are mitransient's values: {factors}."
-    return ["capture:", *capture.lines], capture.max_bounces, comment
+    comments = [f"Times {capture.scale} these are mitransient's values: {factors}."] if capture.scale else []
+    if capture.mask is None:
+        return ["capture:", *capture.lines], capture.max_bounces, comments, {}
+    comments.append("Pixels that do not see the wall are to be masked: target: {..., mask: mask.npy}.")
+    return ["capture:", *capture.lines], capture.max_bounces, comments, {"mask.npy": array_file(capture.mask)}
 
 
 def chosen_sensor(scene, found, options, report):
@@ -102,14 +114,20 @@ def scene_text(title, view, found, shining):
     return "\n".join(lines) + "\n"
 
 
-def experiment_text(path, title, film, most, comment):
+def array_file(array):
+    """As NumPy writes it."""
+    file = io.BytesIO()
+    np.save(file, array)
+    return file.getvalue()
+
+
+def experiment_text(path, title, film, most, comments):
     name = re.sub(r"[^A-Za-z0-9_-]", "_", path.stem).lstrip("-") or "scene"
     gates = "{kind: steady}"
     if film.bins:
         start, width, count = film.bins
         gates = f"{{kind: bins, start: {start:.10g}, width: {width:.10g}, count: {count}}}"
     lines = [f"# Made {title}. Nothing is unknown yet: add `parameters`, see experiments/README.md."]
-    if comment:
-        lines.append(f"# {comment}")
+    lines += [f"# {comment}" for comment in comments]
     lines += [f"name: {name}", "scene: scene.yaml", f"max_bounces: {most}", f"gates: {gates}"]
     return "\n".join(lines) + "\n"

@@ -1,14 +1,26 @@
 """The walls of captures: points that a detector looks at, and where a laser's ray meets the wall.
 
-A wall has `shape`, `normal` (towards the detector), `points` (rows one after the other), `lines` (our keys) and hit().
+A wall has `shape`, `normal` (towards the detector), `points` (rows one after the other), `lines` (our keys), hit() and, where
+not all pixels look at it, `seen`: of each pixel whether it does.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from scipy.spatial import cKDTree
 
 from . import matrices
 from .writing import vector_text
 
 ON_PLANE = 1e-5  # of the largest coordinate: files hold single precision
+COARSE = 1e-3  # planes that are counted as one, to find the wall
+
+
+class Hits(NamedTuple):
+    points: np.ndarray
+    shapes: list
+    normals: np.ndarray
+    rays: np.ndarray
 
 
 class RectangleWall:
@@ -23,6 +35,7 @@ class RectangleWall:
         across = self.points[film.width - 1] - self.points[0] if film.width > 1 else matrix[:3, 0]
         down = self.points[-film.width] - self.points[0] if film.height > 1 else matrix[:3, 1]
         corner, across, down = map(vector_text, (self.points[0], across, down))
+        self.seen = None
         self.lines = [f"  sensor: {{corner: {corner}, across: {across}, down: {down}, size: [{film.width}, {film.height}]}}"]
 
     def point(self, u, v):
@@ -31,11 +44,12 @@ class RectangleWall:
 
     def hit(self, origin, direction):
         """Where a ray meets it, or none."""
-        return next(iter(first_hits([self.shape], origin, [direction])[0]), None)
+        return next(iter(first_hits([self.shape], origin, [direction]).points), None)
 
 
 class SeenWall:
-    """What a perspective camera sees, as long as that is flat; the detector looks along the middles of its pixels."""
+    """The plane that most pixels of a perspective camera see; the detector looks along their middles. Pixels that see something
+    else have the point of the next pixel that sees the wall, and are masked."""
 
     def __init__(self, shapes, sensor, film, slope, report):
         matrix = sensor.transform()
@@ -44,20 +58,25 @@ class SeenWall:
         y = slope * (film.height - 2 * np.arange(film.height) - 1) / film.width
         x, y = np.meshgrid(x, y)
         rays = matrices.directions(matrix, np.stack([x, y, np.ones_like(x)], -1).reshape(-1, 3))
-        self.points, found, normals = first_hits(shapes, self.origin, rays)
-        if not found:
+        hits = first_hits(shapes, self.origin, rays)
+        if not hits.shapes:
             sensor.fail("sees no wall")
-        if len(found) < len(rays):
-            report.attempt(sensor.fail, f"{len(rays) - len(found)} of its {len(rays)} pixels see no wall")
-        self.shape = found[0]
-        heights = (self.points - self.points[0]) @ normals[0]
-        if np.abs(heights).max() > ON_PLANE * np.abs(self.points).max():
-            sensor.fail(f"it sees more than a flat wall: {', '.join(sorted({shape.name for shape in found}))}")
-        self.normal = facing(self.shape, self.origin, normals[0], self.points[0])
+        first, on_wall = most_seen_plane(hits)
+        self.shape, places = hits.shapes[first], hits.points[on_wall]
+        self.normal = facing(self.shape, self.origin, hits.normals[first], hits.points[first])
+        self.seen = np.zeros(len(rays), bool)
+        self.seen[hits.rays[on_wall]] = True
+        pixels = np.stack(np.divmod(np.arange(len(rays)), film.width), axis=1)
+        self.points = places[cKDTree(pixels[self.seen]).query(pixels)[1]]
+        if self.seen.all():
+            self.seen = None
+        else:
+            report.note(sensor.place, f"{sensor}: {(~self.seen).sum()} of its {len(rays)} pixels do not see the wall, "
+                        f"{self.shape.name}: mask.npy masks them")
         self.lines = ["  sensor: {points: [" + ", ".join(map(vector_text, self.points)) + "]}"]
 
     def hit(self, origin, direction):
-        return next(iter(first_hits(self.shapes, origin, [direction])[0]), None)
+        return next(iter(first_hits(self.shapes, origin, [direction]).points), None)
 
 
 def facing(shape, origin, normal, place):
@@ -71,8 +90,18 @@ def facing(shape, origin, normal, place):
     return -normal
 
 
+def most_seen_plane(hits):
+    """A hit on the plane that most hits lie on, and for each hit whether it lies there."""
+    normals = hits.normals / np.linalg.norm(hits.normals, axis=1, keepdims=True)
+    heights, size = (normals * hits.points).sum(axis=1), np.abs(hits.points).max()
+    cells = np.round(np.column_stack([normals, heights / size]) / COARSE)
+    _, first, counts = np.unique(cells, axis=0, return_index=True, return_counts=True)
+    first = first[counts.argmax()]
+    return first, np.abs((hits.points - hits.points[first]) @ normals[first]) <= ON_PLANE * size
+
+
 def first_hits(shapes, origin, directions):
-    """Of the rays that hit something: where first, the shapes there and their normals."""
+    """Of the rays that hit something: where first, the shapes there, their normals (of any length), and which rays they are."""
     directions = np.asarray(directions, float)
     nearest = np.full(len(directions), np.inf)
     found, normals = [None] * len(directions), np.zeros((len(directions), 3))
@@ -86,7 +115,7 @@ def first_hits(shapes, origin, directions):
                     nearest[ray], found[ray], normals[ray] = distance[ray], shape, np.cross(*edges)
     hit = np.isfinite(nearest)
     points = origin + directions[hit] * nearest[hit, np.newaxis]
-    return points, [shape for shape in found if shape is not None], normals[hit]
+    return Hits(points, [shape for shape in found if shape is not None], normals[hit], np.flatnonzero(hit))
 
 
 def distances(offset, directions, edge1, edge2):

@@ -19,8 +19,11 @@ void describe(Keys& keys, PointLight& light, bool& grey) {
              "from the direction to where it is dark", {.only = spot, .unit = "degrees"});
   keys.value("blend", field::number(light.blend, {.low = 0, .high = 1, .low_open = true}),
              "the outer part of the cone over which it fades, by smoothstep in the angle", {.only = spot});
-  keys.value("intensity", field::color(light.intensity, NumberRange::positive(), grey),
-             "radiant intensity; of a spot, inside of its cone", {.required = true});
+  const auto shines = [&light](const YamlValue& value) {
+    if (light.intensity.is_black()) value.fail("is black", "a colour with a component above 0");
+  };
+  keys.value("intensity", field::checked(field::color(light.intensity, NumberRange::non_negative(), grey), shines),
+             "radiant intensity, not black; of a spot, inside of its cone", {.required = true});
 }
 
 }  // namespace isochron
