@@ -4,12 +4,11 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numeric>
-#include <string_view>
 
 #include "core/base/error.h"
+#include "core/base/text_lines.h"
 #include "core/base/yaml_document.h"
 
 namespace isochron {
@@ -40,18 +39,8 @@ bool is_plain(const YAML::Node& node) {
   return node.IsScalar() && node.Tag() != "!";
 }
 
-template <class T>
-std::optional<T> parse(const YAML::Node& node) {
-  if (!is_plain(node)) return {};
-  std::string_view text = node.Scalar();
-  if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
-  T value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size()) return {};
-  if constexpr (std::is_floating_point_v<T>) {
-    if (!std::isfinite(value)) return {};
-  }
-  return value;
+std::optional<double> number_of(const YAML::Node& node) {
+  return is_plain(node) ? parse_number(node.Scalar()) : std::nullopt;
 }
 
 std::string child(const std::string& parent, const std::string& name) {
@@ -88,7 +77,7 @@ bool YamlValue::is_scalar() const {
   return node_->IsScalar();
 }
 bool YamlValue::is_number() const {
-  return parse<double>(*node_).has_value();
+  return number_of(*node_).has_value();
 }
 
 void YamlValue::fail(const std::string& wrong, const std::string& allowed) const {
@@ -100,7 +89,7 @@ void YamlValue::fail(const std::string& wrong, const std::string& allowed) const
 }
 
 double YamlValue::number(const NumberRange& range) const {
-  const std::optional<double> value = parse<double>(*node_);
+  const std::optional<double> value = number_of(*node_);
   const std::string bounds = range.describe();
   const std::string allowed = bounds.empty() ? "a finite number" : "a number " + bounds;
   if (!value) fail(describe(*node_) + " is not a finite number", allowed);
@@ -112,7 +101,7 @@ long long YamlValue::integer(long long low, long long high) const {
   constexpr long long kHighest = std::numeric_limits<long long>::max();
   const std::string allowed = high == kHighest ? fmt::format("an integer, at least {}", low)
                                                : fmt::format("an integer from {} to {}", low, high);
-  const std::optional<long long> value = parse<long long>(*node_);
+  const std::optional<long long> value = is_plain(*node_) ? parse_integer(node_->Scalar()) : std::nullopt;
   if (!value) fail(describe(*node_) + " is not an integer that fits", allowed);
   if (*value < low || *value > high) fail(fmt::format("{} is out of range", *value), allowed);
   return *value;

@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <numeric>
 #include <tuple>
+#include <utility>
 
 #include "core/base/error.h"
 
@@ -17,13 +19,22 @@ std::string show(const Vec3& p) {
 }
 
 /// For each vertex the first one at the same position.
-std::vector<int> first_at_position(const std::vector<Vec3>& positions) {
-  std::vector<int> order(positions.size());
+std::vector<int> first_at_position(const Mesh& mesh) {
+  constexpr double kRounding = 0x1p-44;  // of the largest coordinate: what computing in double precision may leave
+  double largest = 0;
+  for (const auto& face : mesh.faces)
+    for (const int v : face)
+      for (int axis = 0; axis < 3; ++axis) largest = std::max(largest, std::abs(mesh.positions[v][axis]));
+  const double cell = largest * kRounding;
+  std::vector<Vec3> cells(mesh.positions);
+  if (cell > 0)
+    for (Vec3& p : cells) p = {std::round(p.x / cell), std::round(p.y / cell), std::round(p.z / cell)};
+  std::vector<int> order(cells.size());
   std::iota(order.begin(), order.end(), 0);
   // Comparing doubles takes 0 and -0 for equal, as wanted.
-  const auto key = [&](int v) { return std::tie(positions[v].x, positions[v].y, positions[v].z); };
+  const auto key = [&](int v) { return std::tie(cells[v].x, cells[v].y, cells[v].z); };
   std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b) || (key(a) == key(b) && a < b); });
-  std::vector<int> first(positions.size());
+  std::vector<int> first(cells.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool repeated = i > 0 && key(order[i]) == key(order[i - 1]);
     first[order[i]] = repeated ? first[order[i - 1]] : order[i];
@@ -65,7 +76,7 @@ std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces, c
 }  // namespace
 
 Mesh clean_mesh(const Mesh& mesh) {
-  const std::vector<int> first = first_at_position(mesh.positions);
+  const std::vector<int> first = first_at_position(mesh);
   std::vector<std::array<int, 3>> faces;
   faces.reserve(mesh.faces.size());
   for (const auto& face : mesh.faces) {
@@ -85,14 +96,19 @@ Mesh clean_mesh(const Mesh& mesh) {
     for (const int v : faces[f]) number[v] = 0;
   }
   if (clean.faces.empty()) throw InputError("has no face with an area");
+  FileVertices of_file;
   for (std::size_t v = 0; v < number.size(); ++v) {
-    if (number[v] < 0) continue;
-    number[v] = static_cast<int>(clean.positions.size());
-    clean.positions.push_back(mesh.positions[v] + Vec3{});  // -0 + 0 = 0
+    if (number[v] >= 0) {
+      number[v] = static_cast<int>(clean.positions.size());
+      clean.positions.push_back(mesh.positions[v] + Vec3{});  // -0 + 0 = 0
+    }
+    of_file.vertex.push_back(number[first[v]]);
+    if (of_file.vertex.back() < 0) of_file.loose.push_back(mesh.positions[v]);
   }
   for (auto& face : clean.faces) {
     for (int& v : face) v = number[v];
   }
+  if (clean.positions.size() < number.size()) clean.file_vertices = std::move(of_file);
   return clean;
 }
 
@@ -139,6 +155,7 @@ int add_shape(Scene& scene, Shape shape, const Mesh& mesh, const std::vector<Edg
     const int other = e.face[1] < 0 ? -1 : e.face[1] + t;
     scene.edges.push_back({{e.vertex[0] + v, e.vertex[1] + v}, {e.face[0] + t, other}});
   }
+  if (mesh.file_vertices) shape.file_vertices = std::make_shared<const FileVertices>(*mesh.file_vertices);
   scene.shapes.push_back(std::move(shape));
   return index;
 }

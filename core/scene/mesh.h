@@ -1,6 +1,7 @@
 // Triangle meshes: reading files, welding, and edges with the faces on either side.
 #pragma once
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,21 +14,22 @@ namespace isochron {
 struct Mesh {
   std::vector<Vec3> positions;
   std::vector<std::array<int, 3>> faces;
+  std::optional<FileVertices> file_vertices = {};  ///< of a clean mesh, see Shape
 };
 
 /// Reads OBJ, OFF, PLY (text or binary) or STL (text or binary), chosen by the file's extension. Vertices and
-/// faces are those of the file, in its order, manifold or not; polygons are
-/// cut into triangles, concave ones too (see cut_polygon), and one that crosses itself is refused. Of STL,
-/// vertices at equal positions are one already. Coordinates are rounded to float. Throws InputError
-/// `FILE[:LINE]: what is wrong`.
+/// faces are those of the file, in its order, manifold or not; polygons are cut into triangles, concave and bent ones
+/// too (see cut_polygon), and one that crosses itself is refused. Of STL, which does not number vertices, those at equal
+/// positions are one already, in the order of their first appearance. Coordinates are as precise as the file has
+/// them, up to double. Throws InputError `FILE[:LINE]: what is wrong`.
 Mesh read_mesh(const std::string& file);
 
 /// The mesh on which shapes are built:
-/// - vertices at exactly equal positions (0 and -0 are equal) become one, so that seams of texture
-///   coordinates or normals are no borders;
+/// - vertices at equal positions become one, so that seams of texture coordinates or normals are no borders. What
+///   rounding in double precision explains counts as equal: 2^-44 of the largest coordinate of a face;
 /// - degenerate faces (two equal corners, or exactly no area) and repetitions of a face are dropped;
-/// - vertices of no remaining face are dropped; the others are in the order of their first appearance in
-/// `mesh`. Throws InputError when no face is left, or when two faces have the same corners but opposite
+/// - vertices of no remaining face are set apart; the others are in the order of their first appearance in
+/// `mesh`, whose numbers `file_vertices` keeps. Throws InputError when no face is left, or when two faces have the same corners but opposite
 /// orientation: which of the two a ray meets would be undefined.
 Mesh clean_mesh(const Mesh& mesh);
 

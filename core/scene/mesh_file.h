@@ -1,6 +1,5 @@
 // Readers of mesh files, one per format; mesh.h is what others use.
 #pragma once
-#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -9,19 +8,18 @@
 
 namespace isochron {
 
-/// What a mesh file holds. Coordinates are rounded to float.
+/// What a mesh file holds, in double precision.
 struct PolygonMesh {
   std::vector<Vec3> positions;
   std::vector<int> corners;       ///< of all polygons
   std::vector<std::size_t> ends;  ///< in `corners`, of each polygon
 
-  void add_vertex(const std::array<float, 3>& p) { positions.push_back({p[0], p[1], p[2]}); }
   /// Leaves out polygons of fewer than three different corners.
   void add_polygon(const std::vector<int>& polygon);
 };
 
 /// All throw InputError `FILE[:LINE]: what is wrong`, with lines counted from one, unless the file holds as much as it
-/// declares, every coordinate is a finite float, and every index that of a vertex.
+/// declares, every coordinate is a finite number, and every index that of a vertex.
 PolygonMesh read_obj(const std::string& file, const std::string& contents);
 PolygonMesh read_off(const std::string& file, const std::string& contents);
 PolygonMesh read_ply(const std::string& file, const std::string& contents);  ///< text or binary

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -98,18 +97,18 @@ PolygonMesh read_text(MeshText& text, const Header& header) {
   for (const Element& element : header.elements) {
     for (long long i = 0; i < element.count; ++i) {
       text.require_next();
-      std::array<float, 3> point;
+      Vec3 point;
       for (const Property& property : element.properties) {
         if (property.corners) {
           text.add_face(text.face(header.vertices), mesh);
         } else if (property.axis >= 0) {
-          point[static_cast<std::size_t>(property.axis)] = text.number();
+          point[property.axis] = text.number();
         } else {
           for (long long left = property.list ? text.count() : 1; left > 0; --left)
             if (text.word().empty()) text.fail("the line ends too early");
         }
       }
-      if (element.name == "vertex") mesh.add_vertex(point);
+      if (element.name == "vertex") mesh.positions.push_back(point);
     }
   }
   return mesh;
@@ -179,7 +178,7 @@ PolygonMesh read_binary(const std::string& file, const Header& header, std::stri
   for (const Element& element : header.elements) {
     if (element.properties.empty()) continue;
     for (long long i = 0; i < element.count; ++i) {
-      std::array<float, 3> point;
+      Vec3 point;
       for (const Property& property : element.properties) {
         if (property.corners) {
           corners.clear();
@@ -193,15 +192,15 @@ PolygonMesh read_binary(const std::string& file, const Header& header, std::stri
             throw InputError(fmt::format("{}: face {} has {} vertices (at least three)", file, i, corners.size()));
           mesh.add_polygon(corners);
         } else if (property.axis >= 0) {
-          const float value = static_cast<float>(bytes.number(property.type));
+          const double value = bytes.number(property.type);
           if (!std::isfinite(value))
             throw InputError(fmt::format("{}: vertex {} has a coordinate that is not a finite number", file, i));
-          point[static_cast<std::size_t>(property.axis)] = value;
+          point[property.axis] = value;
         } else {
           bytes.skip(property.list ? bytes.list_size(property.count) : 1, property.type);
         }
       }
-      if (element.name == "vertex") mesh.add_vertex(point);
+      if (element.name == "vertex") mesh.positions.push_back(point);
     }
   }
   return mesh;
@@ -210,7 +209,7 @@ PolygonMesh read_binary(const std::string& file, const Header& header, std::stri
 }  // namespace
 
 PolygonMesh read_ply(const std::string& file, const std::string& contents) {
-  MeshText text(file, contents, '\0');
+  MeshText text(file, contents, {});
   const Header header = read_header(text);
   return header.format == "ascii" ? read_text(text, header) : read_binary(file, header, text.rest());
 }

@@ -23,12 +23,13 @@ std::string to_ply(const Scene& scene, const Shape& shape) {
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double "
       "z\n"
       "element face {}\nproperty list uchar int vertex_indices\nend_header\n",
-      shape.vertex_count, shape.triangle_count);
-  for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v)
-    for (int axis = 0; axis < 3; ++axis) append(bytes, scene.positions[v][axis]);
+      shape.file_vertex_count(), shape.triangle_count);
+  for (const Vec3& p : shape.file_positions(scene.positions))
+    for (int axis = 0; axis < 3; ++axis) append(bytes, p[axis]);
+  const std::vector<int> numbers = shape.numbers_in_file();
   for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
     append(bytes, std::uint8_t{3});
-    for (const int v : scene.triangles[t].vertex) append(bytes, std::int32_t{v - shape.first_vertex});
+    for (const int v : scene.triangles[t].vertex) append(bytes, std::int32_t{numbers[v - shape.first_vertex]});
   }
   return bytes;
 }
@@ -36,14 +37,12 @@ std::string to_ply(const Scene& scene, const Shape& shape) {
 std::string to_obj(const Scene& scene, const Shape& shape) {
   std::string text;
   auto out = std::back_inserter(text);
-  for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v) {
-    const Vec3& p = scene.positions[v];
-    fmt::format_to(out, "v {} {} {}\n", p.x, p.y, p.z);
-  }
-  const int first = shape.first_vertex - 1;  // OBJ counts from 1
+  for (const Vec3& p : shape.file_positions(scene.positions)) fmt::format_to(out, "v {} {} {}\n", p.x, p.y, p.z);
+  const std::vector<int> numbers = shape.numbers_in_file();
+  const auto number = [&](int v) { return numbers[v - shape.first_vertex] + 1; };  // OBJ counts from 1
   for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
     const auto& v = scene.triangles[t].vertex;
-    fmt::format_to(out, "f {} {} {}\n", v[0] - first, v[1] - first, v[2] - first);
+    fmt::format_to(out, "f {} {} {}\n", number(v[0]), number(v[1]), number(v[2]));
   }
   return text;
 }

@@ -6,8 +6,8 @@
 
 namespace isochron {
 
-/// A shape's mesh where it is in the scene, as the contents of a file: vertices in the order of Scene::positions (welded),
-/// faces in the order and orientation of Scene::triangles. In double precision; read_mesh rounds to float.
+/// A shape's mesh where it is in the scene, as the contents of a file: the vertices of the file that it was read from, faces
+/// in the order and orientation of Scene::triangles, in double precision.
 std::string to_ply(const Scene& scene, const Shape& shape);  ///< binary, little-endian
 std::string to_obj(const Scene& scene, const Shape& shape);  ///< with all digits
 

@@ -24,6 +24,23 @@ int find_name(const std::vector<T>& items, const std::string& name) {
 
 }  // namespace
 
+std::vector<int> Shape::numbers_in_file() const {
+  std::vector<int> numbers(vertex_count, -1);
+  for (int number = 0; number < file_vertex_count(); ++number)
+    if (const int v = vertex_of_file(number); v >= 0 && numbers[v] < 0) numbers[v] = number;
+  return numbers;
+}
+
+std::vector<Vec3> Shape::file_positions(const std::vector<Vec3>& scene_positions) const {
+  std::vector<Vec3> positions;
+  std::size_t loose = 0;
+  for (int number = 0; number < file_vertex_count(); ++number) {
+    const int v = vertex_of_file(number);
+    positions.push_back(v < 0 ? file_vertices->loose[loose++] : scene_positions[first_vertex + v]);
+  }
+  return positions;
+}
+
 int Scene::find_shape(const std::string& name) const {
   return find_name(shapes, name);
 }

@@ -1,6 +1,7 @@
 // The scene as the user describes it: what the loader fills, what parameters move, what the renderer prepares from.
 #pragma once
 #include <array>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,13 +22,19 @@ struct Triangle {
   int shape;
 };
 
-/// Faces whose normals differ by less than this angle are one plane: a mesh read in single precision cannot tell.
+/// Faces whose normals differ by less than this angle are one plane: a file in single precision cannot tell.
 inline constexpr double kCoplanarAngle = 1e-6;
 
 /// Mesh edge between welded vertices. `face[1]` is -1 on an open border.
 struct Edge {
   std::array<int, 2> vertex;
   std::array<int, 2> face;
+};
+
+/// The vertices of a mesh file, where they are not one by one those of the shape: some have no face, or lie at one position.
+struct FileVertices {
+  std::vector<int> vertex;  ///< of the shape, for each of the file; -1: without a face
+  std::vector<Vec3> loose;  ///< where those are, in their order; they stay whatever moves
 };
 
 /// One mesh: contiguous ranges of Scene::positions, Scene::triangles and Scene::edges.
@@ -42,6 +49,17 @@ struct Shape {
   bool deforms = false;   ///< parameters may move its vertices otherwise than as a rigid body
   bool textured = false;  ///< what Scene::texture says multiplies its material's BSDF
   bool hidden = false;    ///< points of paths are drawn on it, see HiddenGeometry
+  std::shared_ptr<const FileVertices> file_vertices = {};  ///< none: the shape's
+
+  int file_vertex_count() const {
+    return file_vertices ? static_cast<int>(file_vertices->vertex.size()) : vertex_count;
+  }
+  /// The shape's vertex of a number in the file; -1 where it has no face.
+  int vertex_of_file(int number) const { return file_vertices ? file_vertices->vertex[number] : number; }
+  /// The first number in the file of each of the shape's vertices.
+  std::vector<int> numbers_in_file() const;
+  /// Of all vertices of the file.
+  std::vector<Vec3> file_positions(const std::vector<Vec3>& scene_positions) const;
 };
 
 /// What becomes of the light that a pixel receives: a reading is gain x light + background.

@@ -47,11 +47,14 @@ void transform_mesh(const Transform& transform, Mesh& mesh) {
   const double angle = transform.degrees * kPi / 180;
   const double cosine = std::cos(angle), sine = std::sin(angle);
   const Vec3& axis = transform.axis;
-  for (Vec3& p : mesh.positions) {
+  const auto move = [&](Vec3& p) {
     const Vec3 q = p * transform.scale;
     const Vec3 rotated = angle == 0 ? q : q * cosine + cross(axis, q) * sine + axis * (dot(axis, q) * (1 - cosine));
     p = rotated + transform.translation;
-  }
+  };
+  for (Vec3& p : mesh.positions) move(p);
+  if (!mesh.file_vertices) return;
+  for (Vec3& p : mesh.file_vertices->loose) move(p);
 }
 
 /// Normals are computed from cross products, which must not vanish or overflow.

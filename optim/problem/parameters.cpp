@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <numeric>
 #include <stdexcept>
 
 #include "core/base/error.h"
+#include "core/base/text_lines.h"
 
 namespace isochron {
 namespace {
@@ -185,10 +185,9 @@ std::vector<double> Parameters::parse_point(const std::string& text) const {
     if (equals == std::string::npos)
       throw InputError(fmt::format("--at {}: allowed: initial, target or NAME=VALUE[,NAME=VALUE...]", item));
     const std::string number = trimmed(item.substr(equals + 1));
-    char* stop = nullptr;
-    const double value = std::strtod(number.c_str(), &stop);
-    if (number.empty() || *stop != '\0' || !std::isfinite(value))
-      throw InputError(fmt::format("--at {}: '{}' is not a finite number", key, number));
+    const std::optional<double> given_value = parse_number(number);
+    if (!given_value) throw InputError(fmt::format("--at {}: '{}' is not a finite number", key, number));
+    const double value = *given_value;
     const Block block = find(key, "--at");
     if (std::find(given.begin(), given.end(), key) != given.end())
       throw InputError(fmt::format("--at {}: is given twice", key));

@@ -131,18 +131,23 @@ class Parameters {
     std::vector<Moved> velocity;  ///< a column at most once
   };
 
+  /// Of one parameter.
+  struct Unknowns {
+    int count = 1;
+    std::vector<int> listed;  ///< the one that each value of a list is of, as the mesh's file counts vertices; -1: none
+  };
+
   /// Throw InputError where there is none.
   int find_shape(const ParameterSpec& spec) const;
   int find_light(const ParameterSpec& spec) const;
-  /// Of a parameter that moves something, else false; `count` becomes the number of its unknowns.
-  bool bind_move(const ParameterSpec& spec, int first, int& count);
+  /// Of a parameter that moves something, else false.
+  bool bind_move(const ParameterSpec& spec, int first, Unknowns& unknowns);
   void bind_light(const ParameterSpec& spec, int first);
-  /// Returns how many unknowns there are.
-  int bind_value(const ParameterSpec& spec, int first, double gate_unit);
-  void bind_motion(const ParameterSpec& spec, Motion& motion, int shape, int& count);
+  void bind_value(const ParameterSpec& spec, int first, double gate_unit, Unknowns& unknowns);
+  void bind_motion(const ParameterSpec& spec, Motion& motion, int shape, Unknowns& unknowns);
   /// Sets the pivot in the scene as loaded, and what carries it.
   void bind_pivot(const ParameterSpec& spec, Motion& motion, int shape) const;
-  void bind_values(const ParameterSpec& spec, int count);
+  void bind_values(const ParameterSpec& spec, const Unknowns& unknowns);
   /// Turns `p` and what `tangent`, if given, holds about the pivot.
   static void turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,
                    std::vector<Moved>* tangent);

@@ -89,10 +89,11 @@ void mark_hidden(Scene& scene, const Experiment& experiment) {
 Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit)
     : scene_(scene), motions_(scene.shapes.size()), light_motions_(scene.lights.size()) {
   for (const ParameterSpec& spec : specs) {
-    int count = 1;
+    Unknowns unknowns;
     const int first = size();
-    if (!bind_move(spec, first, count)) count = bind_value(spec, first, gate_unit);
-    bind_values(spec, count);
+    if (!bind_move(spec, first, unknowns)) bind_value(spec, first, gate_unit, unknowns);
+    bind_values(spec, unknowns);
+    const int count = unknowns.count;
     blocks_.push_back({spec.name, first, count, spec.scale > 0 ? spec.scale : default_scale(spec)});
     for (int i = 0; i < count; ++i)
       component_names_.push_back(count == 1 ? spec.name : fmt::format("{}[{}]", spec.name, i));
@@ -107,7 +108,7 @@ int Parameters::find_light(const ParameterSpec& spec) const {
   return found(scene_.find_light(spec.light), spec, "light", spec.light, scene_.lights);
 }
 
-int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_unit) {
+void Parameters::bind_value(const ParameterSpec& spec, int first, double gate_unit, Unknowns& unknowns) {
   const DofLayout layout(scene_);
   Value value{0, 1, first, 1};
   const auto colour = [&](int dof) {
@@ -138,6 +139,8 @@ int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_uni
       const Shape& shape = scene_.shapes[find_shape(spec)];
       value.dof = layout.texture(shape.first_vertex);
       value.numbers = value.count = shape.vertex_count;
+      for (int number = 0; number < shape.file_vertex_count(); ++number)
+        unknowns.listed.push_back(shape.vertex_of_file(number));
       break;
     }
     case ParameterType::background:
@@ -161,16 +164,44 @@ int Parameters::bind_value(const ParameterSpec& spec, int first, double gate_uni
     if (other.dof == value.dof)
       spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
   values_.push_back(value);
-  return value.count;
+  unknowns.count = value.count;
 }
 
-void Parameters::bind_values(const ParameterSpec& spec, int count) {
+namespace {
+
+/// Values in the order of the unknowns, of a list that may have one for each vertex of a file.
+std::vector<double> in_order(const ParameterSpec& spec, const char* key, const std::vector<double>& values, int count,
+                             const std::vector<int>& listed) {
+  if (static_cast<int>(values.size()) == count) return values;
+  if (values.size() != listed.size()) {
+    const bool differ = !listed.empty() && static_cast<int>(listed.size()) != count;
+    spec.fail(key, fmt::format("{} values are given", values.size()),
+              count == 1 ? "1"
+                         : fmt::format("1{} {}{}", differ ? "," : " or", count,
+                                       differ ? fmt::format(" or {}", listed.size()) : ""));
+  }
+  std::vector<double> ordered(static_cast<std::size_t>(count), kUnknown);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (listed[i] < 0) continue;
+    double& place = ordered[static_cast<std::size_t>(listed[i])];
+    if (!std::isnan(place) && place != values[i])
+      spec.fail(key, fmt::format("two vertices at one position have the values {} and {}", place, values[i]),
+                "one value");
+    place = values[i];
+  }
+  return ordered;
+}
+
+}  // namespace
+
+void Parameters::bind_values(const ParameterSpec& spec, const Unknowns& unknowns) {
   const auto expand = [&](const std::vector<double>& values, const char* key, double missing, auto& into) {
-    if (values.size() > 1 && static_cast<int>(values.size()) != count)
-      spec.fail(key, fmt::format("{} values are given", values.size()),
-                count == 1 ? "1" : fmt::format("1 or {}", count));
-    for (int i = 0; i < count; ++i)
-      into.push_back(values.empty() ? missing : values.size() == 1 ? values[0] : values[i]);
+    if (values.size() < 2) {
+      into.insert(into.end(), static_cast<std::size_t>(unknowns.count), values.empty() ? missing : values[0]);
+      return;
+    }
+    const std::vector<double> ordered = in_order(spec, key, values, unknowns.count, unknowns.listed);
+    into.insert(into.end(), ordered.begin(), ordered.end());
   };
   double lowest = -std::numeric_limits<double>::infinity(), highest = -lowest;
   const double largest = spec.initial.empty() ? 0 : *std::max_element(spec.initial.begin(), spec.initial.end());

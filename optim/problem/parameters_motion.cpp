@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/constants.h"
 #include "optim/problem/parameters.h"
@@ -30,34 +31,51 @@ std::vector<Vec3> vertex_normals(const Scene& scene, const Shape& shape) {
   return sum;
 }
 
-int select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, std::vector<int>& slot) {
+/// Gives each vertex that is selected its place in the selection, and returns these, or -1, for every vertex of the file that
+/// the selection names: those that lie at one position move as one, those without a face do not.
+std::vector<int> select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, std::vector<int>& slot) {
   const Selection& selection = spec.selection;
-  slot.assign(shape.vertex_count, -1);
-  int count = 0;
+  std::vector<int> named, places;
   if (selection.kind == Selection::Kind::list) {
-    for (int v : selection.indices) {
-      if (v < 0 || v >= shape.vertex_count)
-        spec.fail("selection", fmt::format("there is no vertex {} in shape '{}'", v, shape.name),
-                  fmt::format("0 to {}", shape.vertex_count - 1));
-      if (slot[v] >= 0) spec.fail("selection", fmt::format("vertex {} is listed twice", v));
-      slot[v] = count++;
+    std::vector<char> listed(shape.file_vertex_count());
+    for (const int number : selection.indices) {
+      if (number < 0 || number >= shape.file_vertex_count())
+        spec.fail("selection", fmt::format("there is no vertex {} in shape '{}'", number, shape.name),
+                  fmt::format("0 to {}", shape.file_vertex_count() - 1));
+      if (shape.vertex_of_file(number) < 0)
+        spec.fail("selection", fmt::format("vertex {} of shape '{}' has no face", number, shape.name));
+      if (std::exchange(listed[number], 1)) spec.fail("selection", fmt::format("vertex {} is listed twice", number));
+      named.push_back(number);
     }
   } else {
     const Vec3 &lo = selection.min, &hi = selection.max;
-    for (int v = 0; v < shape.vertex_count; ++v) {
-      const Vec3& p = scene.positions[shape.first_vertex + v];
+    const std::vector<Vec3> positions = shape.file_positions(scene.positions);
+    for (int number = 0; number < shape.file_vertex_count(); ++number) {
+      const Vec3& p = positions[number];
       const bool inside = selection.kind == Selection::Kind::all ||
                           (p.x >= lo.x && p.x <= hi.x && p.y >= lo.y && p.y <= hi.y && p.z >= lo.z && p.z <= hi.z);
-      if (inside) slot[v] = count++;
+      if (inside) named.push_back(number);
     }
   }
+  slot.assign(shape.vertex_count, -1);
+  int count = 0;
+  for (const int number : named) {
+    const int v = shape.vertex_of_file(number);
+    if (v >= 0 && slot[v] < 0) slot[v] = count++;
+    places.push_back(v < 0 ? -1 : slot[v]);
+  }
   if (count == 0) spec.fail("selection", fmt::format("selects no vertex of shape '{}'", shape.name));
-  return count;
+  return places;
+}
+
+/// How many of a selection's vertices move by themselves.
+int selected_count(const std::vector<int>& slot) {
+  return static_cast<int>(std::count_if(slot.begin(), slot.end(), [](int place) { return place >= 0; }));
 }
 
 }  // namespace
 
-bool Parameters::bind_move(const ParameterSpec& spec, int first, int& count) {
+bool Parameters::bind_move(const ParameterSpec& spec, int first, Unknowns& unknowns) {
   switch (spec.type) {
     case ParameterType::translation:
     case ParameterType::rotation:
@@ -66,7 +84,7 @@ bool Parameters::bind_move(const ParameterSpec& spec, int first, int& count) {
         Motion motion;
         motion.first_component = first;
         const int shape = find_shape(spec);
-        bind_motion(spec, motion, shape, count);
+        bind_motion(spec, motion, shape, unknowns);
         motions_[shape].push_back(std::move(motion));
       } else {
         bind_light(spec, first);
@@ -92,15 +110,18 @@ void Parameters::bind_light(const ParameterSpec& spec, int first) {
   light_motions_[light].push_back({spec.type, first, turns ? normalize(spec.axis) : spec.direction});
 }
 
-void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shape_index, int& count) {
+void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shape_index, Unknowns& unknowns) {
   const Shape& shape = scene_.shapes[shape_index];
   motion.type = spec.type;
   motion.direction_kind = spec.direction_kind;
   motion.direction = spec.type == ParameterType::rotation ? normalize(spec.axis) : spec.direction;
-  const int selected = select(spec, scene_, shape, motion.slot);
+  const std::vector<int> places = select(spec, scene_, shape, motion.slot);
   if (spec.type == ParameterType::rotation) bind_pivot(spec, motion, shape_index);
   if (spec.type != ParameterType::vertices) return;
-  count = spec.direction_kind == VertexDirection::free ? 3 * selected : selected;
+  const int selected = selected_count(motion.slot), stride = spec.direction_kind == VertexDirection::free ? 3 : 1;
+  unknowns.count = stride * selected;
+  for (const int place : places)
+    for (int axis = 0; axis < stride; ++axis) unknowns.listed.push_back(place < 0 ? -1 : stride * place + axis);
   if (spec.direction_kind != VertexDirection::normal) return;
   const std::vector<Vec3> sums = vertex_normals(scene_, shape);
   motion.normals.resize(selected);
@@ -108,7 +129,8 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
     if (motion.slot[v] < 0) continue;
     const double norm = length(sums[v]);
     if (!(norm > 0))
-      spec.fail("direction", fmt::format("vertex {} of shape '{}' has no normal", v, shape.name),
+      spec.fail("direction",
+                fmt::format("vertex {} of shape '{}' has no normal", shape.numbers_in_file()[v], shape.name),
                 "leave it out by selection");
     motion.normals[motion.slot[v]] = sums[v] / norm;
   }

@@ -21,7 +21,7 @@ Scene two_shapes() {
   return scene;
 }
 
-TEST(MeshWriter, BothKindsAreReadBackInTheSameOrderRoundedToFloat) {
+TEST(MeshWriter, BothKindsAreReadBackInTheSameOrder) {
   const Scene scene = two_shapes();
   TemporaryFolder folder;
   folder.write("m.ply", to_ply(scene, scene.shapes[1]));
@@ -29,10 +29,24 @@ TEST(MeshWriter, BothKindsAreReadBackInTheSameOrderRoundedToFloat) {
   for (const char* name : {"m.ply", "m.obj"}) {
     const Mesh mesh = read_mesh(folder.path(name));
     ASSERT_EQ(mesh.positions.size(), 4u) << name;
-    for (int v = 0; v < 4; ++v)
-      for (int axis = 0; axis < 3; ++axis)
-        EXPECT_EQ(mesh.positions[v][axis], static_cast<double>(static_cast<float>(scene.positions[v + 1][axis])));
+    for (int v = 0; v < 4; ++v) EXPECT_EQ(mesh.positions[v], scene.positions[v + 1]);
     EXPECT_EQ(mesh.faces, (std::vector<std::array<int, 3>>{{0, 1, 2}, {1, 3, 2}})) << name;
+  }
+}
+
+TEST(MeshWriter, VerticesAreThoseOfTheFileThatWasRead) {
+  // In the file: one without a face, the second of the shape, its first, the second again, the others.
+  Scene scene = two_shapes();
+  scene.shapes[1].file_vertices =
+      std::make_shared<const FileVertices>(FileVertices{{-1, 1, 0, 1, 2, 3}, {{7, 7, 7}}});
+  const std::vector<Vec3>& p = scene.positions;
+  TemporaryFolder folder;
+  folder.write("m.ply", to_ply(scene, scene.shapes[1]));
+  folder.write("m.obj", to_obj(scene, scene.shapes[1]));
+  for (const char* name : {"m.ply", "m.obj"}) {
+    const Mesh mesh = read_mesh(folder.path(name));
+    EXPECT_EQ(mesh.positions, (std::vector<Vec3>{{7, 7, 7}, p[2], p[1], p[2], p[3], p[4]})) << name;
+    EXPECT_EQ(mesh.faces, (std::vector<std::array<int, 3>>{{2, 1, 4}, {1, 5, 4}})) << name;
   }
 }
 
