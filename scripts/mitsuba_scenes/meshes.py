@@ -113,6 +113,6 @@ def transformed(mesh, matrix, flip):
 
 def obj_text(mesh, comment):
     lines = [f"# {comment}"]
-    lines += ["v " + " ".join(f"{x + 0.0:.9g}" for x in point) for point in mesh.points]
+    lines += ["v " + " ".join(f"{x + 0.0:.15g}" for x in point) for point in mesh.points]
     lines += ["f " + " ".join(str(corner + 1) for corner in face) for face in mesh.faces]
     return "\n".join(lines) + "\n"

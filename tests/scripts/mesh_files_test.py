@@ -15,8 +15,9 @@ PROGRAM = sys.argv.pop(1)
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "app/python"))
 import numpy as np
 from isochron.errors import InputError
-from isochron.mesh_files import read_mesh, read_polygons, read_scene_mesh
+from isochron.mesh_files import read_mesh, read_polygons, read_run_mesh, read_scene_mesh
 
+FIELD = pathlib.Path(__file__).resolve().parents[1] / "data/field"
 POINTS = [(0, 0, 0), (1.1, 0, 0), (1.1, 1, 0), (0, 1, 0), (0.5, 0.5, 0.7)]  # a pyramid; 1.1 and 0.7 are no floats
 FACES = [(3, 2, 1, 0), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
 TRIANGLES = [(3, 2, 1), (3, 1, 0), *FACES[1:]]
@@ -57,6 +58,11 @@ def text_stl():
         lines += ["facet normal 0 0 0", "outer loop", *("vertex {} {} {}".format(*POINTS[i]) for i in face), "endloop",
                   "endfacet"]
     return "\n".join([*lines, "endsolid pyramid"]).encode()
+
+
+def area(points, triangles):
+    a, b, c = np.swapaxes(points[triangles], 0, 1)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
 
 
 FILES = {"a.obj": obj(), "a.off": off(), "text.ply": text_ply(), "uneven.ply": binary_ply("<", "float", FACES),
@@ -104,7 +110,9 @@ class MeshFilesTest(unittest.TestCase):
 
     def test_vertices_are_numbered_as_the_program_does(self):
         (self.folder / "experiment.yaml").write_text(EXPERIMENT)
-        for name, data in FILES.items():
+        field = ("meshes/bom_vertex_silent.obj", "meshes/bent_closed.obj", "meshes/bent_pentagon.obj", "meshes/bin_trailing.stl",
+                 "meshes/upper.stl", "georeferenced/roof.obj", "unreferenced_vertices/loose.obj")
+        for name, data in {**FILES, **{pathlib.Path(f).name: (FIELD / f).read_bytes() for f in field}}.items():
             with self.subTest(name=name):
                 path = self.write(name, data)
                 (self.folder / "scene.yaml").write_text(SCENE.replace("FILE", name))
@@ -113,9 +121,37 @@ class MeshFilesTest(unittest.TestCase):
                                       capture_output=True, text=True)
                 self.assertEqual(done.returncode, 0, done.stderr)
                 points, triangles = read_scene_mesh(path, TRANSFORM)
-                of_program = read_mesh(run / "geometry/initial_it.ply")
-                np.testing.assert_allclose(points, of_program[0], rtol=0, atol=1e-12)
+                of_program = read_run_mesh(run / "geometry/initial_it.ply")
+                np.testing.assert_allclose(points, of_program[0], rtol=0, atol=1e-12 * max(1, np.abs(points).max()))
                 self.assertEqual(len(triangles), len(of_program[1]))
+                self.assertAlmostEqual(area(points, triangles), area(*of_program), 7)  # roundings of 1e7
+                if path.suffix != ".stl":  # which has no numbers
+                    self.assertEqual(len(read_mesh(path)[0]), len(read_mesh(run / "geometry/initial_it.ply")[0]))
+
+    def test_files_from_the_field_are_the_unit_cube(self):
+        cubes = [path for path in (FIELD / "meshes").iterdir() if not path.name.startswith("bent")]
+        self.assertEqual(len(cubes), 9)
+        for path in cubes:
+            with self.subTest(name=path.name):
+                points, triangles = read_scene_mesh(path, {})
+                self.assertEqual((len(points), len(triangles)), (8, 12))
+                self.assertAlmostEqual(area(points, triangles), 6, 12)
+                self.assertAlmostEqual(np.linalg.det(points[triangles]).sum() / 6, 1, 12)
+
+    def test_lines_of_any_kind(self):
+        for end in ("\n", "\r", "\r\n"):
+            ply = binary_ply("<", "double", TRIANGLES)
+            head, body = ply.split(b"end_header\n")
+            ply = (head + b"end_header\n").replace(b"\n", end.encode()) + body
+            for name, data in (("a.obj", obj()), ("a.off", off()), ("a.ply", text_ply()), ("a.stl", text_stl())):
+                with self.subTest(name=name, end=end):
+                    data = b"\xef\xbb\xbf" + data.replace(b"\n", end.encode())
+                    points, triangles = read_mesh(self.write(name, data))
+                    np.testing.assert_allclose(points[triangles], np.array(POINTS)[TRIANGLES], rtol=1e-7)
+            points, triangles = read_mesh(self.write("binary.ply", ply))
+            np.testing.assert_array_equal(points[triangles], np.array(POINTS)[TRIANGLES])
+        with self.assertRaisesRegex(InputError, "UTF-16"):
+            read_mesh(self.write("a.obj", obj().decode().encode("utf-16")))
 
     def test_mistakes_are_one_line(self):
         cut = FILES["even.ply"][:-3], FILES["uneven.ply"][:-3], FILES["big.ply"][:-3]

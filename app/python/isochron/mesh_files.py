@@ -21,10 +21,59 @@ class Polygons:
     corners: list | np.ndarray | None = None
 
     def triangles(self):
-        """[M, 3]; what has more corners is cut from its first one."""
+        """[M, 3], of polygons cut as the program does: from their first corner where they are convex, else so that the area is
+        least, which loses none, concave or bent."""
         if isinstance(self.faces, np.ndarray) and self.faces.shape[1] == 3:
             return self.faces
-        return np.array([(face[0], a, b) for face in self.faces for a, b in zip(face[1:], face[2:])], int).reshape(-1, 3)
+        sizes = np.array([len(face) for face in self.faces])
+        cut = [None] * len(sizes)
+        for size in np.unique(sizes):
+            chosen = np.flatnonzero(sizes == size)
+            corners = np.array([self.faces[face] for face in chosen])
+            for face, own, is_convex in zip(chosen, corners, _convex(self.points[corners])):
+                fan = is_convex or size == 3
+                cut[face] = [(0, i, i + 1) for i in range(1, size - 1)] if fan else _least_area(self.points[own])
+                cut[face] = own[np.array(cut[face])]
+        return np.concatenate(cut)
+
+
+def _convex(polygons):
+    """Whether polygons [K, corners, 3] are strictly convex along the axis nearest to their normals."""
+    points = polygons - polygons[:, :1]
+    normals = np.cross(points, np.roll(points, -1, axis=1)).sum(axis=1)
+    axis = np.abs(normals).argmax(axis=1)
+    rows = np.arange(len(points))
+    flat = np.stack([points[rows, :, (axis + i) % 3] for i in (1, 2)], axis=2)
+    side = np.roll(flat, -1, axis=1) - flat
+    following = np.roll(side, -1, axis=1)
+    turn = (side[..., 0] * following[..., 1] - side[..., 1] * following[..., 0]) * np.sign(normals[rows, axis])[:, None]
+    angle = np.arctan2(turn, (side * following).sum(axis=2)).sum(axis=1)
+    return (turn > 0).all(axis=1) & (angle < 3 * np.pi)  # once round
+
+
+def _least_area(points):
+    """The triangles, of numbers of corners, of least area among those with the fewest that have as good as none."""
+    count = len(points)
+    flat_costs = 4 * count * (np.ptp(points, axis=0) ** 2).sum()  # more than all areas together
+    cost, tips = np.zeros((count, count)), np.zeros((count, count), int)
+    for span in range(2, count):
+        for first in range(count - span):
+            last = first + span
+            between = np.arange(first + 1, last)
+            a, b = points[between] - points[first], points[last] - points[first]
+            area = np.linalg.norm(np.cross(a, b), axis=1)
+            longest = np.maximum(np.maximum((a * a).sum(axis=1), ((a - b) ** 2).sum(axis=1)), b @ b)
+            all_costs = cost[first, between] + cost[between, last] + area + flat_costs * (area <= 1e-6 * longest)
+            best = all_costs.argmin()
+            cost[first, last], tips[first, last] = all_costs[best], between[best]
+    triangles, left = [], [(0, count - 1)]
+    while left:
+        first, last = left.pop()
+        if last - first > 1:
+            tip = tips[first, last]
+            triangles.append((first, tip, last))
+            left += [(first, tip), (tip, last)]
+    return triangles
 
 
 def read_polygons(path, kind=None):
@@ -49,9 +98,16 @@ def read_polygons(path, kind=None):
 
 
 def read_mesh(path):
-    """Vertices [N, 3] and triangles [M, 3] of a file. Raises InputError."""
+    """Vertices [N, 3] as a file counts them and triangles [M, 3]. Raises InputError."""
     mesh = read_polygons(path)
     return mesh.points, mesh.triangles()
+
+
+def read_run_mesh(path):
+    """A mesh that a run wrote, with the vertices alone that have a face: those that parameters have values for."""
+    points, triangles = read_mesh(path)
+    used, triangles = np.unique(triangles, return_inverse=True)
+    return points[used], triangles.reshape(-1, 3)
 
 
 def name_in_files(shape):
@@ -60,13 +116,13 @@ def name_in_files(shape):
 
 
 def read_scene_mesh(path, transform):
-    """A mesh as the program numbers its vertices: rounded to float, those at one position are one, those without a face
-    none."""
+    """A mesh of a scene where it is there, with the vertices that the program takes: those at one position are one, those
+    without a face none."""
     from scipy.spatial.transform import Rotation  # takes long to load
 
     points, triangles = read_mesh(path)
-    points = points.astype(np.float32).astype(float)
-    _, first, inverse = np.unique(points + 0.0, axis=0, return_index=True, return_inverse=True)
+    cell = np.abs(points[np.unique(triangles)]).max() * 2.0**-44 or 1  # rounding in double precision
+    _, first, inverse = np.unique(np.round(points / cell) + 0.0, axis=0, return_index=True, return_inverse=True)
     triangles = first[inverse.ravel()][triangles]
     triangles = triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
     kept = np.unique(triangles)
@@ -79,22 +135,50 @@ def read_scene_mesh(path, transform):
     return points + np.asarray(transform.get("translate", (0, 0, 0)), float), triangles
 
 
+MARK = b"\xef\xbb\xbf"
+
+
+def _lines(data, comment=None, continued=False):
+    """Number and words of each line that has some, whether it ends in LF, CR or CRLF. `continued`: a line that ends in a
+    backslash goes on in the next one."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError("is text in UTF-16 (allowed: UTF-8)")
+    begun = None
+    for number, line in enumerate(re.split(b"\r\n|\r|\n", data), 1):
+        while line.startswith(MARK):
+            line = line[len(MARK):]
+        text = line.decode("utf-8", "replace")
+        text = (text.partition(comment)[0] if comment else text).rstrip()
+        first, before = begun or (number, "")
+        begun = (first, f"{before}{text[:-1]} ") if continued and text.endswith("\\") else None
+        words = (before + text).split()
+        if words and not begun:
+            yield first, words
+    if begun and begun[1].split():
+        yield begun[0], begun[1].split()
+
+
+def _number(word):
+    if "_" in word:  # which Python takes between digits
+        raise ValueError
+    return float(word)
+
+
 def _read_obj(data):
     points, normals, faces, corners = [], [], [], []
-    for number, line in enumerate(data.decode("utf-8", "replace").splitlines(), 1):
-        words = line.split()
+    for number, words in _lines(data, "#", continued=True):
         try:
-            if words[:1] == ["v"]:
-                points.append([float(word) for word in words[1:4]])
-            elif words[:1] == ["vn"]:
-                normals.append([float(word) for word in words[1:4]])
-            elif words[:1] == ["f"]:
+            if words[0] == "v":
+                points.append([_number(words[i]) for i in (1, 2, 3)])
+            elif words[0] == "vn":
+                normals.append([_number(words[i]) for i in (1, 2, 3)])
+            elif words[0] in ("f", "fo"):
                 parts = [word.split("/") for word in words[1:]]
                 faces.append([_counted(part[0], len(points)) for part in parts])
                 has_normals = all(len(part) == 3 and part[2] for part in parts)
                 corners.append([_counted(part[2], len(normals)) for part in parts] if has_normals else None)
-        except ValueError:
-            raise InputError(f"line {number}: '{line.strip()}' is not understood") from None
+        except (ValueError, IndexError):
+            raise InputError(f"line {number}: '{' '.join(words)}' is not understood") from None
     if max((max(c) for c in corners if c), default=-1) >= len(normals):
         raise InputError("a face has a corner that is not there")
     points = np.array(points, float).reshape(-1, 3)
@@ -115,11 +199,14 @@ PLY_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"
 
 
 def _read_ply(data):
-    end = data.find(b"end_header")
-    if not data.startswith(b"ply") or end < 0:
+    data = data.removeprefix(MARK)
+    first = re.match(rb"ply[ \t]*(\r\n|\r|\n)", data)
+    # In a file whose lines end in CR alone a LF behind the header is of the data.
+    end = first and re.search(rb"[\r\n][ \t]*end_header[^\r\n]*" + (rb"\r" if first[1] == b"\r" else rb"(\r\n|\r|\n)"), data)
+    if not end:
         raise InputError("is no PLY file")
-    end = data.index(b"\n", end) + 1
-    header = [line.split() for line in data[:end].decode("ascii", "replace").splitlines()]
+    end = end.end()
+    header = [words for _, words in _lines(data[:end])]
     order, elements = None, []
     for words in header:
         if words[:1] == ["format"]:
@@ -184,28 +271,35 @@ class _BinaryRows:
 
 
 class _TextRows:
+    """A line for each row; what a row does not take of it is passed over."""
+
     def __init__(self, data):
-        self.words = iter(data.split())
+        self.rows = _lines(data)
 
     def table(self, count, properties):
         table = {name: [] for name, _ in properties}
         for _ in range(count):
+            words = iter(next(self.rows)[1])
             for name, kind in properties:
                 if isinstance(kind, list):
-                    table[name].append([float(next(self.words)) for _ in range(int(next(self.words)))])
+                    table[name].append([_number(next(words)) for _ in range(int(next(words)))])
                 else:
-                    table[name].append(float(next(self.words)))
+                    table[name].append(_number(next(words)))
         return table
 
 
+OFF = re.compile("(off|coff|noff|cnoff|stoff|stcoff|stnoff|stcnoff)?([0-9]+)?$", re.IGNORECASE)
+
+
 def _read_off(data):
-    lines = (line.split("#")[0].split() for line in data.decode("utf-8", "replace").splitlines())
-    lines = iter([words for words in lines if words])
-    header = next(lines)
-    if header not in (["OFF"], ["COFF"], ["NOFF"], ["CNOFF"], ["STOFF"]):
+    lines = (words for _, words in _lines(data, "#"))
+    first, *counts = next(lines)
+    header = OFF.match(first)
+    if not header or first.startswith("nOFF"):
         raise InputError("does not begin with OFF")
-    points, faces = (int(word) for word in next(lines)[:2])
-    points = np.array([[float(word) for word in next(lines)[:3]] for _ in range(points)]).reshape(-1, 3)
+    counts = [header[2], *counts] if header[2] else counts or next(lines)
+    points, faces = (int(word) for word in counts[:2])
+    points = np.array([[_number(row[i]) for i in (0, 1, 2)] for row in (next(lines) for _ in range(points))]).reshape(-1, 3)
     return Polygons(points, [_off_face(next(lines)) for _ in range(faces)])
 
 
@@ -217,17 +311,24 @@ def _off_face(words):
 
 
 STL_FACE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+STL_NAMES = re.compile("(end ?)?solid.*", re.IGNORECASE)
 
 
 def _read_stl(data):
     """Three points of each triangle, as they stand there."""
-    if len(data) >= 84 and len(data) == 84 + STL_FACE.itemsize * struct.unpack_from("<I", data, 80)[0]:
-        points = np.frombuffer(data, STL_FACE, offset=84)["corners"].reshape(-1, 3).astype(float)
+    count = struct.unpack_from("<I", data, 80)[0] if len(data) >= 84 else 0
+    size = 84 + count * STL_FACE.itemsize
+    if len(data) >= 84 and len(data) >= size:
+        if len(data) >= size + STL_FACE.itemsize and data[size:].strip(b"\0"):
+            raise InputError(f"{len(data) - size} bytes follow the {count} facets that its header states")
+        points = np.frombuffer(data, STL_FACE, count, offset=84)["corners"].reshape(-1, 3).astype(float)
     else:
-        if not data.lstrip().startswith(b"solid"):
+        lines = [" ".join(words).lower() for _, words in _lines(data)]
+        if b"\0" in data or not lines or not lines[0].startswith("solid"):
             raise InputError("is no STL file")
-        words = [line.split() for line in data.decode("utf-8", "replace").splitlines()]
-        points = np.array([[float(x) for x in w[1:4]] for w in words if w[:1] == ["vertex"]]).reshape(-1, 3)
+        words = " ".join(STL_NAMES.sub("", line) for line in lines).split()
+        places = [i for i, word in enumerate(words) if word == "vertex"]
+        points = np.array([[_number(words[i + k]) for k in (1, 2, 3)] for i in places]).reshape(-1, 3)
     return Polygons(points, np.arange(len(points)).reshape(-1, 3))
 
 

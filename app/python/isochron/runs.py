@@ -91,7 +91,8 @@ class Run:
         return read_image(self.folder / "final.exr")
 
     def meshes(self, when: str = "final") -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """Shape -> vertices [vertex, xyz] and triangles [triangle, 3] of the shapes that parameters move.
+        """Shape -> vertices [vertex, xyz], as its mesh's file counts them, and triangles [triangle, 3] of the shapes that
+        parameters move.
         when: initial, final, target or the number of an iteration that the run wrote, such as 000010."""
         start = f"{when}_"
         files = sorted((self.folder / "geometry").glob(f"{start}*.*"))

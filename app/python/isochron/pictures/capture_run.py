@@ -8,7 +8,7 @@ import numpy as np
 from isochron import exr
 from isochron.captures import read_capture
 from isochron.errors import InputError
-from isochron.mesh_files import name_in_files, read_mesh, read_scene_mesh
+from isochron.mesh_files import name_in_files, read_run_mesh, read_scene_mesh
 from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
 from isochron.runs import read_values
@@ -148,7 +148,7 @@ class CaptureRun:
         for path in sorted((self.directory / "geometry").glob("final_*")):
             name = path.stem.removeprefix("final_")
             shape = next((s for s in paints if name_in_files(s) == name), name)
-            self._add_surface(path, shape, read_mesh(path), paints.pop(shape, None))
+            self._add_surface(path, shape, read_run_mesh(path), paints.pop(shape, None))
         moved = {str(spec.get("shape")) for spec in self.specs.values() if spec.get("type") != "albedo"}
         for shape, paint in paints.items():
             path, transform = self._find_shape(shape)

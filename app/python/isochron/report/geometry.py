@@ -5,7 +5,7 @@ import base64
 import numpy as np
 
 from isochron.errors import InputError
-from isochron.mesh_files import name_in_files, read_mesh, read_scene_mesh
+from isochron.mesh_files import name_in_files, read_run_mesh, read_scene_mesh
 from isochron.report.markup import Markup, data_for_scripts, element, section
 
 MOST_TRIANGLES = 2500  # of a mesh; larger ones are shown coarser
@@ -73,7 +73,7 @@ class Geometry:
             for path in sorted((self.run.directory / "geometry").glob(f"{name}_*")):
                 shape = path.stem.removeprefix(f"{name}_")
                 if path.suffix in (".ply", ".obj") and moment not in self.moved.get(shape, {}):
-                    mesh = self.run.read(read_mesh, f"geometry/{path.name}")
+                    mesh = self.run.read(read_run_mesh, f"geometry/{path.name}")
                     if mesh:
                         self.moved.setdefault(shape, {})[moment] = mesh
 
