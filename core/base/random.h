@@ -3,6 +3,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <cstdlib>
 
 #include "core/base/sobol.h"
 
@@ -14,6 +15,13 @@ struct Stream {
   std::uint32_t iteration = 0;
   std::uint32_t pass = 0;
 };
+
+/// Tells apart the numbers of test runs, which have to hold with any: ISOCHRON_TEST_SEED in the environment (tests/README.md).
+/// 0 where it is not set.
+inline const std::uint32_t kTestSeed = [] {
+  const char* text = std::getenv("ISOCHRON_TEST_SEED");
+  return text ? static_cast<std::uint32_t>(std::strtoul(text, nullptr, 10)) : 0u;
+}();
 
 inline std::array<std::uint32_t, 4> philox(std::array<std::uint32_t, 4> counter, std::array<std::uint32_t, 2> key) {
   for (int round = 0; round < 10; ++round) {
@@ -32,8 +40,9 @@ class Rng {
  public:
   Rng(const Stream& stream, std::uint64_t index, std::uint32_t sample) {
     // One extra Philox call folds (seed, iteration, pass) into the 64-bit key of the sample's numbers.
-    const auto mixed = philox({stream.iteration, stream.pass, static_cast<std::uint32_t>(index >> 32), 0x6973u},
-                              {static_cast<std::uint32_t>(stream.seed), static_cast<std::uint32_t>(stream.seed >> 32)});
+    const auto mixed =
+        philox({stream.iteration, stream.pass, static_cast<std::uint32_t>(index >> 32), 0x6973u + kTestSeed},
+               {static_cast<std::uint32_t>(stream.seed), static_cast<std::uint32_t>(stream.seed >> 32)});
     key_ = {mixed[0], mixed[1]};
     counter_ = {0, static_cast<std::uint32_t>(index), sample, mixed[2]};
   }

@@ -6,13 +6,15 @@
 #include <numbers>
 #include <random>
 
+#include "tests/seed.h"
+
 namespace isochron {
 namespace {
 
 constexpr long double kTurn = 2 * std::numbers::pi_v<long double>;
 
 TEST(Turn, AgreesWithLongDouble) {
-  std::mt19937_64 rng(1);
+  std::mt19937_64 rng(test_seed(1));
   std::uniform_real_distribution<double> uniform(-2, 2);
   for (int i = 0; i < 100000; ++i) {
     const double u = uniform(rng);

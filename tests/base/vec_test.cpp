@@ -5,6 +5,8 @@
 
 #include <random>
 
+#include "tests/seed.h"
+
 namespace isochron {
 namespace {
 
@@ -49,7 +51,7 @@ void expect_frame(const Vec3& n) {
 }
 
 TEST(CompleteFrame, OrthonormalAndRightHanded) {
-  std::mt19937 generator(1);
+  std::mt19937 generator(test_seed(1));
   std::normal_distribution<double> normal;
   for (int i = 0; i < 10000; ++i)
     expect_frame(normalize(Vec3{normal(generator), normal(generator), normal(generator)}));

@@ -9,6 +9,7 @@
 #include "core/base/error.h"
 #include "core/gates/gate.h"
 #include "tests/gates/quadrature.h"
+#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -107,7 +108,7 @@ TEST(Bins, CountEveryLengthOnce) {
 
 // Neighbours take the response's values from each other; each must have those of its own shape.
 TEST(Bins, ContiguousOrNotTheSameGates) {
-  std::mt19937 generator(3);
+  std::mt19937 generator(test_seed(3));
   std::uniform_real_distribution<double> uniform(0, 1);
   for (const Response& r : kResponses)
     for (const double width : {0.4, 0.37, 3.2, 0.1 * std::sqrt(2.0), 0.025}) {
@@ -146,7 +147,7 @@ TEST(Bins, DerivativeIsTheSlope) {
 }
 
 TEST(Bins, LengthsFollowTheGate) {
-  std::mt19937_64 generator(8);
+  std::mt19937_64 generator(test_seed(8));
   std::uniform_real_distribution<double> uniform(0, 1);
   constexpr int kCells = 40, kDraws = 200000;
   for (const Response& r : kResponses) {

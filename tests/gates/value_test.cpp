@@ -10,6 +10,7 @@
 #include "core/base/error.h"
 #include "core/gates/gate.h"
 #include "tests/gates/quadrature.h"
+#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -110,7 +111,7 @@ TEST(GateShape, TabulatedValues) {
 
 // Unevenly spaced knots, many per bucket and many buckets per knot, against a linear search.
 TEST(GateShape, TabulatedLookupFindsTheInterval) {
-  std::mt19937 generator(5);
+  std::mt19937 generator(test_seed(5));
   std::uniform_real_distribution<double> uniform(0, 1);
   std::vector<double> offsets{-3}, values{0.1};
   for (int i = 0; i < 300; ++i) {
@@ -206,7 +207,7 @@ TEST(GateShape, SaysWhatIsWrong) {
 
 // Unsorted centres of every spacing against a plain loop over all gates.
 TEST(GateSet, VisitsExactlyTheGatesThatHoldTheLength) {
-  std::mt19937 generator(9);
+  std::mt19937 generator(test_seed(9));
   std::uniform_real_distribution<double> uniform(0, 1);
   for (const auto& [name, gate] : finite_gates()) {
     const double scale = gate.upper() - gate.lower();

@@ -17,7 +17,7 @@ using Triangles = std::vector<EllipsoidBvh::Input>;
 
 class Generator {
  public:
-  explicit Generator(std::uint64_t seed) : rng_(seed) {}
+  explicit Generator(std::uint64_t seed) : rng_(test_seed(seed)) {}
   double uniform(double lo = 0, double hi = 1) { return lo + (hi - lo) * uniform_(rng_); }
   Vec3 vec(double scale) { return {uniform(-scale, scale), uniform(-scale, scale), uniform(-scale, scale)}; }
   /// Triangles of sizes between 1 % of the scene and the whole of it.

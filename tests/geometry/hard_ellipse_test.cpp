@@ -16,6 +16,7 @@
 
 #include "core/base/constants.h"
 #include "tests/geometry/reference_ellipse.h"
+#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -81,7 +82,7 @@ class ExtremeCases {
   Vec3 vec(double scale) { return {scale * normal_(rng_), scale * normal_(rng_), scale * normal_(rng_)}; }
   long double shift(double step) { return step * (2.0L * uniform() - 1); }
 
-  std::mt19937_64 rng_{20250107};
+  std::mt19937_64 rng_{test_seed(20250107)};
   std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> uniform_;
   Vec3L a_, b_;

@@ -7,6 +7,7 @@
 
 #include "core/base/constants.h"
 #include "core/geometry/ellipsoid_bvh.h"
+#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -35,7 +36,7 @@ TEST(QueryCost, GrowsWithTheCrossingTrianglesAndTheDepth) {
   for (const int side : {1, 2, 5, 16, 50, 158, 500, 708}) {  // 4 to 1 002 528 triangles
     const auto triangles = torus(side, side);
     const EllipsoidBvh bvh(triangles);
-    std::mt19937_64 rng(3);
+    std::mt19937_64 rng(test_seed(3));
     std::uniform_real_distribution<double> uniform(-2, 2);
     const auto vec = [&] {
       const double x = uniform(rng), y = uniform(rng), z = uniform(rng);

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "core/geometry/ellipsoid.h"
+#include "tests/seed.h"
 
 namespace isochron {
 
@@ -40,7 +41,7 @@ class RandomCases {
   }
 
  private:
-  std::mt19937_64 rng_{20240611};
+  std::mt19937_64 rng_{test_seed(20240611)};
   std::normal_distribution<double> normal_;
   std::uniform_real_distribution<double> uniform_;
 };

@@ -10,6 +10,7 @@
 
 #include "core/image/capture_file.h"
 #include "tests/scene/temporary_folder.h"
+#include "tests/seed.h"
 
 namespace isochron {
 
@@ -20,7 +21,7 @@ inline Vec3 any_point(std::mt19937& random) {
 
 /// Confocal with 0 spots. Counts are whole numbers, which 32-bit floats keep.
 inline CaptureFile any_capture(int columns, int rows, int spots, int bins) {
-  std::mt19937 random(3);
+  std::mt19937 random(test_seed(3));
   CaptureFile capture;
   CaptureGeometry& geometry = capture.geometry;
   geometry.columns = columns;

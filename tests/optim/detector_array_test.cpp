@@ -15,7 +15,6 @@
 #include "optim/problem/photon_noise.h"
 #include "optim/run/run.h"
 #include "tests/optim/tiny_scene.h"
-#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -23,7 +22,7 @@ namespace {
 GatedImage poisson_image(const std::vector<double>& background, double light, int gates, std::uint32_t seed) {
   GatedImage counts(static_cast<int>(background.size()), 1, gates, 1);
   for (int p = 0; p < counts.pixels(); ++p) {
-    Rng rng({test_seed(seed), 0, 0}, static_cast<std::uint64_t>(p), 0);
+    Rng rng({seed, 0, 0}, static_cast<std::uint64_t>(p), 0);
     // Light in one bin of eight.
     for (int g = 0; g < gates; ++g) counts.at(p, g, 0) = poisson(background[p] + (g % 8 == 0 ? light : 0), rng);
   }
@@ -118,16 +117,16 @@ class DetectorArray : public ::testing::Test {
                              start_ + ", target: 0}\n" + parameters +
                              "samples: {primal: 1024, interior: 512, visibility: 64, path_length: 512}\n"
                              "output: {frames: 0, geometry: none, histogram_samples: 64}\n"
-                             "seed: " +
-                             std::to_string(test_seed(1)) + "\noptimizer: " + optimizer + "\n");
+                             "optimizer: " +
+                             optimizer + "\n");
   }
 
   /// Counts drawn at the target values, with `hot` more in every bin of point 14.
   void write_counts(const std::string& parameters, double hot) const {
-    const std::string target = "{samples: 4096, seed: " + std::to_string(test_seed(7)) + ", noise: {counts: true}}";
+    const std::string target = "{samples: 4096, seed: 7, noise: {counts: true}}";
     const Problem problem(load_experiment(experiment(target, parameters, "{method: quasi_newton}")));
     GatedImage counts = problem.make_target(kGoOn);
-    Rng rng({test_seed(11), 0, 0}, 0, 0);
+    Rng rng({11, 0, 0}, 0, 0);
     for (int g = 0; hot > 0 && g < counts.gates; ++g) counts.at(14, g, 0) += poisson(hot, rng);
     ASSERT_TRUE(write_histograms(folder_.file("counts.h5"), problem.experiment(), problem.scene(), counts));
   }
@@ -169,7 +168,7 @@ TEST_F(DetectorArray, DelaysOfSinglePointsAreFound) {
   std::string late;
   double mean = 0;
   std::vector<double> delays;
-  Rng rng({test_seed(5), 0, 0}, 0, 0);
+  Rng rng({5, 0, 0}, 0, 0);
   for (int i = 0; i < 30; ++i) delays.push_back(0.03 * (2 * rng.uniform() - 1));
   for (const double d : delays) mean += d / 30;
   for (double& d : delays) late += fmt::format("{}{}", late.empty() ? "" : ", ", d -= mean);

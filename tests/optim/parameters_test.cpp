@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/base/error.h"
+#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -100,7 +101,7 @@ std::vector<double> dofs(const Scene& scene) {
 }
 
 std::vector<double> point_near_initial(const Parameters& parameters, unsigned seed) {
-  std::mt19937 generator(seed);
+  std::mt19937 generator(test_seed(seed));
   std::uniform_real_distribution<double> shift(-0.05, 0.05);
   std::vector<double> theta = parameters.initial();
   for (double& value : theta) value += shift(generator);
@@ -291,7 +292,7 @@ TEST(Parameters, TransposeIsTheAdjointOfTheTangent) {
   const Scene scene = two_shapes(false);
   const Parameters parameters(scene, every_kind());
   const std::vector<double> theta = point_near_initial(parameters, 6);
-  std::mt19937 generator(7);
+  std::mt19937 generator(test_seed(7));
   std::normal_distribution<double> normal;
   std::vector<double> x(parameters.size()), y(DofLayout(scene).size());
   for (double& value : x) value = normal(generator);

@@ -4,12 +4,14 @@
 
 #include <random>
 
+#include "tests/seed.h"
+
 namespace isochron {
 namespace {
 
 TEST(TangentBasis, TransposeProductMatchesTheDenseMatrix) {
   constexpr int kRows = 40, kColumns = 7;
-  std::mt19937 random(3);
+  std::mt19937 random(test_seed(3));
   std::uniform_real_distribution<double> uniform(-1, 1);
   std::vector<std::vector<double>> dense(kRows, std::vector<double>(kColumns, 0.0));
   TangentBasis basis;

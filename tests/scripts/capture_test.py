@@ -15,6 +15,7 @@ import unittest
 import h5py
 import numpy as np
 import yaml
+from seeds import generator
 
 PROGRAM = sys.argv.pop(1)
 
@@ -82,7 +83,7 @@ class CaptureTest(unittest.TestCase):
         with h5py.File(source) as read, h5py.File(self.folder / "counts.h5", "w") as written:
             for key in read:
                 read.copy(key, written)
-            written["H"][...] = np.random.default_rng(seed).poisson(read["H"][()])
+            written["H"][...] = generator(seed).poisson(read["H"][()])
             change(written)
 
     def test_rendered_counts_are_fitted(self):

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import scipy.io
 from captures import response
+from seeds import generator
 
 C = 299792458e-12  # metres in a picosecond
 
@@ -146,7 +147,7 @@ class ImportTest(unittest.TestCase):
     def write_pulse(self, jitter, begin=100, dark=0.5, seed=1):
         """Photons of a pulse that rises for 10 bins and decays with 60, from bin `begin`, and the truth's mean in bins
         behind `begin`."""
-        random = np.random.default_rng(seed)
+        random = generator(seed)
         time = np.arange(1200.0)
         pulse = np.where(time < 10, time / 10, np.exp((10 - time) / 60))
         counts = np.empty((8, 8, 1500))

@@ -23,6 +23,7 @@ from isochron.pictures.capture_run import METRES_PER_PS, CaptureRun
 from isochron.pictures.deviance import Fit
 from isochron.pictures.wall import Plane, Wall
 from report_folders import write_ply
+from seeds import generator
 
 PS, START, BINS = 20, 2000, 120
 LENGTHS = (START + PS * (np.arange(BINS) + 0.5)) * METRES_PER_PS
@@ -76,7 +77,7 @@ class PlotCaptureTest(unittest.TestCase):
         (self.folder / "experiment.yaml").write_text(EXPERIMENT)
         (self.folder / "summary.yaml").write_text(SUMMARY)
         fit = light_of(self.points, self.place, laser)
-        counts = np.random.default_rng(5).poisson(fit)
+        counts = generator(5).poisson(fit)
         write_capture(self.folder / "final.h5", fit, PS * METRES_PER_PS, START * METRES_PER_PS, self.points, (0, 0, 1),
                       laser, "isochron")
         self.write_target(counts)
@@ -281,7 +282,7 @@ class WallTest(unittest.TestCase):
 
     def test_planes(self):
         wall = Wall(grid(), np.array([[0, 0, 1.0]]))
-        places = np.random.default_rng(1).uniform(-0.3, 0.3, (20, 3))
+        places = generator(1).uniform(-0.3, 0.3, (20, 3))
         places[:, 2] = 0.5 + 0.1 * (places[:, 0] - places[:, 0].mean()) - 0.2 * (places[:, 1] - places[:, 1].mean())
         plane = Plane(places)
         self.assertTrue(plane.flat)

@@ -27,6 +27,7 @@ import isochron
 import numpy as np
 from isochron import _core
 from scipy.stats import t as student
+from seeds import generator
 
 try:
     import torch
@@ -196,7 +197,7 @@ class DualityTest(PythonTest):
         for (file, overrides), samples in zip(((CUBE, {**SMALL, "gates.sigma": 0.1}), *self.cases[1:]), (512, 64, 64)):
             numbers = {f"samples.{term}": samples for term in ("primal", "interior", "visibility")}
             experiment = isochron.Experiment(file, {**overrides, **numbers})
-            rng = np.random.default_rng(2)
+            rng = generator(2)
             shape = experiment.render(samples=2).shape
             adjoint, tangent = rng.normal(size=shape), rng.normal(size=len(experiment.initial))
             tangent *= np.concatenate([np.full(p.initial.size, p.scale) for p in experiment.parameters.values()])
@@ -446,7 +447,7 @@ class TorchTest(PythonTest):
         by chance once in 1000, with other seeds."""
         cube = isochron.Experiment(CUBE, {**SMALL, "gates.sigma": 0.3, "samples.primal": 256, "samples.interior": 32,
                                           "samples.visibility": 32})
-        weights = torch.from_numpy(np.random.default_rng(3).uniform(0.5, 1, cube.target.shape))
+        weights = torch.from_numpy(generator(3).uniform(0.5, 1, cube.target.shape))
         count, step, gradients, differences = 16, 0.02, [], []
         for iteration in range(count):
             theta = torch.tensor([0.1], dtype=torch.float64, requires_grad=True)

@@ -11,6 +11,7 @@ sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent / "app/python")]
 import numpy as np
 from isochron import exr
 from isochron.captures import write_capture
+from seeds import generator
 
 METRES_PER_PS = 299792458e-12
 SCENE = """camera: {position: [0, 1, 4], look_at: [0, 0.3, 0], up: [0, 1, 0], fov: 40, resolution: [8, 6]}
@@ -127,7 +128,7 @@ def write_capture_run(folder, bins=40, columns=6, rows=5):
     lengths = (2900 + 40 * (np.arange(bins) + 0.5)) * METRES_PER_PS
     fit = 2 + 30 * np.exp(-0.5 * ((lengths[:, np.newaxis, np.newaxis] - way) / 0.02) ** 2)
     write_capture(folder / "final.h5", fit, 40 * METRES_PER_PS, 2900 * METRES_PER_PS, points, (0, 0, 1), None, "isochron")
-    counts = np.random.default_rng(5).poisson(fit)
+    counts = generator(5).poisson(fit)
     notes = {"isochron.gateCenters": " ".join(f"{2920 + 40 * g}" for g in range(bins)), "isochron.gateUnit": "ps",
              "isochron.quantity": "radiance per scene unit of path length"}
     for name, light in (("target", counts), ("initial", fit * 0.5), ("final", fit), ("frames/000000", fit * 0.5),
