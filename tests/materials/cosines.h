@@ -17,6 +17,11 @@ inline Directions directions(double cos_i, double cos_o, double cos_io) {
   return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, cos_i, cos_o, cos_io};
 }
 
+/// Of unit vectors above a surface whose normal is z.
+inline Directions directions(const Vec3& w_i, const Vec3& w_o) {
+  return {{0, 0, 1}, w_i, w_o, w_i.z, w_o.z, dot(w_i, w_o)};
+}
+
 inline double value(const Material& m, double cos_i, double cos_o, double cos_io) {
   return m.bsdf().value(directions(cos_i, cos_o, cos_io)).r;
 }

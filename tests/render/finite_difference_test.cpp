@@ -20,7 +20,7 @@
 namespace isochron::testing {
 namespace {
 
-enum class Look { diffuse, glossy, retroreflecting, glass };
+enum class Look { diffuse, glossy, retroreflecting, plastic, glass };
 
 struct DifferenceCase {
   const char* name;
@@ -50,6 +50,10 @@ TEST_P(FiniteDifference, TotalDerivative) {
     replace_material(scene, "block", retroreflector(Rgb(0.3), Rgb(0.6), 0.5));
     replace_material(scene, "panel", retroreflector(Rgb(0.2), Rgb(0.7), 0.5, true));
   }
+  if (c.look == Look::plastic) {
+    replace_material(scene, "block", plastic(Rgb(0.5), 0.5, 2.0));
+    replace_material(scene, "panel", plastic(Rgb(0.6), 0.5, 2.0, true));
+  }
   const Vec3 corner = scene.positions[scene.shapes[scene.find_shape("block")].first_vertex + 2];
   const Vec3 middle = scene.positions[scene.shapes[scene.find_shape("panel")].first_vertex + 4];
   const auto at = [](const Vec3& place) { return [=](const Vec3& p) { return p == place; }; };
@@ -73,17 +77,18 @@ TEST_P(FiniteDifference, TotalDerivative) {
   if (glass)
     parameters.push_back(
         {"ior", change_material(scene, "block", "ior"), 0.01, false, c.sampling == Sampling::ellipsoidal ? 2.0 : 1.0});
-  if (c.look == Look::retroreflecting)
-    parameters.push_back({"reflectance", change_material(scene, "block", "reflectance"), 0.01, false});
+  const bool two_lobes = c.look == Look::retroreflecting || c.look == Look::plastic;
+  if (c.look == Look::plastic) parameters.push_back({"ior", change_material(scene, "block", "ior"), 0.01, false});
+  if (two_lobes) parameters.push_back({"reflectance", change_material(scene, "block", "reflectance"), 0.01, false});
   // What roughness changes is little beside the noise of the finite differences.
   if (c.look != Look::diffuse)
     parameters.push_back({"roughness", change_material(scene, "block", "roughness"), 0.01, false,
-                          glass                             ? 20.0
-                          : c.look == Look::retroreflecting ? 2.5
-                                                            : 1.0,
-                          glass                             ? 4.0
-                          : c.look == Look::retroreflecting ? 0.5
-                                                            : INFINITY});
+                          glass       ? 20.0
+                          : two_lobes ? 2.5
+                                      : 1.0,
+                          glass       ? 4.0
+                          : two_lobes ? 0.5
+                                      : INFINITY});
   std::vector<Motion> motions;
   for (const Parameter& p : parameters) motions.push_back(p.motion);
   const TangentBasis basis = make_basis(scene, motions);
@@ -161,6 +166,10 @@ INSTANTIATE_TEST_SUITE_P(
                        Sampling::standard, 60, 125},
         DifferenceCase{"retroreflecting_boxcar_ellipsoidal", Look::retroreflecting, GateShape::boxcar(0.6),
                        Sampling::ellipsoidal, 40, 200},
+        DifferenceCase{"plastic_gaussian_standard", Look::plastic, GateShape::gaussian(0.3), Sampling::standard, 60,
+                       125},
+        DifferenceCase{"plastic_boxcar_ellipsoidal", Look::plastic, GateShape::boxcar(0.6), Sampling::ellipsoidal, 40,
+                       200},
         DifferenceCase{"glass_gaussian_standard", Look::glass, GateShape::gaussian(0.3), Sampling::standard, 60, 125},
         DifferenceCase{"glass_boxcar_ellipsoidal", Look::glass, GateShape::boxcar(0.6), Sampling::ellipsoidal, 60,
                        125}),

@@ -34,6 +34,15 @@ inline Material retroreflector(const Rgb& albedo, const Rgb& reflectance, double
   return m;
 }
 
+inline Material plastic(const Rgb& albedo, double roughness, double ior, bool two_sided = false) {
+  Material m("plastic");
+  m.set("albedo", albedo);
+  m.set("roughness", roughness);
+  m.set("ior", ior);
+  m.bsdf().set_two_sided(two_sided);
+  return m;
+}
+
 inline Material glass(double roughness, double ior) {
   Material m("rough_dielectric");
   m.set("roughness", roughness);

@@ -136,7 +136,8 @@ TEST_F(SceneLoader, Glass) {
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: -1.5")),
             "scene.yaml:9:56: materials.glass.ior: -1.5 is out of range (a number above 0)");
   EXPECT_EQ(error(white, glass("roughness: 0.1, ior: 1.5, two_sided: true")),
-            "scene.yaml:9:61: materials.glass.two_sided: belongs to diffuse, rough_conductor and retroreflecting, not "
+            "scene.yaml:9:61: materials.glass.two_sided: belongs to diffuse, rough_conductor, plastic and "
+            "retroreflecting, not "
             "to rough_dielectric "
             "(allowed: type, roughness, ior)");
 }
@@ -287,10 +288,10 @@ TEST_F(SceneLoader, MaterialErrors) {
             "scene.yaml:9:79: materials.metal.two_sided: '1' is neither (true or false)");
   EXPECT_EQ(error("type: diffuse", "type: difuse"),
             "scene.yaml:8:17: materials.white.type: 'difuse' is not known, did you mean 'diffuse'? "
-            "(allowed: diffuse, rough_conductor, rough_dielectric, retroreflecting)");
+            "(allowed: diffuse, rough_conductor, rough_dielectric, plastic, retroreflecting)");
   EXPECT_EQ(error("albedo: 0.6", "albedo: 0.6, roughness: 0.1"),
-            "scene.yaml:8:39: materials.white.roughness: belongs to rough_conductor, rough_dielectric and "
-            "retroreflecting, not to diffuse "
+            "scene.yaml:8:39: materials.white.roughness: belongs to rough_conductor, rough_dielectric, plastic "
+            "and retroreflecting, not to diffuse "
             "(allowed: type, albedo, two_sided)");
   EXPECT_EQ(error("  metal:", "  white:"), "scene.yaml:9:3: materials.white: stands here twice, first on line 8");
 }

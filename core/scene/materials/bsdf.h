@@ -88,6 +88,8 @@ class Bsdf {
   virtual void describe(Keys& keys, bool& grey) = 0;
   /// What can be differentiated. Numbers are counted along this list.
   virtual std::vector<Quantity> quantities() = 0;
+  /// To be called when numbers were set through quantities(): what follows from them is computed once, here.
+  virtual void numbers_changed() {}
 
   /// f in 1/sr, without cosine; that of radiance which travels from w_i to w_o. Zero where nothing is scattered.
   virtual Rgb value(const Directions& d) const = 0;

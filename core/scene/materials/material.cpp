@@ -63,6 +63,7 @@ void Material::set_number(int k, double value) {
     const int count = static_cast<int>(quantity.values.size());
     if (k < count) {
       quantity.values[k] = value;
+      bsdf_->numbers_changed();
       return;
     }
     k -= count;
@@ -74,6 +75,7 @@ void Material::set(const std::string& name_of_quantity, const Rgb& value) {
   Quantity quantity;
   if (find(name_of_quantity, &quantity) < 0) throw std::logic_error("no such quantity: " + name_of_quantity);
   for (std::size_t c = 0; c < quantity.values.size(); ++c) quantity.values[c] = value[static_cast<int>(c)];
+  bsdf_->numbers_changed();
 }
 
 }  // namespace isochron

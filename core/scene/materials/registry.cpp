@@ -3,10 +3,11 @@
 
 namespace isochron {
 
-extern const MaterialKind kDiffuse, kRoughConductor, kRoughDielectric, kRetroreflecting;
+extern const MaterialKind kDiffuse, kRoughConductor, kRoughDielectric, kPlastic, kRetroreflecting;
 
 std::span<const MaterialKind* const> material_kinds() {
-  static constexpr const MaterialKind* kKinds[] = {&kDiffuse, &kRoughConductor, &kRoughDielectric, &kRetroreflecting};
+  static constexpr const MaterialKind* kKinds[] = {&kDiffuse, &kRoughConductor, &kRoughDielectric, &kPlastic,
+                                                   &kRetroreflecting};
   return kKinds;
 }
 
