@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "optim/problem/vector_math.h"
+
 namespace isochron {
 namespace {
 
@@ -15,12 +17,6 @@ constexpr std::size_t kMostDifferences = 32, kFewestDifferences = 6;
 
 double square(double x) {
   return x * x;
-}
-
-double dot(const std::vector<double>& a, const std::vector<double>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
 }
 
 double squared_distance(const std::vector<double>& a, const std::vector<double>& b) {

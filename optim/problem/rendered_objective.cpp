@@ -8,60 +8,15 @@
 
 #include "core/base/error.h"
 #include "optim/problem/gauss_newton.h"
+#include "optim/problem/jacobian.h"
 #include "optim/problem/loss.h"
 
 namespace isochron {
-namespace {
-
-/// Bytes of derivative images, and of partial sums of the renderer's work partitions (about 8), that are alive at a time.
-constexpr double kGroupBytes = 1e9, kImagesPerUnknown = 8 + 2;
-
-/// Matrices of unknowns x unknowns that one step of Levenberg-Marquardt holds.
-constexpr double kSquareMatrices = 8;
-
-/// Adds the derivative images, or central differences, of one half of the samples to the columns of
-/// `jacobian`.
-void add_half(const Problem& problem, const std::vector<double>& theta, std::uint32_t iteration, int half,
-              const Poll& poll, JacobianHalves& jacobian) {
-  const SampleSpec& samples = problem.experiment().samples;
-  const auto half_of = [&](int count) { return SampleRange{half * ((count + 1) / 2), (half + 1) * ((count + 1) / 2)}; };
-  const auto add = [&](int column, const GatedImage& image) {
-    double* entry = jacobian.half[half].data() + jacobian.residuals * static_cast<std::size_t>(column);
-    for (double value : image.data) *entry++ += value;
-  };
-  const int unknowns = static_cast<int>(theta.size());
-  if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
-    for (int i = 0; i < unknowns; ++i) {
-      add(i, problem.finite_difference(theta, i, problem.stream(Pass::finite_difference, iteration),
-                                       half_of(samples.primal)));
-      poll();
-    }
-    return;
-  }
-  const Scene scene = problem.parameters().apply(theta);
-  const TangentBasis all = problem.parameters().tangent(theta);
-  const double bytes = 8.0 * static_cast<double>(jacobian.residuals) * kImagesPerUnknown;
-  const int group = std::max(1, static_cast<int>(std::min(kGroupBytes / bytes, 1e6)));
-  for (int first = 0; first < unknowns; first += group) {
-    const TangentBasis basis = select_columns(all, first, std::min(group, unknowns - first));
-    const Renderer renderer = problem.renderer(scene, problem.estimator(samples.visibility), &basis);
-    for (Term term : kTerms) {
-      if (samples.term(term) == 0) continue;
-      const auto images = renderer.derive(term, problem.stream(pass_of(term), iteration), half_of(samples.term(term)));
-      for (int i = 0; i < basis.columns; ++i) add(first + i, images[i]);
-      poll();
-    }
-  }
-}
-
-}  // namespace
 
 void require_jacobian_fits(const Problem& problem) {
   if (problem.experiment().optimizer.method != OptimizerMethod::levenberg_marquardt) return;
-  const Camera& camera = problem.scene().camera;
-  const double residuals = 1.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
-  const double unknowns = problem.parameters().size();
-  const double bytes = 8 * (2 * residuals * unknowns + kSquareMatrices * unknowns * unknowns);
+  const double residuals = residual_count(problem), unknowns = problem.parameters().size();
+  const double bytes = linearisation_bytes(problem, unknowns);
   if (bytes > kMostLinearisationBytes)
     throw InputError(fmt::format(
         "{}: optimizer.method: levenberg_marquardt needs {:.3g} GB for the Jacobian of {:.0f} residuals by {} "
@@ -102,8 +57,7 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
   Evaluation result;
   set_loss(problem_.loss(image, target_, theta), result);
 
-  JacobianHalves jacobian(target_.data.size(), theta.size());
-  for (int half : {0, 1}) add_half(problem_, theta, iteration, half, poll_, jacobian);
+  JacobianHalves jacobian = render_jacobian(problem_, theta, problem_.parameters().tangent(theta), iteration, poll_);
   gauss_newton(jacobian, loss_adjoint(image, target_, rho).data, curvature_weights(image.image, target_, rho), result);
   result.image = std::move(image.image);
   const PenaltyScale scale = problem_.penalty_scale(target_);
@@ -116,14 +70,8 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
 
 std::vector<double> RenderedObjective::probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
                                                        const Evaluation& now, int probe) const {
-  GatedImage signs = now.image;
-  signs.data = curvature_weights(now.image, target_, problem_.reading_loss(target_));
-  for (std::size_t i = 0; i < signs.data.size(); ++i) {
-    Rng rng(problem_.stream(Pass::probe, iteration), i, static_cast<std::uint32_t>(probe));
-    signs.data[i] = std::copysign(std::sqrt(signs.data[i]), rng.uniform() - 0.5);
-  }
-  std::vector<double> diagonal = problem_.transpose_apply(theta, signs, iteration, poll_);
-  for (double& d : diagonal) d *= d;
+  std::vector<double> diagonal = probe_diagonal(
+      problem_, theta, curvature_weights(now.image, target_, problem_.reading_loss(target_)), iteration, probe, poll_);
   problem_.penalty().add_diagonal(problem_.penalty_scale(target_), diagonal);
   return diagonal;
 }

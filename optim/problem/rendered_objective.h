@@ -26,8 +26,7 @@ class RenderedObjective : public Objective {
   /// From two halves of the image's samples, as all losses here; see loss.h.
   double loss(const std::vector<double>& theta, std::uint32_t iteration) const override;
   Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
-  /// Each term's samples are cut into two halves, an odd number rounded up. The Jacobian is rendered for a
-  /// group of unknowns at a time, each time from the same random numbers.
+  /// See jacobian.h.
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
   std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
                                       int probe) const override;

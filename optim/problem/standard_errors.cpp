@@ -1,10 +1,63 @@
 #include "optim/problem/standard_errors.h"
 
-#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 namespace isochron {
+namespace {
+
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+/// What is determined that much better together is stated so, though each alone has an error, too.
+constexpr double kBetterTogether = 10;
+
+/// A combination and how it depends on the unknowns, component by component and on average.
+struct Functions {
+  const Parameters::Block& other;
+  Combination combination;
+  std::vector<std::vector<double>> components;
+  std::vector<double> mean;
+};
+
+Functions functions_of(const NullDirection& direction, const NullDirection::Partner& partner,
+                       const std::vector<Parameters::Block>& blocks, const std::vector<double>& theta) {
+  const Parameters::Block& other = blocks[partner.block];
+  const auto is_pivot = [&](const Parameters::Block& b) { return b.begin == direction.pivot; };
+  const std::string& name = std::find_if(blocks.begin(), blocks.end(), is_pivot)->name;
+  const double pivot = theta[direction.pivot], p = partner.power;
+  Functions result{
+      other, {combination_name(name, other.name, partner), {}, {}, 0, 0}, {}, std::vector<double>(theta.size())};
+  for (int i = other.begin; i < other.begin + other.count; ++i) {
+    const double x = theta[i], factor = partner.product ? std::pow(x, p) : 1;
+    std::vector<double> weights(theta.size(), 0.0);
+    weights[direction.pivot] = factor;
+    weights[i] = partner.product ? pivot * p * std::pow(x, p - 1) : p;
+    for (const int k : {direction.pivot, i}) result.mean[k] += weights[k] / other.count;
+    result.components.push_back(std::move(weights));
+    result.combination.values.push_back(partner.product ? pivot * factor : pivot + p * x);
+    result.combination.mean += result.combination.values.back() / other.count;
+  }
+  return result;
+}
+
+/// Parameters all of whose unknowns are undetermined, and single components.
+std::vector<std::string> undetermined_names(const std::vector<Parameters::Block>& blocks,
+                                            const std::vector<std::string>& names,
+                                            const std::vector<bool>& undetermined) {
+  std::vector<std::string> found;
+  for (const Parameters::Block& block : blocks) {
+    const auto begin = undetermined.begin() + block.begin;
+    if (std::count(begin, begin + block.count, true) == block.count) {
+      found.push_back(block.name);
+      continue;
+    }
+    for (int i = block.begin; i < block.begin + block.count; ++i)
+      if (undetermined[i]) found.push_back(names[i]);
+  }
+  return found;
+}
+
+}  // namespace
 
 double variance_scale(const Problem& problem, const Evaluation& at) {
   const double readings = problem.readings().count(at.image);
@@ -12,27 +65,79 @@ double variance_scale(const Problem& problem, const Evaluation& at) {
   return at.mean_squared_error > 0 ? 2 * at.mean_squared_error / readings : std::numeric_limits<double>::quiet_NaN();
 }
 
-std::vector<double> standard_errors(const std::vector<double>& matrix, double scale) {
-  constexpr Eigen::Index kMostUnknowns = 1000;
-  const auto n = static_cast<Eigen::Index>(std::lround(std::sqrt(static_cast<double>(matrix.size()))));
-  if (n == 0 || n > kMostUnknowns || !std::isfinite(scale)) return {};
-  const Eigen::Map<const Eigen::MatrixXd> h(matrix.data(), n, n);
-  // Scaled to a unit diagonal: unknowns have units.
-  const Eigen::VectorXd root = h.diagonal().cwiseSqrt().cwiseInverse();
-  if (!root.allFinite()) return {};
-  const Eigen::LLT<Eigen::MatrixXd> factor(root.asDiagonal() * h * root.asDiagonal());
-  if (factor.info() != Eigen::Success) return {};
-  const Eigen::VectorXd inverse = factor.solve(Eigen::MatrixXd::Identity(n, n)).diagonal();
-  std::vector<double> errors(static_cast<std::size_t>(n));
-  for (Eigen::Index i = 0; i < n; ++i) errors[static_cast<std::size_t>(i)] = std::sqrt(scale * inverse[i]) * root[i];
-  return errors;
+Determined::Determined(const std::vector<Parameters::Block>& blocks, const std::vector<std::string>& names,
+                       const std::vector<double>& theta, const std::vector<double>& matrix,
+                       const std::vector<ParameterChange>& changes, std::vector<bool> unseen,
+                       const std::vector<bool>& free)
+    : blocks_(blocks), names_(names), theta_(theta), undetermined_(std::move(unseen)), fixed_(theta.size()) {
+  for (std::size_t i = 0; i < theta.size(); ++i) fixed_[i] = undetermined_[i] && !free[i];
+  directions_ = null_directions(matrix, changes, blocks, theta);
+  exact_ = directions_.size();
+  for (const NullDirection& direction : directions_) {
+    fixed_[direction.pivot] = true;
+    for (std::size_t i = 0; i < theta.size(); ++i)
+      if (direction.change[i] != 0) undetermined_[i] = true;
+  }
+  const double near_null = 1 / (kBetterTogether * kBetterTogether);
+  for (const ChangeKinds kinds : {ChangeKinds::summands, ChangeKinds::factors})
+    for (NullDirection& near : null_directions(matrix, changes, blocks, theta, near_null, kinds)) {
+      const auto same = [&](const NullDirection& other) { return other.pivot == near.pivot; };
+      if (near.partners.size() == 1 && !undetermined_[near.pivot] && std::ranges::none_of(directions_, same))
+        directions_.push_back(std::move(near));
+    }
 }
 
-std::vector<double> least_standard_errors(const std::vector<double>& diagonal, double scale) {
-  if (!std::isfinite(scale)) return {};
-  std::vector<double> errors;
-  for (const double d : diagonal) errors.push_back(std::sqrt(scale / d));
-  return errors;
+ParameterErrors Determined::errors(double scale, const std::vector<bool>& asked, const std::vector<double>& least,
+                                   const Spreads& spreads) const {
+  std::vector<std::vector<double>> weights;
+  for (std::size_t i = 0; i < theta_.size(); ++i) {
+    if (!asked[i] || fixed_[i]) continue;
+    weights.emplace_back(theta_.size(), 0.0);
+    weights.back()[i] = 1;
+  }
+  std::vector<Functions> functions;
+  std::vector<int> near_pivots;  // -1: of an exact direction
+  for (std::size_t d = 0; d < directions_.size(); ++d)
+    for (const NullDirection::Partner& partner : directions_[d].partners) {
+      functions.push_back(functions_of(directions_[d], partner, blocks_, theta_));
+      near_pivots.push_back(d < exact_ ? -1 : directions_[d].pivot);
+      const Functions& last = functions.back();
+      if (asked[last.other.begin]) weights.insert(weights.end(), last.components.begin(), last.components.end());
+      weights.push_back(last.mean);
+    }
+
+  const std::vector<Spread> found = spreads(weights);
+  auto next = found.begin();
+  const auto next_error = [&] { return std::sqrt(scale * next++->variance); };
+  ParameterErrors result;
+  std::vector<bool> undetermined = undetermined_;
+  std::vector<double> values = least;
+  values.resize(theta_.size(), kInfinite);
+  for (const Parameters::Block& block : blocks_)
+    for (int i = block.begin; i < block.begin + block.count; ++i) {
+      if (asked[i] && !fixed_[i]) {
+        const double step = next->step;
+        values[i] = next_error();
+        if (std::isinf(values[i])) undetermined[i] = true;
+        if (block.count <= kFewComponents && !undetermined[i] && std::abs(step) > values[i])
+          result.steps_left.emplace_back(names_[i], step);
+      }
+      if (undetermined[i]) values[i] = kInfinite;
+    }
+  for (std::size_t c = 0; c < functions.size(); ++c) {
+    const Functions& of = functions[c];
+    Combination combination = of.combination;
+    for (int i = 0; i < of.other.count; ++i)
+      combination.errors.push_back(asked[of.other.begin]
+                                       ? next_error()
+                                       : std::abs(of.components[i][of.other.begin + i]) * least[of.other.begin + i]);
+    combination.mean_error = next_error();
+    if (near_pivots[c] < 0 || kBetterTogether * combination.mean_error < values[near_pivots[c]])
+      result.combinations.push_back(std::move(combination));
+  }
+  if (std::isfinite(scale)) result.values = std::move(values);
+  result.undetermined = undetermined_names(blocks_, names_, undetermined);
+  return result;
 }
 
 }  // namespace isochron

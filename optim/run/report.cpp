@@ -65,16 +65,40 @@ std::string table(const std::vector<Row>& rows) {
   return text;
 }
 
+/// The first of some names.
+std::string some_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 8;
+  const std::string rest = names.size() > kMost ? fmt::format(" and {} more", names.size() - kMost) : "";
+  return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + std::min(kMost, names.size()), ", "), rest);
+}
+
+std::string what_errors_say(const ParameterErrors& errors) {
+  std::string text;
+  if (!errors.undetermined.empty())
+    text += fmt::format("  the readings do not determine {}\n", some_of(errors.undetermined));
+  for (const Combination& c : errors.combinations)
+    text += fmt::format("  {} is {:.5g}{}{}\n", c.name, c.mean,
+                        std::isfinite(c.mean_error) ? fmt::format(" +- {:.2g}", c.mean_error) : "",
+                        c.values.size() > 1 ? fmt::format(" (mean of {})", c.values.size()) : "");
+  std::vector<std::string> steps;
+  for (const auto& [name, step] : errors.steps_left) steps.push_back(fmt::format("{} by {:.2g}", name, step));
+  if (!steps.empty())
+    text += fmt::format("  not at the minimum: a Newton step would move {}: more than the standard errors\n",
+                        some_of(steps));
+  return text;
+}
+
 }  // namespace
 
 std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
-                       const Parameters& parameters) {
+                       const Parameters& parameters, const ParameterErrors& errors) {
   const int rejected = state.safeguard.rejected + state.steps_rejected;
   std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {} (row {} of log.csv)\n",
                                  name(result.status), state.iteration, std::max(state.seconds, last.seconds),
                                  rejected > 0 ? fmt::format(", {} steps rejected", rejected) : "", name(result.choice),
                                  last.iteration);
-  text += table(rows_of(parameters, state.theta)) + bounds_report(find_at_bounds(parameters, state.theta));
+  text += table(rows_of(parameters, state.theta)) + bounds_report(find_at_bounds(parameters, state.theta)) +
+          what_errors_say(errors);
   auto out = std::back_inserter(text);
   if (!std::isnan(last.loss)) {
     fmt::format_to(out, "  loss {:.3g} +- {:.2g} (at the start {:.3g} +- {:.2g}){}\n", last.loss, last.loss_noise,

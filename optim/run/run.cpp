@@ -15,11 +15,13 @@
 #include "optim/experiment/files.h"
 #include "optim/problem/capture_data.h"
 #include "optim/problem/darkness.h"
+#include "optim/problem/jacobian.h"
+#include "optim/problem/joint_errors.h"
 #include "optim/problem/loss.h"
 #include "optim/problem/memory.h"
 #include "optim/problem/problem.h"
+#include "optim/problem/rendered_curvature.h"
 #include "optim/problem/rendered_objective.h"
-#include "optim/problem/standard_errors.h"
 #include "optim/problem/vector_math.h"
 #include "optim/run/checkpoint.h"
 #include "optim/run/frames.h"
@@ -91,7 +93,7 @@ class Run {
     write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_, cost, errors_));
     if (options_.report)
       options_.report((had_ended && state_.iteration == first ? nothing_left(result, options_.folder) : "") +
-                      run_report(result, state_, last_, parameters_));
+                      run_report(result, state_, last_, parameters_, errors_));
     return result.status;
   }
 
@@ -170,16 +172,27 @@ class Run {
     geometry.write("final", state_.theta);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);
-    errors_ = find_errors(*optimizer, final);
+    errors_ = find_errors(final);
     write_expected_counts();
     return result;
   }
 
-  ParameterErrors find_errors(const Optimizer& optimizer, const Evaluation& final) const {
-    const double scale = variance_scale(problem_, final);
-    if (const std::vector<double> diagonal = optimizer.curvature_diagonal(); !diagonal.empty())
-      return {"gauss_newton_diagonal", least_standard_errors(diagonal, scale)};
-    return {"gauss_newton_matrix", standard_errors(final.curvature, scale)};
+  /// Of all unknowns together where their matrix is not too large.
+  ParameterErrors find_errors(const Evaluation& final) const {
+    const std::vector<double>& theta = state_.theta;
+    if (!problem_.can_render(theta)) return {};
+    const double scale = variance_scale(problem_, final), unknowns = parameters_.size();
+    const std::vector<Parameters::Block>& blocks = parameters_.blocks();
+    const std::vector<std::string>& names = parameters_.component_names();
+    const Poll poll = [] {};  // as it ends, a run is not interrupted
+    if (unknowns <= kMostTogether && linearisation_bytes(problem_, unknowns) <= kMostLinearisationBytes) {
+      const RenderedCurvature curvature(problem_, target_, theta, poll);
+      return joint_errors(curvature.all(), curvature.gradient(), scale, blocks, names, theta);
+    }
+    if (problem_.experiment().gradient.method == GradientMethod::finite_difference) return {};
+    const RenderedCurvature curvature(problem_, target_, theta, poll);
+    return eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(), curvature.gradient(), scale,
+                             blocks, names, theta);
   }
 
   void write_expected_counts() const {

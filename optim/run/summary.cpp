@@ -16,6 +16,37 @@ std::string optional_number(double value) {
   return std::isnan(value) ? "null" : std::isinf(value) ? (value > 0 ? ".inf" : "-.inf") : exact(value);
 }
 
+/// A number, or a list of those of many components.
+std::string numbers(const std::vector<double>& values, std::size_t begin, std::size_t count) {
+  std::vector<std::string> list;
+  for (std::size_t i = begin; i < begin + count; ++i) list.push_back(optional_number(values[i]));
+  return count == 1 ? list[0] : fmt::format("[{}]", fmt::join(list, ", "));
+}
+
+/// Errors are in units of the parameters.
+std::string errors_yaml(const Parameters& parameters, const ParameterErrors& errors) {
+  std::string text;
+  auto out = std::back_inserter(text);
+  if (!errors.values.empty()) {
+    fmt::format_to(out, "standard_errors_from: {}\nstandard_errors:\n", errors.from);
+    for (const Parameters::Block& block : parameters.blocks())
+      fmt::format_to(out, "  {}: {}\n", block.name, numbers(errors.values, block.begin, block.count));
+  }
+  if (errors.from.empty()) return text;
+  std::vector<std::string> quoted;  // an index in brackets would be a list
+  for (const std::string& name : errors.undetermined) quoted.push_back(fmt::format("\"{}\"", name));
+  fmt::format_to(out, "undetermined: [{}]\n", fmt::join(quoted, ", "));
+  if (!errors.steps_left.empty()) text += "steps_left:\n";
+  for (const auto& [name, step] : errors.steps_left) fmt::format_to(out, "  \"{}\": {}\n", name, exact(step));
+  if (!errors.combinations.empty()) text += "combinations:\n";
+  for (const Combination& c : errors.combinations) {
+    fmt::format_to(out, "  {}:\n    mean: {}\n    mean_standard_error: {}\n    values: {}\n", c.name,
+                   optional_number(c.mean), optional_number(c.mean_error), numbers(c.values, 0, c.values.size()));
+    if (!c.errors.empty()) fmt::format_to(out, "    standard_errors: {}\n", numbers(c.errors, 0, c.errors.size()));
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string summary_yaml(const LoopResult& result, const Checkpoint& state, const LogRow& last,
@@ -39,16 +70,7 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
                    optional_number(parameters.distance_to_target(parameters.initial(), block)),
                    optional_number(parameters.distance_to_target(state.theta, block)));
   text += bounds_yaml(find_at_bounds(parameters, state.theta));
-  if (!errors.values.empty()) {
-    fmt::format_to(out, "standard_errors_from: {}\nstandard_errors:\n", errors.from);  // in units of the parameter
-    for (const Parameters::Block& block : parameters.blocks()) {
-      std::vector<std::string> numbers;
-      for (int i = block.begin; i < block.begin + block.count; ++i)
-        numbers.push_back(optional_number(errors.values[i]));
-      const std::string list = fmt::format("{}", fmt::join(numbers, ", "));
-      fmt::format_to(out, "  {}: {}\n", block.name, block.count == 1 ? list : "[" + list + "]");
-    }
-  }
+  text += errors_yaml(parameters, errors);
   std::vector<std::string> passes;
   for (const auto& [name, seconds] : cost.passes) passes.push_back(fmt::format("{}: {:.6g}", name, seconds));
   fmt::format_to(

@@ -3,6 +3,7 @@
 #include <utility>
 #include <vector>
 
+#include "optim/problem/standard_errors.h"
 #include "optim/run/log.h"
 #include "optim/run/loop.h"
 
@@ -16,12 +17,6 @@ struct RunCost {
   long long peak_memory = 0;  ///< of the process, bytes
   /// Seconds by what they were for, in the order in which they are written.
   std::vector<std::pair<std::string, double>> passes = {};
-};
-
-/// Standard errors of the unknowns, see standard_errors.h. `values` is empty where they are not known.
-struct ParameterErrors {
-  std::string from;  ///< gauss_newton_matrix, or gauss_newton_diagonal: lower bounds
-  std::vector<double> values;
 };
 
 /// Text of summary.yaml. `last`: the last row, that of the final parameters unless the run was interrupted;

@@ -86,11 +86,6 @@ class Scaled : public Optimizer {
   }
   bool rejected() const override { return inner_->rejected(); }
   bool scatters() const override { return inner_->scatters(); }
-  std::vector<double> curvature_diagonal() const override {
-    std::vector<double> diagonal = inner_->curvature_diagonal();
-    for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] /= scales_[i] * scales_[i];
-    return diagonal;
-  }
   void reset() override { inner_->reset(); }
   OptimizerState state() const override { return inner_->state(); }
   void restore(const OptimizerState& state) override { inner_->restore(state); }

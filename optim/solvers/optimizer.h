@@ -32,8 +32,6 @@ class Optimizer {
   /// Whether each iteration solves the problem of its own random numbers, so that near the optimum the parameters of
   /// iterations scatter about it, and their mean is nearer to it than the last.
   virtual bool scatters() const { return false; }
-  /// An estimate of the diagonal of the Gauss-Newton matrix, where it has one; else empty.
-  virtual std::vector<double> curvature_diagonal() const { return {}; }
   /// Forgets what it learnt, after a step was rejected.
   virtual void reset() = 0;
   virtual OptimizerState state() const = 0;

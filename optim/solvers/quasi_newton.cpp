@@ -54,7 +54,6 @@ class QuasiNewton : public Optimizer {
   }
   bool rejected() const override { return rejected_; }
   bool scatters() const override { return true; }
-  Vector curvature_diagonal() const override { return diagonal_; }
   void reset() override {
     diagonal_.clear();
     probes_ = 0;

@@ -106,15 +106,29 @@ TEST_F(Report, BoundsOfManyUnknownsAreCounted) {
 TEST_F(Report, SummaryHasErrorsAndCost) {
   const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
   state_.theta = {0.6875, 0.375};
+  const ParameterErrors errors{"gauss_newton_matrix",
+                               {0.25, INFINITY},
+                               {"thing"},
+                               {{"wall * thing", {0.5, 0.75}, {0.125, 0.25}, 0.625, 0.0625}},
+                               {{"wall", -0.5}}};
   const std::string summary =
-      summary_yaml({}, state_, last_, parameters, {3, 1.5, 700, 2048, {{"primal", 0.75}, {"visibility", 0.5}}},
-                   {"gauss_newton_diagonal", {0.25, INFINITY}});
-  EXPECT_NE(summary.find("standard_errors_from: gauss_newton_diagonal\nstandard_errors:\n  wall: 0.25\n"
+      summary_yaml({}, state_, last_, parameters, {3, 1.5, 700, 2048, {{"primal", 0.75}, {"visibility", 0.5}}}, errors);
+  EXPECT_NE(summary.find("standard_errors_from: gauss_newton_matrix\nstandard_errors:\n  wall: 0.25\n"
                          "  thing: .inf\n"
+                         "undetermined: [\"thing\"]\n"
+                         "steps_left:\n  \"wall\": -0.5\n"
+                         "combinations:\n  wall * thing:\n    mean: 0.625\n    mean_standard_error: 0.0625\n"
+                         "    values: [0.5, 0.75]\n    standard_errors: [0.125, 0.25]\n"
                          "last_call: {first_iteration: 3, seconds: 1.5, rays: 700, peak_memory_bytes: 2048, "
                          "passes: {primal: 0.75, visibility: 0.5}}\n"),
             std::string::npos)
       << summary;
+  const std::string text = run_report({}, state_, last_, parameters, errors);
+  EXPECT_NE(text.find("  the readings do not determine thing\n"
+                      "  wall * thing is 0.625 +- 0.062 (mean of 2)\n"
+                      "  not at the minimum: a Newton step would move wall by -0.5: more than the standard errors\n"),
+            std::string::npos)
+      << text;
 }
 
 TEST(ReportOfFiles, NamesWhatTheFolderHolds) {

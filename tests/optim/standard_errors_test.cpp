@@ -1,50 +1,256 @@
-// Standard errors of unknowns: against the closed form of a straight line through points with known noise.
-#include "optim/problem/standard_errors.h"
-
+// Standard errors of unknowns against closed forms: a straight line, products and sums of which one part is free, and the inverse
+// of a matrix that is written out against conjugate gradients on its products.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "core/base/random.h"
+#include "optim/problem/eliminated_errors.h"
+#include "optim/problem/joint_errors.h"
+#include "tests/seed.h"
+
 namespace isochron {
 namespace {
 
-/// Least squares of a + b x through N points at x = 0 ... N - 1 with noise s. The loss is the mean of squares, so that its
-/// Gauss-Newton matrix is 2 / N times J'J, and the scale 2 s^2 / N.
+using ::testing::ElementsAre;
+using Rows = std::vector<std::vector<double>>;
+
+/// What all readings with noise `s` say: J'J / s^2, with a scale of 1.
+std::vector<double> information(const Rows& jacobian, double s = 1) {
+  const std::size_t n = jacobian[0].size();
+  std::vector<double> matrix(n * n, 0.0);
+  for (const auto& row : jacobian)
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < n; ++j) matrix[i * n + j] += row[i] * row[j] / (s * s);
+  return matrix;
+}
+
+struct Model {
+  std::vector<Parameters::Block> blocks;
+  std::vector<std::string> names;
+  std::vector<double> theta;
+  void add(const std::string& name, std::vector<double> values) {
+    const int begin = static_cast<int>(theta.size()), count = static_cast<int>(values.size());
+    blocks.push_back({name, begin, count});
+    for (int i = 0; i < count; ++i) names.push_back(count == 1 ? name : name + "[" + std::to_string(i) + "]");
+    theta.insert(theta.end(), values.begin(), values.end());
+  }
+  ParameterErrors errors(const std::vector<double>& data, std::vector<double> prior = {},
+                         std::vector<double> gradient = {}, double scale = 1) const {
+    prior.resize(data.size());
+    gradient.resize(theta.size());
+    return joint_errors({data, data, prior}, gradient, scale, blocks, names, theta);
+  }
+};
+
+/// a + b x at x = 0 ... 19.
 constexpr int kPoints = 20;
 constexpr double kNoise = 0.3;
 
-std::vector<double> matrix() {
-  double one = 0, x = 0, square = 0;
-  for (int i = 0; i < kPoints; ++i) one += 1, x += i, square += 1.0 * i * i;
-  const double f = 2.0 / kPoints;
-  return {f * one, f * x, f * x, f * square};
+Rows line() {
+  Rows jacobian;
+  for (int i = 0; i < kPoints; ++i) jacobian.push_back({1, double{1} * i});
+  return jacobian;
 }
 
-constexpr double kScale = 2 * kNoise * kNoise / kPoints;
+Model line_model() {
+  Model model;
+  model.add("a", {2});
+  model.add("b", {-1});
+  return model;
+}
 
 TEST(StandardErrors, AreThoseOfALeastSquaresLine) {
-  const std::vector<double> errors = standard_errors(matrix(), kScale);
-  ASSERT_EQ(errors.size(), 2u);
+  const ParameterErrors found = line_model().errors(information(line(), kNoise));
   const double n = kPoints, mean = (n - 1) / 2, spread = n * (n * n - 1) / 12;
-  EXPECT_NEAR(errors[0], kNoise * std::sqrt(1 / n + mean * mean / spread), 1e-12);
-  EXPECT_NEAR(errors[1], kNoise / std::sqrt(spread), 1e-12);
+  ASSERT_EQ(found.values.size(), 2u);
+  EXPECT_NEAR(found.values[0], kNoise * std::sqrt(1 / n + mean * mean / spread), 1e-9);
+  EXPECT_NEAR(found.values[1], kNoise / std::sqrt(spread), 1e-9);
+  EXPECT_TRUE(found.undetermined.empty());
+  EXPECT_TRUE(found.combinations.empty());
+  EXPECT_TRUE(line_model().errors(information(line()), {}, {}, std::nan("")).values.empty());
 }
 
-TEST(StandardErrors, OfTheDiagonalAreLess) {
-  const std::vector<double> h = matrix(), both = standard_errors(h, kScale),
-                            least = least_standard_errors({h[0], h[3], 0}, kScale);
-  EXPECT_NEAR(least[0], kNoise / std::sqrt(kPoints), 1e-12);
-  EXPECT_LT(least[0], both[0]);
-  EXPECT_LT(least[1], both[1]);
-  EXPECT_TRUE(std::isinf(least[2]));  // nothing depends on it
+TEST(StandardErrors, SayWhatHasNotComeToRest) {
+  // The loss |a + b x - y|^2 / 2 rises by J'(J d) where all is off by d: a Newton step goes back by d.
+  const std::vector<double> matrix = information(line());
+  const double off = 5;
+  const ParameterErrors found = line_model().errors(matrix, {}, {off * matrix[0], off * matrix[1]});
+  ASSERT_EQ(found.steps_left.size(), 1u);
+  EXPECT_EQ(found.steps_left[0].first, "a");
+  EXPECT_NEAR(found.steps_left[0].second, -off, 1e-6);
 }
 
-TEST(StandardErrors, AreUnknownForNoisyMatricesAndUnknownScales) {
-  EXPECT_TRUE(standard_errors({1, 2, 2, 1}, kScale).empty());  // not positive definite
-  EXPECT_TRUE(standard_errors({0, 0, 0, 1}, kScale).empty());
-  EXPECT_TRUE(standard_errors({}, kScale).empty());
-  EXPECT_TRUE(standard_errors(matrix(), std::nan("")).empty());
-  EXPECT_TRUE(least_standard_errors({1, 2}, std::nan("")).empty());
+/// Readings of gain * paint_j, so many of each j, and one row for a background.
+Rows products(double gain, const std::vector<double>& paint, int each) {
+  Rows jacobian;
+  for (std::size_t j = 0; j < paint.size(); ++j)
+    for (int k = 0; k < each; ++k) {
+      std::vector<double> row(paint.size() + 2, 0.0);
+      row[0] = paint[j];
+      row[1 + j] = gain;
+      jacobian.push_back(row);
+    }
+  jacobian.push_back(std::vector<double>(paint.size() + 2, 0.0));
+  jacobian.back().back() = 1;
+  return jacobian;
+}
+
+TEST(StandardErrors, OfAProductOfWhichOnlyItIsDetermined) {
+  const std::vector<double> paint = {0.2, 0.5, 0.9};
+  const double gain = 40;
+  Model model;
+  model.add("gain", {gain});
+  model.add("paint", paint);
+  model.add("dark", {2});
+  const ParameterErrors found = model.errors(information(products(gain, paint, 4), kNoise));
+  EXPECT_THAT(found.undetermined, ElementsAre("gain", "paint"));
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(std::isinf(found.values[i])) << i;
+  EXPECT_NEAR(found.values[4], kNoise, 1e-9);
+  ASSERT_EQ(found.combinations.size(), 1u);
+  const Combination& product = found.combinations[0];
+  EXPECT_EQ(product.name, "gain * paint");
+  for (std::size_t j = 0; j < paint.size(); ++j) {
+    EXPECT_NEAR(product.values[j], gain * paint[j], 1e-12);
+    EXPECT_NEAR(product.errors[j], kNoise / 2, 1e-9);  // the mean of four readings
+  }
+  EXPECT_NEAR(product.mean_error, kNoise / std::sqrt(12.0), 1e-9);
+}
+
+TEST(StandardErrors, OfAProductKnowNothingFromAPenaltyOnSlopes) {
+  const std::vector<double> paint = {0.2, 0.5, 0.9};
+  Model model;
+  model.add("gain", {40});
+  model.add("paint", paint);
+  model.add("dark", {2});
+  std::vector<double> prior(25, 0.0);  // (paint_0 - paint_1)^2 + (paint_1 - paint_2)^2, times 1000
+  const double w = 1000, rows[3][3] = {{w, -w, 0}, {-w, 2 * w, -w}, {0, -w, w}};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) prior[5 * (i + 1) + j + 1] = rows[i][j];
+  const std::vector<double> data = information(products(40, paint, 4), kNoise);
+  const ParameterErrors without = model.errors(data), with = model.errors(data, prior);
+  EXPECT_THAT(with.undetermined, ElementsAre("gain", "paint"));
+  EXPECT_LT(with.combinations[0].errors[0], without.combinations[0].errors[0]);  // of neighbours it does know
+  EXPECT_NEAR(with.combinations[0].mean_error, without.combinations[0].mean_error, 1e-9);
+}
+
+TEST(StandardErrors, OfTwoSinglesThatScaleAlike) {
+  Model model;
+  model.add("gain", {40});
+  model.add("albedo", {0.5});
+  const ParameterErrors found = model.errors(information({{0.5, 40}}));
+  ASSERT_EQ(found.combinations.size(), 1u);
+  EXPECT_EQ(found.combinations[0].name, "gain * albedo");
+  EXPECT_NEAR(found.combinations[0].mean_error, 1, 1e-9);
+}
+
+/// Readings of z + relief_j, and with `side` of z alone, weighed by that.
+Rows sums(int count, double side) {
+  Rows jacobian;
+  for (int j = 0; j < count; ++j) {
+    jacobian.emplace_back(count + 1, 0.0);
+    jacobian.back()[0] = jacobian.back()[1 + j] = 1;
+  }
+  jacobian.emplace_back(count + 1, 0.0);
+  jacobian.back()[0] = side;
+  return jacobian;
+}
+
+TEST(StandardErrors, OfAPositionAndARelief) {
+  Model model;
+  model.add("z", {0.1});
+  model.add("relief", {0.01, 0.012, 0.008, 0.011});
+  const ParameterErrors none = model.errors(information(sums(4, 0)));
+  EXPECT_THAT(none.undetermined, ElementsAre("z", "relief"));
+  ASSERT_EQ(none.combinations.size(), 1u);
+  EXPECT_EQ(none.combinations[0].name, "z + relief");
+  EXPECT_NEAR(none.combinations[0].values[2], 0.108, 1e-12);
+  EXPECT_NEAR(none.combinations[0].mean_error, 0.5, 1e-9);
+
+  const ParameterErrors hardly = model.errors(information(sums(4, 0.01)));  // each alone is known, to 100
+  EXPECT_TRUE(hardly.undetermined.empty());
+  EXPECT_NEAR(hardly.values[0], 100, 1e-4);
+  ASSERT_EQ(hardly.combinations.size(), 1u);
+  EXPECT_NEAR(hardly.combinations[0].mean_error, 0.5, 1e-6);
+}
+
+TEST(StandardErrors, OfWhatNoReadingSeesOrNoiseHides) {
+  Model model;
+  model.add("a", {1});
+  model.add("unseen", {1});
+  model.add("pair", {1, 2});
+  std::vector<double> data(16, 0.0), bound;
+  data[0] = 4;
+  data[10] = data[15] = 1;
+  data[11] = data[14] = 1.02;  // noise has made one of its eigenvalues -0.02
+  bound = data;
+  bound[11] = bound[14] = 0.98;
+  const ParameterErrors found = joint_errors({data, bound, std::vector<double>(16)}, std::vector<double>(4), 1,
+                                             model.blocks, model.names, model.theta);
+  EXPECT_THAT(found.undetermined, ElementsAre("unseen", "pair"));
+  EXPECT_NEAR(found.values[0], 0.5, 1e-9);
+  EXPECT_TRUE(std::isinf(found.values[1]));
+}
+
+/// A random Jacobian: two single unknowns, each of which acts like the sum of some of many others, but for a part.
+class Synthetic : public CurvatureProducts {
+ public:
+  Synthetic(int many, double part) {
+    model.add("first", {1});
+    model.add("second", {2});
+    model.add("many", std::vector<double>(static_cast<std::size_t>(many), 0.5));
+    Rng rng({test_seed(71), 0, 0}, 0, 0);
+    Rows jacobian;
+    for (int k = 0; k < 4 * many; ++k) {
+      std::vector<double> row(model.theta.size());
+      for (std::size_t i = 2; i < row.size(); ++i) row[i] = rng.uniform() < 0.1 ? rng.uniform() : 0;
+      for (std::size_t i = 2; i < row.size(); ++i) row[i % 2] += row[i] / many;
+      for (const int i : {0, 1}) row[i] += part * (rng.uniform() - 0.5);
+      jacobian.push_back(row);
+    }
+    matrix = information(jacobian);
+  }
+  std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override {
+    std::vector<std::vector<double>> result;
+    for (const auto& v : vectors) {
+      result.emplace_back(v.size(), 0.0);
+      for (std::size_t i = 0; i < v.size(); ++i)
+        for (std::size_t j = 0; j < v.size(); ++j) result.back()[i] += matrix[i * v.size() + j] * v[j];
+    }
+    return result;
+  }
+  Curvatures within(const std::vector<std::vector<double>>& columns) const override {
+    Curvatures result;
+    for (const auto& product : products(columns))
+      for (const auto& c : columns) {
+        result.data.push_back(0);
+        for (std::size_t i = 0; i < c.size(); ++i) result.data.back() += product[i] * c[i];
+      }
+    result.bound = result.data;
+    result.prior.assign(result.data.size(), 0.0);
+    return result;
+  }
+  Model model;
+  std::vector<double> matrix;
+};
+
+TEST(StandardErrors, ByEliminationAreThoseOfTheInverse) {
+  const Synthetic synthetic(80, 0.02);
+  const Model& model = synthetic.model;
+  const std::size_t n = model.theta.size();
+  std::vector<double> diagonal(n);
+  for (std::size_t i = 0; i < n; ++i) diagonal[i] = synthetic.matrix[i * n + i];
+  const std::vector<double> nothing(n, 0.0);
+  const ParameterErrors whole = model.errors(synthetic.matrix),
+                        eliminated = eliminated_errors(synthetic, diagonal, nothing, nothing, 1, model.blocks,
+                                                       model.names, model.theta);
+  for (const int i : {0, 1}) {
+    EXPECT_GT(whole.values[i], 3 / std::sqrt(diagonal[i])) << "nothing to eliminate";
+    EXPECT_LT(eliminated.values[i], 1.0001 * whole.values[i]);
+    EXPECT_GT(eliminated.values[i], 0.95 * whole.values[i]);
+  }
+  EXPECT_NEAR(eliminated.values[5], 1 / std::sqrt(diagonal[5]), 1e-9);
 }
 
 }  // namespace

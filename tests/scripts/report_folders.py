@@ -119,8 +119,9 @@ def write_capture_run(folder, bins=40, columns=6, rows=5):
         "  - {name: z, type: translation, shape: board, direction: [0, 0, 1], initial: 0, target: 0.02}\n"
         "  - {name: paint, type: albedo, per: vertex, shape: board, initial: 0.5}\n")
     (folder / "summary.yaml").write_text(
-        "status: iterations_reached\niterations: 2\nstandard_errors_from: gauss_newton_diagonal\nstandard_errors:\n"
-        "  z: 0.0005\n  paint: [0.1, 0.1, 0.2, .inf]\nparameters:\n  z: 0.019\n  paint: [0.2, 0.4, 0.6, 0.8]\n")
+        "status: iterations_reached\niterations: 2\nstandard_errors_from: gauss_newton_products\nstandard_errors:\n"
+        "  z: 0.0005\n  paint: [0.1, 0.1, 0.2, .inf]\nundetermined: [paint]\nsteps_left:\n  z: 0.25\ncombinations:\n"
+        "  gain * paint:\n    mean: 12.5\n    mean_standard_error: 0.75\nparameters:\n  z: 0.019\n  paint: [0.2, 0.4, 0.6, 0.8]\n")
     points = np.zeros((columns, rows, 3))
     points[..., 0] = np.linspace(-0.3, 0.3, columns)[:, np.newaxis]
     points[..., 1] = np.linspace(0.3, -0.3, rows)

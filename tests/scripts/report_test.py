@@ -198,7 +198,8 @@ class ReportTest(unittest.TestCase):
             self.page()
         for before, after in (("iterations: 20", "iterations: many"), ("last_call: {", "last_call: 1 #"),
                               ("height: 0.01", "height: high"),
-                              ("loss_final: 0.01", "loss_final: [1]"), ("parameters:", "standard_errors: 3\nparameters:")):
+                              ("loss_final: 0.01", "loss_final: [1]"), ("parameters:", "standard_errors: 3\nparameters:"),
+                              ("parameters:", "combinations: {a: {mean: [x]}, b: 3}\nsteps_left: {c: }\nparameters:")):
             self.edit("summary.yaml", before, after)
             self.page()
         self.edit("inputs/scene/scene.yaml", "position: [0, 1, 4]", "position: here")
@@ -236,8 +237,8 @@ class ReportTest(unittest.TestCase):
     def test_capture(self):
         write_capture_run(self.folder)
         page = self.page()
-        for words in ("lower bound of the standard error", "Slice over time: row 2", "Histograms", "drawn from it",
-                      "± 0.0005"):
+        for words in ("it is a lower bound", "Slice over time: row 2", "Histograms", "drawn from it",
+                      "± 0.0005", "undetermined", "gain * paint", "± 0.75", "a Newton step would move z by 0.25"):
             self.assertIn(words, page.words)
         self.assertEqual(self.viewers()[0]["steps"], ["iteration 0", "iteration 1", "final, after iteration 2"])
         self.assertIn("Seen from the wall", page.words)

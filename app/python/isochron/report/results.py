@@ -12,12 +12,12 @@ TAIL = (5, 100)  # rows over which the scatter is taken: a quarter of all, withi
 
 MEANING = {
     "gauss_newton_matrix":
-        "± in the table: standard error by the loss's Gauss–Newton matrix at the end (for counts: by photon noise), all "
-        "parameters unknown together.",
-    "gauss_newton_diagonal":
-        "± in the table: a lower bound of the standard error (for counts: by photon noise), as if all other parameters were "
-        "known, from the diagonal of the loss's Gauss–Newton matrix. What acts alike, as a relief and a tilt, can be off by "
-        "far more.",
+        "± in the table: standard error by the loss's Gauss–Newton matrix at the end, smoothing included (for counts: by photon "
+        "noise), all parameters unknown together.",
+    "gauss_newton_products":
+        "± in the table: standard error by the loss's Gauss–Newton matrix at the end, smoothing included (for counts: by photon "
+        "noise). Of parameters of up to three numbers all others are unknown, too; of longer ones it is a lower bound, as if "
+        "all else were known.",
     "scatter":
         "± in the table: scatter of the parameter over the last quarter of the iterations (5 to 100 rows), that is by how "
         "much the optimiser's noise, and what drift there is, moves it; how far it is from the truth it does not say.",
@@ -29,7 +29,7 @@ class Uncertainty:
 
     def __init__(self, run, parameter):
         self.values, self.kind = None, None
-        if parameter.errors is not None and np.isfinite(parameter.errors).any():
+        if parameter.errors is not None and not np.isnan(parameter.errors).all():
             self.values, self.kind = parameter.errors, run.errors_from
             return
         rows = len(run.log.get("iteration", ()))
@@ -52,6 +52,16 @@ def root_mean_square(values):
     return None if values is None else float(np.sqrt(np.mean(np.square(values))))
 
 
+def plus_minus(error, digits=4):
+    return "undetermined" if np.isposinf(error) else f"± {number(error, digits)}" if np.isfinite(error) else "–"
+
+
+def typical_error(errors):
+    """Root mean square of those that are determined."""
+    finite = errors[np.isfinite(errors)]
+    return root_mean_square(finite) if finite.size else np.inf
+
+
 def rows_of(run, parameter, uncertainty):
     unit = unit_of(run, parameter)
     initial, found, target, errors = parameter.initial, parameter.found, parameter.target, uncertainty.values
@@ -59,7 +69,7 @@ def rows_of(run, parameter, uncertainty):
     if parameter.count > MOST_ROWS:
         yield [f"{parameter.name}, RMS of {parameter.count}", parameter.subject, unit,
                *(number(root_mean_square(v), 5) for v in (initial, found, target)), number(root_mean_square(off)),
-               f"± {number(root_mean_square(errors[np.isfinite(errors)]))}" if errors is not None else "–"]
+               plus_minus(typical_error(errors)) if errors is not None else "–"]
         if off is not None and np.isfinite(off).any():
             for i in np.argsort(-np.nan_to_num(np.abs(off)), kind="stable")[:MOST_WORST]:
                 yield one_row(parameter, unit, int(i), errors, "furthest off: ")
@@ -76,7 +86,7 @@ def one_row(parameter, unit, i, errors, prefix=""):
     off = found - target if found is not None and target is not None else None
     return [prefix + parameter.component(i), "" if prefix else parameter.subject, unit, number(at(parameter.initial), 5),
             number(found, 5), number(target, 5), number(off),
-            f"± {number(errors[i], 3)}" if errors is not None and np.isfinite(errors[i]) else "–"]
+            plus_minus(errors[i], 3) if errors is not None else "–"]
 
 
 def parameters_section(run):
@@ -92,6 +102,7 @@ def parameters_section(run):
     if unknown:
         notes.append(element("p", f"± of {', '.join(unknown)} is not known: this solver gives none, and log.csv has no "
                              "scatter of its numbers (too few rows, or their norm alone).", class_="note"))
+    notes += joint_notes(run)
     if any(p.count > MOST_ROWS and p.found is not None for p in run.parameters):
         notes.append(spread(run))
     charts = [parameter_chart(run, p, uncertainties[p.name], i) for i, p in enumerate(run.parameters[:MOST_CHARTS])]
@@ -100,6 +111,17 @@ def parameters_section(run):
         notes.append(element("p", f"Curves of the first {MOST_CHARTS} of {len(run.parameters)} parameters.", class_="note"))
     return section("parameters", "Parameters", table(head, rows, "Values of the parameters", "numbers"), *notes,
                    grid([c for c in charts if c]))
+
+
+def joint_notes(run):
+    """What the readings determine together only, and what a Newton step would still move."""
+    rows = [[name, number(mean, 5), plus_minus(error)] for name, mean, error in run.combinations]
+    if rows:
+        yield table(["determined together", "mean", "±"], rows, "What is determined together", "numbers")
+    if run.steps_left:
+        yield element("p", "Not at the minimum: a Newton step would move " +
+                      ", ".join(f"{name} by {number(step, 3)}" for name, step in run.steps_left) +
+                      ", which is more than the standard errors.", class_="note")
 
 
 def spread(run):

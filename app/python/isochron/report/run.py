@@ -142,7 +142,22 @@ class Run:
         errors = self.summary.get("standard_errors") if self.ended else None
         errors = errors if isinstance(errors, dict) else {}
         self.errors_from = self.summary.get("standard_errors_from") if errors else None
+        self._read_joint_errors()
         self.parameters = [Parameter(s, found.get(str(s.get("name"))), errors.get(str(s.get("name")))) for s in specs]
+
+    def _read_joint_errors(self):
+        """(name, mean, standard error) of combinations and (name, step) of what is not at the minimum."""
+        def entries(key):
+            found = self.summary.get(key) if self.ended else None
+            return found.items() if isinstance(found, dict) else ()
+
+        def first(value):
+            values = as_numbers(value)
+            return float(values[0]) if values is not None and len(values) else np.nan
+
+        self.combinations = [(str(name), first(c.get("mean")), first(c.get("mean_standard_error")))
+                             for name, c in entries("combinations") if isinstance(c, dict)]
+        self.steps_left = [(str(name), first(step)) for name, step in entries("steps_left")]
 
     def _read_images(self):
         self.images = {}

@@ -1,0 +1,34 @@
+// Derivative images of an experiment, of all its terms together.
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "optim/problem/gauss_newton.h"
+#include "optim/problem/problem.h"
+
+namespace isochron {
+
+/// Values of a pixel, gate and channel in an experiment's images.
+double residual_count(const Problem& problem);
+
+/// What linearise() and errors of so many columns take, in bytes: two halves of a Jacobian and square matrices.
+double linearisation_bytes(const Problem& problem, double columns);
+
+/// The Jacobian at theta along the columns of `basis`, from the random numbers of one iteration: each term's samples are cut into
+/// two halves, an odd number rounded up. It is rendered for a group of columns at a time, each time from the same random numbers.
+/// With finite differences as gradient.method, `basis` is not looked at: the columns are those of all unknowns.
+JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>& theta, const TangentBasis& basis,
+                               std::uint32_t iteration, const Poll& poll);
+
+/// Half `half` (0 or 1) of so many samples, as above.
+SampleRange half_of(int samples, int half);
+
+/// An estimate of the diagonal of J'WJ: see Objective::probe_curvature(), without a penalty's part.
+std::vector<double> probe_diagonal(const Problem& problem, const std::vector<double>& theta,
+                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
+                                   const Poll& poll);
+
+/// A basis whose columns are combinations of those of another.
+TangentBasis combinations_of(const TangentBasis& basis, const std::vector<std::vector<double>>& coefficients);
+
+}  // namespace isochron

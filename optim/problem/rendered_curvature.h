@@ -1,0 +1,45 @@
+// The Gauss-Newton matrix of an experiment's readings at one point, whole or by its products.
+#pragma once
+#include <vector>
+
+#include "optim/problem/eliminated_errors.h"
+#include "optim/problem/problem.h"
+
+namespace isochron {
+
+/// From random numbers that no iteration of a run has. Weights of the readings are those of an image of its own.
+class RenderedCurvature : public CurvatureProducts {
+ public:
+  /// All must outlive this; theta is one that can be rendered.
+  RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
+                    const Poll& poll);
+
+  /// Over all unknowns.
+  Curvatures all() const;
+  /// Over the combinations of unknowns that `columns` hold, from other random numbers than the products. Not for finite
+  /// differences.
+  Curvatures within(const std::vector<std::vector<double>>& columns) const override;
+  /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient for each vector and
+  /// one more. Not for finite differences.
+  std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
+  /// Of the loss, penalty included, but for unknowns that a bound keeps from following it.
+  const std::vector<double>& gradient() const { return gradient_; }
+  /// Diagonals of H + P, estimated and on average too large by the noise of the Jacobian (see Objective::probe_curvature), and of
+  /// P.
+  std::vector<double> diagonal() const;
+  std::vector<double> prior_diagonal() const;
+
+ private:
+  Curvatures readings(const TangentBasis& basis, std::uint32_t iteration) const;
+  std::vector<double> prior_product(const std::vector<double>& vector) const;
+
+  const Problem& problem_;
+  const std::vector<double>& theta_;
+  const Poll& poll_;
+  double penalty_scale_;
+  Scene scene_;
+  TangentBasis basis_;
+  std::vector<double> gradient_, weights_;
+};
+
+}  // namespace isochron
