@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """How often the errors that runs state cover the truth.
 
-    scripts/error_coverage.py measure CSV [DRAWS]   40 draws: some ten minutes of processor time
+    scripts/error_coverage.py measure CSV [DRAWS]   40 draws: a quarter of an hour of processor time
     scripts/error_coverage.py table CSV             a table in Markdown
 
 Small captures of a board around the corner, from photon counts: `letter` has a relief and smoothing, as experiments/letter.yaml,
@@ -20,13 +20,14 @@ from reproduction.measure import program
 from reproduction.tables import read_rows, run_action, write_rows
 from scenes import letter, mesh
 
+CASES = ("letter", "plate", "spot")
 SIDE = 5  # vertices
 EDGE = 0.5
 DISTANCE = 0.5
 NORMAL = 1.959964  # of the middle 95 % of a standard normal
 COLUMNS = ("case", "draw", "quantity", "found", "truth", "standard_error", "z")
 GATES = {"kind": "bins", "unit": "ps", "scene_unit_m": 1, "start": 2880, "width": 24, "count": 72, "response": "response.csv"}
-SAMPLES = 256
+SAMPLES = 512
 PENALTY = {"relief": 0.006, "paint": 7.0e-7}
 
 
@@ -40,7 +41,7 @@ def board():
 
 
 def scene(laser):
-    return {"capture": {"sensor": {"corner": [-0.35, 0.35, 0], "across": [0.7, 0, 0], "down": [0, -0.7, 0], "size": [16, 16]},
+    return {"capture": {"sensor": {"corner": [-0.35, 0.35, 0], "across": [0.7, 0, 0], "down": [0, -0.7, 0], "size": [12, 12]},
                         "normal": [0, 0, 1], "laser": laser},
             "materials": {"paint": {"type": "diffuse", "albedo": 0.5}},
             "shapes": [{"name": "board", "file": "board.obj", "material": "paint",
@@ -81,7 +82,7 @@ def write(directory, case):
                   "target": {"samples": 4096, "noise": {"counts": True}},
                   "samples": {"primal": SAMPLES, "interior": SAMPLES, "visibility": 0, "path_length": 0},
                   "loss": {"kind": "poisson"},
-                  "optimizer": {"method": "levenberg_marquardt", "iterations": 10},
+                  "optimizer": {"method": "levenberg_marquardt", "iterations": 9},
                   "output": {"geometry": "none", "frames": 0, "histogram_samples": 1}}
     (directory / "experiment.yaml").write_text(yaml.safe_dump(experiment), encoding="ascii")
     return {p["name"]: p["target"] for p in unknowns}
@@ -103,12 +104,12 @@ def quantities(summary, truth):
             yield f"{name} at the middle", entry["values"][middle], float(true[middle]), entry["standard_errors"][middle]
 
 
-def measure(file, draws=40):
+def measure(file, draws=40, cases=CASES, first=1):
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
         directory = pathlib.Path(temporary)
-        for draw in range(1, int(draws) + 1):
-            for case in ("letter", "plate", "spot"):
+        for draw in range(first, first + int(draws)):
+            for case in cases:
                 truth = write(directory, case)
                 program("run", directory / "experiment.yaml", "-o", directory / "run", "--force", "--seed", draw, "--set",
                         f"target.seed={100 + draw}")

@@ -90,9 +90,10 @@ std::vector<Vector> solve(const CurvatureProducts& curvature, const std::vector<
 }  // namespace
 
 ParameterErrors eliminated_errors(const CurvatureProducts& curvature, const std::vector<double>& diagonal,
-                                  const std::vector<double>& smoothed, const std::vector<double>& gradient,
-                                  double scale, const std::vector<Parameters::Block>& blocks,
-                                  const std::vector<std::string>& names, const std::vector<double>& theta) {
+                                  const std::vector<double>& smoothed,
+                                  const std::vector<std::vector<double>>& gradients, const NoiseLevel& noise,
+                                  const std::vector<Parameters::Block>& blocks, const std::vector<std::string>& names,
+                                  const std::vector<double>& theta) {
   const std::size_t n = theta.size();
   const std::vector<ParameterChange> changes = parameter_changes(blocks, theta);
   std::vector<Vector> columns;
@@ -102,7 +103,7 @@ ParameterErrors eliminated_errors(const CurvatureProducts& curvature, const std:
   for (std::size_t i = 0; i < n; ++i) {
     unseen[i] = !(diagonal[i] - smoothed[i] > kRoundOff * diagonal[i]);
     kept[i] = smoothed[i] > 0;
-    least[i] = std::sqrt(scale / diagonal[i]);
+    least[i] = std::sqrt(noise.scale / diagonal[i]);
   }
   for (const Parameters::Block& block : blocks)
     std::fill_n(asked.begin() + block.begin, block.count, block.count <= kFewComponents);
@@ -119,12 +120,12 @@ ParameterErrors eliminated_errors(const CurvatureProducts& curvature, const std:
     for (std::size_t k = 0; k < weights.size(); ++k) {
       const std::size_t entry = k * weights.size() + k;
       const double curved = within.data[entry] + within.prior[entry], along = dot(weights[k], solutions[k]);
-      result.push_back({curved > 0 ? along * along / curved : std::numeric_limits<double>::infinity(),
-                        -dot(gradient, solutions[k])});
+      result.push_back({curved > 0 ? along * along / curved : std::numeric_limits<double>::infinity(), {}});
+      for (const Vector& gradient : gradients) result.back().steps.push_back(-dot(gradient, solutions[k]));
     }
     return result;
   };
-  ParameterErrors errors = determined.errors(scale, asked, least, spreads);
+  ParameterErrors errors = determined.errors(noise, asked, least, spreads);
   errors.from = "gauss_newton_products";
   return errors;
 }

@@ -23,8 +23,9 @@ class CurvatureProducts {
 /// `diagonal`: of H + P, `smoothed`: of P. Asked for are parameters of few components; fields have the errors of the diagonal, as
 /// if all else were known.
 ParameterErrors eliminated_errors(const CurvatureProducts& curvature, const std::vector<double>& diagonal,
-                                  const std::vector<double>& smoothed, const std::vector<double>& gradient,
-                                  double scale, const std::vector<Parameters::Block>& blocks,
-                                  const std::vector<std::string>& names, const std::vector<double>& theta);
+                                  const std::vector<double>& smoothed,
+                                  const std::vector<std::vector<double>>& gradients, const NoiseLevel& noise,
+                                  const std::vector<Parameters::Block>& blocks, const std::vector<std::string>& names,
+                                  const std::vector<double>& theta);
 
 }  // namespace isochron

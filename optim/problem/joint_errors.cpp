@@ -13,7 +13,8 @@ using Vector = Eigen::Map<const Eigen::VectorXd>;
 /// The inverse of H + P over the unknowns that are not fixed.
 class Inverse {
  public:
-  Inverse(const Curvatures& curvatures, const std::vector<double>& gradient, const std::vector<bool>& fixed) {
+  Inverse(const Curvatures& curvatures, const std::vector<std::vector<double>>& gradients,
+          const std::vector<bool>& fixed) {
     for (std::size_t i = 0; i < fixed.size(); ++i)
       if (!fixed[i]) free_.push_back(static_cast<int>(i));
     if (free_.empty()) return;
@@ -29,7 +30,10 @@ class Inverse {
     const double least = std::max(-values_[0], kRoundOff * values_[values_.size() - 1]);
     hidden_ = (values_.array() <= least).count();
     values_ = values_.cwiseMax(least);
-    gradient_ = parts(Vector(gradient.data(), n));
+    for (const std::vector<double>& gradient : gradients) {
+      gradients_.push_back(parts(Vector(gradient.data(), n)));
+      gradients_.back().head(hidden_).setZero();
+    }
   }
 
   std::vector<Spread> spreads(const std::vector<std::vector<double>>& weights) const {
@@ -37,9 +41,10 @@ class Inverse {
     if (free_.empty()) return result;
     for (std::size_t k = 0; k < weights.size(); ++k) {
       const Eigen::VectorXd along = parts(Vector(weights[k].data(), static_cast<Eigen::Index>(weights[k].size())));
-      const Eigen::ArrayXd variances = along.array().square() / values_.array(),
-                           steps = along.array() * gradient_.array() / values_.array();
-      result[k] = {variances.sum(), -steps.tail(steps.size() - hidden_).sum()};
+      const Eigen::ArrayXd variances = along.array().square() / values_.array();
+      result[k].variance = variances.sum();
+      for (const Eigen::VectorXd& gradient : gradients_)
+        result[k].steps.push_back(-(along.array() * gradient.array() / values_.array()).sum());
       if (2 * variances.head(hidden_).sum() > result[k].variance)
         result[k].variance = std::numeric_limits<double>::infinity();
     }
@@ -53,16 +58,17 @@ class Inverse {
   }
 
   std::vector<int> free_;
-  Eigen::VectorXd inverse_width_, values_, gradient_;
+  Eigen::VectorXd inverse_width_, values_;
+  std::vector<Eigen::VectorXd> gradients_;  ///< without what noise hides
   Eigen::MatrixXd vectors_;
   Eigen::Index hidden_ = 0;  ///< eigenvalues that cannot be told from zero
 };
 
 }  // namespace
 
-ParameterErrors joint_errors(const Curvatures& curvatures, const std::vector<double>& gradient, double scale,
-                             const std::vector<Parameters::Block>& blocks, const std::vector<std::string>& names,
-                             const std::vector<double>& theta) {
+ParameterErrors joint_errors(const Curvatures& curvatures, const std::vector<std::vector<double>>& gradients,
+                             const NoiseLevel& noise, const std::vector<Parameters::Block>& blocks,
+                             const std::vector<std::string>& names, const std::vector<double>& theta) {
   const auto n = theta.size();
   const Matrix bound(curvatures.bound.data(), static_cast<Eigen::Index>(n), static_cast<Eigen::Index>(n));
   const std::vector<ParameterChange> changes = parameter_changes(blocks, theta);
@@ -77,8 +83,8 @@ ParameterErrors joint_errors(const Curvatures& curvatures, const std::vector<dou
     smoothed[i] = curvatures.prior[i * n + i] > 0;
   }
   const Determined determined(blocks, names, theta, matrix, changes, unseen, smoothed);
-  const Inverse inverse(curvatures, gradient, determined.fixed());
-  ParameterErrors errors = determined.errors(scale, std::vector<bool>(n, true), {},
+  const Inverse inverse(curvatures, gradients, determined.fixed());
+  ParameterErrors errors = determined.errors(noise, std::vector<bool>(n, true), {},
                                              [&](const auto& weights) { return inverse.spreads(weights); });
   errors.from = "gauss_newton_matrix";
   return errors;

@@ -11,6 +11,9 @@ namespace {
 /// Random numbers of what is asked at a run's end: no run has so many iterations.
 constexpr std::uint32_t kProductsIteration = kMostIterations + 2u, kMatrixIteration = kMostIterations + 3u;
 
+/// Their scatter is known to a factor of about 1 +- 1 / sqrt(10).
+constexpr int kGradients = 6;
+
 /// Of the diagonal, which preconditions: each knows an entry to a factor of about 1 +- sqrt(2 / 12).
 constexpr int kProbes = 12;
 
@@ -21,17 +24,20 @@ RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& t
     : problem_(problem),
       theta_(theta),
       poll_(poll),
-      penalty_scale_(problem.penalty_scale(target)),
+      smoothing_{problem.penalty_scale(target).slopes, 0},
+      priors_{0, problem.penalty_scale(target).priors},
       scene_(problem.parameters().apply(theta)),
       basis_(problem.parameters().tangent(theta)) {
-  Evaluation at = problem.evaluate(theta, target, kMatrixIteration, poll);
-  weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
-  gradient_ = std::move(at.gradient);
   const Parameters& parameters = problem.parameters();
-  for (std::size_t i = 0; i < theta.size(); ++i)
-    if ((theta[i] <= parameters.lower()[i] && gradient_[i] > 0) ||
-        (theta[i] >= parameters.upper()[i] && gradient_[i] < 0))
-      gradient_[i] = 0;
+  for (int k = 0; k < kGradients; ++k) {
+    Evaluation at = problem.evaluate(theta, target, kMatrixIteration + k, poll);
+    if (k == 0) weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
+    for (std::size_t i = 0; i < theta.size(); ++i)
+      if ((theta[i] <= parameters.lower()[i] && at.gradient[i] > 0) ||
+          (theta[i] >= parameters.upper()[i] && at.gradient[i] < 0))
+        at.gradient[i] = 0;
+    gradients_.push_back(std::move(at.gradient));
+  }
 }
 
 std::vector<double> RenderedCurvature::diagonal() const {
@@ -40,13 +46,13 @@ std::vector<double> RenderedCurvature::diagonal() const {
     const std::vector<double> found = probe_diagonal(problem_, theta_, weights_, kProductsIteration, probe, poll_);
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbes;
   }
-  problem_.penalty().add_diagonal(penalty_scale_, mean);
+  for (const PenaltyScale& scale : {smoothing_, priors_}) problem_.penalty().add_diagonal(scale, mean);
   return mean;
 }
 
 std::vector<double> RenderedCurvature::prior_diagonal() const {
   std::vector<double> diagonal(theta_.size(), 0.0);
-  problem_.penalty().add_diagonal(penalty_scale_, diagonal);
+  problem_.penalty().add_diagonal(smoothing_, diagonal);
   return diagonal;
 }
 
@@ -60,22 +66,33 @@ Curvatures RenderedCurvature::readings(const TangentBasis& basis, std::uint32_t 
 Curvatures RenderedCurvature::all() const {
   Curvatures result = readings(basis_, kMatrixIteration);
   result.prior.resize(result.data.size());
-  problem_.penalty().add_curvature(static_cast<int>(theta_.size()), penalty_scale_, result.prior);
+  const int unknowns = static_cast<int>(theta_.size());
+  problem_.penalty().add_curvature(unknowns, smoothing_, result.prior);
+  for (std::vector<double>* matrix : {&result.data, &result.bound})
+    problem_.penalty().add_curvature(unknowns, priors_, *matrix);
   return result;
 }
 
 Curvatures RenderedCurvature::within(const std::vector<std::vector<double>>& columns) const {
   Curvatures result = readings(combinations_of(basis_, columns), kMatrixIteration);
+  std::size_t entry = 0;
   for (const std::vector<double>& a : columns) {
-    const std::vector<double> product = prior_product(a);
-    for (const std::vector<double>& b : columns) result.prior.push_back(dot(product, b));
+    const std::vector<double> smoothing = penalty_product(smoothing_, a), priors = penalty_product(priors_, a);
+    for (const std::vector<double>& b : columns) {
+      result.prior.push_back(dot(smoothing, b));
+      for (std::vector<double>* matrix : {&result.data, &result.bound}) (*matrix)[entry] += dot(priors, b);
+      ++entry;
+    }
   }
   return result;
 }
 
-std::vector<double> RenderedCurvature::prior_product(const std::vector<double>& vector) const {
-  std::vector<double> product(vector.size(), 0.0);
-  problem_.penalty().add_gradient(vector, penalty_scale_, product);  // it is linear
+std::vector<double> RenderedCurvature::penalty_product(PenaltyScale scale, const std::vector<double>& vector) const {
+  std::vector<double> product(vector.size(), 0.0), nothing = product,
+                                                   constant = product;  // the gradient is linear but for a constant
+  problem_.penalty().add_gradient(vector, scale, product);
+  problem_.penalty().add_gradient(nothing, scale, constant);
+  for (std::size_t i = 0; i < product.size(); ++i) product[i] -= constant[i];
   return product;
 }
 
@@ -99,8 +116,10 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
       poll_();
     }
     products.push_back(basis_.transpose_apply(dof_gradient));
-    const std::vector<double> prior = prior_product(vectors[v]);
-    for (std::size_t i = 0; i < prior.size(); ++i) products.back()[i] += prior[i];
+    for (const PenaltyScale& scale : {smoothing_, priors_}) {
+      const std::vector<double> penalty = penalty_product(scale, vectors[v]);
+      for (std::size_t i = 0; i < penalty.size(); ++i) products.back()[i] += penalty[i];
+    }
   }
   return products;
 }

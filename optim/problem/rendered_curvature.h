@@ -22,24 +22,26 @@ class RenderedCurvature : public CurvatureProducts {
   /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient for each vector and
   /// one more. Not for finite differences.
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
-  /// Of the loss, penalty included, but for unknowns that a bound keeps from following it.
-  const std::vector<double>& gradient() const { return gradient_; }
+  /// Some of the loss, penalty included, each from random numbers of its own; 0 for unknowns that a bound keeps from following
+  /// it.
+  const std::vector<std::vector<double>>& gradients() const { return gradients_; }
   /// Diagonals of H + P, estimated and on average too large by the noise of the Jacobian (see Objective::probe_curvature), and of
-  /// P.
+  /// P, that of smoothing.
   std::vector<double> diagonal() const;
   std::vector<double> prior_diagonal() const;
 
  private:
   Curvatures readings(const TangentBasis& basis, std::uint32_t iteration) const;
-  std::vector<double> prior_product(const std::vector<double>& vector) const;
+  std::vector<double> penalty_product(PenaltyScale scale, const std::vector<double>& vector) const;
 
   const Problem& problem_;
   const std::vector<double>& theta_;
   const Poll& poll_;
-  double penalty_scale_;
+  PenaltyScale smoothing_, priors_;  ///< of either part of the penalty alone
   Scene scene_;
   TangentBasis basis_;
-  std::vector<double> gradient_, weights_;
+  std::vector<std::vector<double>> gradients_;
+  std::vector<double> weights_;
 };
 
 }  // namespace isochron

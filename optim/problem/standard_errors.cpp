@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "optim/problem/vector_math.h"
+
 namespace isochron {
 namespace {
 
@@ -65,6 +67,13 @@ double variance_scale(const Problem& problem, const Evaluation& at) {
   return at.mean_squared_error > 0 ? 2 * at.mean_squared_error / readings : std::numeric_limits<double>::quiet_NaN();
 }
 
+StepMoments moments(const std::vector<double>& steps) {
+  const double count = static_cast<double>(steps.size()), middle = steps.empty() ? 0 : mean(steps);
+  double squares = 0;
+  for (const double step : steps) squares += (step - middle) * (step - middle);
+  return {middle, count > 1 ? squares / (count - 1) : 0};
+}
+
 Determined::Determined(const std::vector<Parameters::Block>& blocks, const std::vector<std::string>& names,
                        const std::vector<double>& theta, const std::vector<double>& matrix,
                        const std::vector<ParameterChange>& changes, std::vector<bool> unseen,
@@ -87,8 +96,8 @@ Determined::Determined(const std::vector<Parameters::Block>& blocks, const std::
     }
 }
 
-ParameterErrors Determined::errors(double scale, const std::vector<bool>& asked, const std::vector<double>& least,
-                                   const Spreads& spreads) const {
+ParameterErrors Determined::errors(const NoiseLevel& noise, const std::vector<bool>& asked,
+                                   const std::vector<double>& least, const Spreads& spreads) const {
   std::vector<std::vector<double>> weights;
   for (std::size_t i = 0; i < theta_.size(); ++i) {
     if (!asked[i] || fixed_[i]) continue;
@@ -108,7 +117,10 @@ ParameterErrors Determined::errors(double scale, const std::vector<bool>& asked,
 
   const std::vector<Spread> found = spreads(weights);
   auto next = found.begin();
-  const auto next_error = [&] { return std::sqrt(scale * next++->variance); };
+  const auto next_error = [&] {
+    const Spread& spread = *next++;
+    return std::sqrt(noise.scale * spread.variance + (noise.rendered ? moments(spread.steps).variance : 0));
+  };
   ParameterErrors result;
   std::vector<bool> undetermined = undetermined_;
   std::vector<double> values = least;
@@ -116,11 +128,12 @@ ParameterErrors Determined::errors(double scale, const std::vector<bool>& asked,
   for (const Parameters::Block& block : blocks_)
     for (int i = block.begin; i < block.begin + block.count; ++i) {
       if (asked[i] && !fixed_[i]) {
-        const double step = next->step;
+        const StepMoments step = moments(next->steps);
+        const double doubt = 2 * std::sqrt(step.variance / static_cast<double>(next->steps.size()));
         values[i] = next_error();
         if (std::isinf(values[i])) undetermined[i] = true;
-        if (block.count <= kFewComponents && !undetermined[i] && std::abs(step) > values[i])
-          result.steps_left.emplace_back(names_[i], step);
+        if (block.count <= kFewComponents && !undetermined[i] && std::abs(step.mean) > values[i] + doubt)
+          result.steps_left.emplace_back(names_[i], step.mean);
       }
       if (undetermined[i]) values[i] = kInfinite;
     }
@@ -135,7 +148,7 @@ ParameterErrors Determined::errors(double scale, const std::vector<bool>& asked,
     if (near_pivots[c] < 0 || kBetterTogether * combination.mean_error < values[near_pivots[c]])
       result.combinations.push_back(std::move(combination));
   }
-  if (std::isfinite(scale)) result.values = std::move(values);
+  if (std::isfinite(noise.scale)) result.values = std::move(values);
   result.undetermined = undetermined_names(blocks_, names_, undetermined);
   return result;
 }

@@ -4,7 +4,8 @@
 // and P that of the smoothing. Errors of a pose, a gain or a background are thus what is left after albedos of vertices and the
 // like have taken over all that they can.
 //
-// Noise of the renderer in J. H comes from two independent halves of its samples, (J1'W J2 + J2'W J1) / 2, which has no bias
+// Noise of the renderer moves what is fitted to images of one set of random numbers: by as much as Newton steps by gradients of
+// different random numbers scatter, whose variance is added. Noise in J: H comes from two independent halves of its samples, (J1'W J2 + J2'W J1) / 2, which has no bias
 // but noise; J'WJ of all samples is semidefinite, but too large by the noise's own variance, and errors from it are too small.
 //
 // Undetermined is an unknown on which no reading depends; one that takes part in a direction that no reading sees, where only a
@@ -27,9 +28,9 @@ inline constexpr int kFewComponents = 3;
 
 /// Of all unknowns or of some combinations of them, each n x n, row after row.
 struct Curvatures {
-  std::vector<double> data;   ///< H, without bias
+  std::vector<double> data;   ///< H, without bias; a normal prior of an unknown counts as a reading of it
   std::vector<double> bound;  ///< H of all samples at once: semidefinite, on average too large
-  std::vector<double> prior;  ///< P
+  std::vector<double> prior;  ///< P, of smoothing
 };
 
 /// What is determined together: see NullDirection::Partner.
@@ -51,13 +52,24 @@ struct ParameterErrors {
 
 /// What the inverse of the Gauss-Newton matrix H is multiplied with to get the covariance of the unknowns, the loss being a mean
 /// over N readings. Counts: 1 / N, as N H is Fisher's information. Else 2 s^2 / N with s^2 the mean squared error that is left,
-/// taken for independent errors of the readings; NaN where that is not above 0. Noise of the renderer is not included.
+/// taken for independent errors of the readings; NaN where that is not above 0.
 double variance_scale(const Problem& problem, const Evaluation& at);
 
 /// Of a linear function of the unknowns.
 struct Spread {
-  double variance = 0;  ///< but for the scale; infinite where noise hides it
-  double step = 0;      ///< by which a Newton step moves it
+  double variance = 0;        ///< but for the scale; infinite where noise hides it
+  std::vector<double> steps;  ///< by which a Newton step moves it, for each gradient
+};
+/// Mean, and variance of a single one, of Newton steps.
+struct StepMoments {
+  double mean = 0, variance = 0;
+};
+StepMoments moments(const std::vector<double>& steps);
+
+/// What is known about the noise of readings and of the renderer.
+struct NoiseLevel {
+  double scale = 0;       ///< see variance_scale()
+  bool rendered = false;  ///< whether the unknowns were fitted to one set of random numbers, whose noise counts, too
 };
 /// Of functions with so many weights of the unknowns each; those that are fixed have none.
 using Spreads = std::function<std::vector<Spread>(const std::vector<std::vector<double>>& weights)>;
@@ -74,9 +86,9 @@ class Determined {
   /// Unknowns that stay as they are while all others are inverted: the pivots of null directions, and what nothing keeps in place.
   const std::vector<bool>& fixed() const { return fixed_; }
 
-  /// Errors of the unknowns that are `asked` for, by their spreads, of others `least`. Where `scale` is NaN, only what is
-  /// undetermined is found.
-  ParameterErrors errors(double scale, const std::vector<bool>& asked, const std::vector<double>& least,
+  /// Errors of the unknowns that are `asked` for, by their spreads, of others `least`. Where the scale is NaN, only
+  /// what is undetermined is found.
+  ParameterErrors errors(const NoiseLevel& noise, const std::vector<bool>& asked, const std::vector<double>& least,
                          const Spreads& spreads) const;
 
  private:

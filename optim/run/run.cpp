@@ -172,26 +172,26 @@ class Run {
     geometry.write("final", state_.theta);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);
-    errors_ = find_errors(final);
+    errors_ = find_errors(*optimizer, final);
     write_expected_counts();
     return result;
   }
 
-  /// Of all unknowns together where their matrix is not too large.
-  ParameterErrors find_errors(const Evaluation& final) const {
+  /// Of all unknowns together where their matrix is not too large. As it ends, a run is not interrupted.
+  ParameterErrors find_errors(const Optimizer& optimizer, const Evaluation& final) const {
     const std::vector<double>& theta = state_.theta;
-    if (!problem_.can_render(theta)) return {};
-    const double scale = variance_scale(problem_, final), unknowns = parameters_.size();
+    const double unknowns = parameters_.size();
+    const bool together =
+        unknowns <= kMostTogether && linearisation_bytes(problem_, unknowns) <= kMostLinearisationBytes;
+    const bool differences = problem_.experiment().gradient.method == GradientMethod::finite_difference;
+    if (!problem_.can_render(theta) || (differences && !together)) return {};
+    const NoiseLevel noise{variance_scale(problem_, final), optimizer.scatters()};
     const std::vector<Parameters::Block>& blocks = parameters_.blocks();
     const std::vector<std::string>& names = parameters_.component_names();
-    const Poll poll = [] {};  // as it ends, a run is not interrupted
-    if (unknowns <= kMostTogether && linearisation_bytes(problem_, unknowns) <= kMostLinearisationBytes) {
-      const RenderedCurvature curvature(problem_, target_, theta, poll);
-      return joint_errors(curvature.all(), curvature.gradient(), scale, blocks, names, theta);
-    }
-    if (problem_.experiment().gradient.method == GradientMethod::finite_difference) return {};
+    const Poll poll = [] {};
     const RenderedCurvature curvature(problem_, target_, theta, poll);
-    return eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(), curvature.gradient(), scale,
+    if (together) return joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta);
+    return eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(), curvature.gradients(), noise,
                              blocks, names, theta);
   }
 

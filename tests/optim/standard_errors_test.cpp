@@ -36,11 +36,10 @@ struct Model {
     for (int i = 0; i < count; ++i) names.push_back(count == 1 ? name : name + "[" + std::to_string(i) + "]");
     theta.insert(theta.end(), values.begin(), values.end());
   }
-  ParameterErrors errors(const std::vector<double>& data, std::vector<double> prior = {},
-                         std::vector<double> gradient = {}, double scale = 1) const {
+  ParameterErrors errors(const std::vector<double>& data, std::vector<double> prior = {}, const Rows& gradients = {},
+                         double scale = 1) const {
     prior.resize(data.size());
-    gradient.resize(theta.size());
-    return joint_errors({data, data, prior}, gradient, scale, blocks, names, theta);
+    return joint_errors({data, data, prior}, gradients, {scale, true}, blocks, names, theta);
   }
 };
 
@@ -76,10 +75,20 @@ TEST(StandardErrors, SayWhatHasNotComeToRest) {
   // The loss |a + b x - y|^2 / 2 rises by J'(J d) where all is off by d: a Newton step goes back by d.
   const std::vector<double> matrix = information(line());
   const double off = 5;
-  const ParameterErrors found = line_model().errors(matrix, {}, {off * matrix[0], off * matrix[1]});
+  const ParameterErrors found = line_model().errors(matrix, {}, {{off * matrix[0], off * matrix[1]}});
   ASSERT_EQ(found.steps_left.size(), 1u);
   EXPECT_EQ(found.steps_left[0].first, "a");
   EXPECT_NEAR(found.steps_left[0].second, -off, 1e-6);
+}
+
+TEST(StandardErrors, HaveTheNoiseOfTheImagesThatWereFitted) {
+  // Three gradients that scatter as if a were off by -1, 0 and 1: a variance of 1.
+  const std::vector<double> matrix = information(line());
+  const Rows gradients = {{-matrix[0], -matrix[1]}, {0, 0}, {matrix[0], matrix[1]}};
+  const ParameterErrors without = line_model().errors(matrix), with = line_model().errors(matrix, {}, gradients);
+  EXPECT_NEAR(with.values[0], std::hypot(without.values[0], 1), 1e-6);
+  EXPECT_NEAR(with.values[1], without.values[1], 1e-6);
+  EXPECT_TRUE(with.steps_left.empty());
 }
 
 /// Readings of gain * paint_j, so many of each j, and one row for a background.
@@ -186,8 +195,8 @@ TEST(StandardErrors, OfWhatNoReadingSeesOrNoiseHides) {
   data[11] = data[14] = 1.02;  // noise has made one of its eigenvalues -0.02
   bound = data;
   bound[11] = bound[14] = 0.98;
-  const ParameterErrors found = joint_errors({data, bound, std::vector<double>(16)}, std::vector<double>(4), 1,
-                                             model.blocks, model.names, model.theta);
+  const ParameterErrors found =
+      joint_errors({data, bound, std::vector<double>(16)}, {}, {1, false}, model.blocks, model.names, model.theta);
   EXPECT_THAT(found.undetermined, ElementsAre("unseen", "pair"));
   EXPECT_NEAR(found.values[0], 0.5, 1e-9);
   EXPECT_TRUE(std::isinf(found.values[1]));
@@ -243,7 +252,7 @@ TEST(StandardErrors, ByEliminationAreThoseOfTheInverse) {
   for (std::size_t i = 0; i < n; ++i) diagonal[i] = synthetic.matrix[i * n + i];
   const std::vector<double> nothing(n, 0.0);
   const ParameterErrors whole = model.errors(synthetic.matrix),
-                        eliminated = eliminated_errors(synthetic, diagonal, nothing, nothing, 1, model.blocks,
+                        eliminated = eliminated_errors(synthetic, diagonal, nothing, {}, {1, false}, model.blocks,
                                                        model.names, model.theta);
   for (const int i : {0, 1}) {
     EXPECT_GT(whole.values[i], 3 / std::sqrt(diagonal[i])) << "nothing to eliminate";
