@@ -114,7 +114,7 @@ class Node:
         found = []
         for index, (name, child) in enumerate(self.children):
             node = self.document.resolve(child)
-            if node.tag in tags:
+            if node is not None and node.tag in tags:
                 self.used.add(index)
                 found.append((name, node))
         return found
@@ -140,7 +140,8 @@ class Node:
         for index, (name, child) in enumerate(self.children):
             if index not in self.used and name not in self.used:
                 node = self.document.resolve(child)
-                yield SceneError(child.place, f"{self}: {node} is not understood here")
+                if node is not None:
+                    yield SceneError(child.place, f"{self}: {node} is not understood here")
 
 
 class Document:
@@ -149,16 +150,18 @@ class Document:
     def __init__(self, path, definitions):
         self.parameters, self.ids, self.used_parameters = dict(definitions), {}, set()
         self.folders = [pathlib.Path(path).parent]  # where files are looked for; those of <path> come first
+        self.missing = []  # what the scene refers to and is not there, as errors
         self.root = self._read(pathlib.Path(path), 0)
         if self.root.tag != "scene":
             raise SceneError(self.root.place, f"is a {self.root.tag}, not a scene")
 
     def resolve(self, child):
+        """The object, or none where nothing has its id."""
         if isinstance(child, Node):
             return child
         if child.id not in self.ids:
-            raise SceneError(child.place, f"nothing has the id '{child.id}'")
-        return self.ids[child.id]
+            self.missing.append(SceneError(child.place, f"nothing has the id '{child.id}'"))
+        return self.ids.get(child.id)
 
     def unused_definitions(self, definitions):
         return [name for name in definitions if name not in self.used_parameters]
@@ -239,9 +242,11 @@ class Context:
             self.document.parameters.setdefault(needed("name"), needed("value"))
             self.document.used_parameters.add(name)
         elif tag == "include":
-            self.include(node, self.found(needed("filename"), place))
+            self.include(node, needed("filename"), place)
         elif tag == "alias":
-            self.document.ids[needed("as")] = self.document.resolve(Reference(needed("id"), place))
+            original = self.document.resolve(Reference(needed("id"), place))
+            if original is not None:
+                self.document.ids[needed("as")] = original
         elif tag == "path":
             self.document.folders.insert(0, self.path.parent / needed("value"))
         else:
@@ -269,7 +274,12 @@ class Context:
                 return folder / filename
         raise SceneError(place, f"{whose}there is no file {filename}")
 
-    def include(self, node, path):
+    def include(self, node, filename, place):
+        try:
+            path = self.found(filename, place)
+        except SceneError as error:
+            self.document.missing.append(error)
+            return
         included = self.document._read(path, self.depth + 1)
         if included.tag == "scene":
             node.children += included.children

@@ -100,7 +100,7 @@ class Materials:
     def metal(self, node):
         """Reflectance at normal incidence."""
         material = node.text("material", "Cu" if node.context.old else "none")
-        node.ignore("ext_eta")
+        node.ignore("ext_eta", "diffuse_reflectance", "alpha")
         if material == "none" or "eta" in node.values:
             eta, k = self.colours.colour(node, "eta", 0.0), self.colours.colour(node, "k", 1.0)
             reflectance = ((eta - 1) ** 2 + k**2) / ((eta + 1) ** 2 + k**2)
@@ -119,7 +119,7 @@ class Materials:
             node.fail(f"int_ior {inside:g} and ext_ior {outside:g} make no glass", "int_ior")
         for name in ("specular_reflectance", "specular_transmittance"):
             if not np.all(self.colours.colour(node, name, 1.0) == 1):
-                node.fail(f"{name} is not 1", name)
+                self.report.attempt(node.fail, f"{name} is not 1", name)
         return f"{{type: rough_dielectric, roughness: {self.roughness(node):.9g}, ior: {inside / outside:.9g}}}"
 
     def ior(self, node, name, default):

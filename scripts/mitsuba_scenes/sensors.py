@@ -63,7 +63,7 @@ def bins_of_peers(node, report):
     return node.number("tstart", 0.0) * METRES_PER_NS, width, node.integer("duration", 1)
 
 
-def crop_of(sensor, film):
+def crop_of(sensor, film, report):
     """How much of the width is kept. Films are cut around their middle or not at all."""
     node = sensor.only("film")
     if node is None:
@@ -71,7 +71,8 @@ def crop_of(sensor, film):
     width, height = node.integer("crop_width", film.width), node.integer("crop_height", film.height)
     left, top = node.integer("crop_offset_x", 0), node.integer("crop_offset_y", 0)
     if 2 * left + width != film.width or 2 * top + height != film.height or min(width, height) < 1:
-        node.fail("its crop is not around its middle", "crop_width")
+        report.attempt(node.fail, "its crop is not around its middle", "crop_width")
+        return 1.0
     share = width / film.width
     film.width, film.height = width, height
     return share
@@ -93,7 +94,7 @@ def slope(sensor, film, report):
         report.attempt(sensor.fail, "its to_world mirrors the image", "to_world")
     if sensor.number("principal_point_offset_x", 0) or sensor.number("principal_point_offset_y", 0):
         report.attempt(sensor.fail, "its principal point is not in the middle")
-    result = np.tan(np.radians(field_of_view(sensor, film)) / 2) * crop_of(sensor, film)
+    result = np.tan(np.radians(field_of_view(sensor, film)) / 2) * crop_of(sensor, film, report)
     report.refuse_rest(sensor)
     return result
 

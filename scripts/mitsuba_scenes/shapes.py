@@ -10,7 +10,7 @@ from .document import SceneError
 from .writing import colour_text
 
 WITHOUT_EFFECT = ("silhouette_sampling_weight", "flip_tex_coords", "max_smooth_angle", "srgb", "collapse")
-
+POINTER = b"version https://git-lfs"
 MOST_NAMES = 8  # in a line
 
 
@@ -106,8 +106,15 @@ class Shapes:
             node.fail("no such shape here (allowed: " + ", ".join([*kinds, "shapegroup", "instance", "merge"]) + ")")
         return kinds[node.type](node)
 
-    def file(self, node):
+    def file_of(self, node):
         path = node.file()
+        with path.open("rb") as file:
+            if file.read(len(POINTER)) == POINTER:
+                node.fail(f"{path} is a pointer of Git LFS: its content was not fetched", "filename")
+        return path
+
+    def file(self, node):
+        path = self.file_of(node)
         try:
             mesh = meshes.read(path, node.type)
         except InputError as error:
@@ -115,7 +122,7 @@ class Shapes:
         return mesh if node.boolean("face_normals") else meshes.shaded_by_its_normals(mesh)
 
     def serialized(self, node):
-        path, index = node.file(), node.integer("shape_index", 0)
+        path, index = self.file_of(node), node.integer("shape_index", 0)
         try:
             found, flat = serialized.read(path, index)
         except InputError as error:

@@ -14,6 +14,14 @@ from .writing import quoted
 def turned(path, options, report):
     """Files by name: texts or bytes."""
     document = Document(path, options.define)
+    try:
+        return files_of(document, path, options, report)
+    finally:
+        for error in document.missing:
+            report.refuse(error)
+
+
+def files_of(document, path, options, report):
     for name in document.unused_definitions(options.define):
         report.note(path, f"-D {name}: no ${name} here")
     scene = document.root

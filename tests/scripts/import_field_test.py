@@ -81,6 +81,17 @@ class DocumentTest(FieldTest):
         lacking = shape("sphere", '<float name="radius" value="$r"/>')
         self.assert_refused(r"\$r has no value", scene(LIT, lacking))
 
+    def test_what_is_not_there(self):
+        box = '<shape type="cube"><ref id="paint"/></shape>'
+        text = scene('<include filename="none.xml"/>', LIT, box)
+        self.assert_refused("there is no file none.xml$", text)
+        self.assert_refused("nothing has the id 'paint'$", text)
+        result = self.run_script(text, "--skip")
+        self.assertEqual((result.returncode, result.stderr.count("\n")), (0, 2))
+        (self.folder / "a.obj").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
+        self.assert_refused("shape 'obj': .*a.obj is a pointer of Git LFS", scene(LIT, shape(
+            "obj", '<string name="filename" value="a.obj"/>')))
+
     def test_depths_of_any_integrator(self):
         depth = '<integer name="max_depth" value="{}"/>'.format
 
