@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <utility>
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
@@ -180,6 +181,33 @@ Camera camera_of(const Capture& capture) {
   return camera;
 }
 
+/// Largest coordinate of all that the scene holds, and the diagonal of the box around it.
+std::pair<double, double> reach_and_size(const Scene& scene) {
+  Vec3 low = scene.camera.position, high = low;
+  const auto add = [&](const Vec3& p) {
+    for (int axis = 0; axis < 3; ++axis)
+      low[axis] = std::min(low[axis], p[axis]), high[axis] = std::max(high[axis], p[axis]);
+  };
+  for (const Vec3& p : scene.positions) add(p);
+  for (const PointLight& light : scene.lights) add(light.position);
+  double reach = 0;
+  for (int axis = 0; axis < 3; ++axis) reach = std::max({reach, std::abs(low[axis]), std::abs(high[axis])});
+  return {reach, length(high - low)};
+}
+
+/// Rays start 2^-20 of the largest coordinate off surfaces, as single precision cannot tell less: a thousandth of the scene is
+/// too much.
+void check_place(const Scene& scene, const YamlValue& shapes) {
+  constexpr double kMost = 0x1p20 / 1000;
+  const auto [reach, size] = reach_and_size(scene);
+  if (reach > kMost * size)
+    shapes.fail(
+        fmt::format("the scene of size {:.3g} lies at coordinates of {:.3g}, where rays, in single precision, do not "
+                    "see it",
+                    size, reach),
+        "at most a thousand times its size, as by `transform: {translate: ...}` of every shape");
+}
+
 void describe_light(Keys& keys, PointLight& light, Scene& scene) {
   const PointLight* first = scene.lights.data();
   describe(keys, light, scene.grey);
@@ -226,6 +254,7 @@ void describe(Keys& keys, Scene& scene) {
       value.fail("a shape emits light", "none does in a capture, which its laser lights alone");
     if (!scene.capture && !emits && scene.lights.empty())
       value.fail("no shape emits light", "emission above 0 on at least one, or `lights`");
+    check_place(scene, value);
   });
 }
 

@@ -191,6 +191,22 @@ TEST_F(FieldMesh, CoordinatesKeepTheirDigits) {
     EXPECT_LT(length(far.positions[v] - near.positions[v]), 2e-9) << v;  // two roundings of 5e6
 }
 
+TEST_F(FieldMesh, SurveysThatAreNotBroughtBackAreRefused) {
+  folder_.write("wall.obj", "v 437250 5418300 0\nv 437251 5418300 0\nv 437251 5418300 1\nf 1 2 3\n");
+  const std::string scene =
+      folder_.write("scene.yaml",
+                    "camera: {position: [437250, 5418298, 0], look_at: [437250, 5418300, 0], up: [0, 0, 1], fov: 4, "
+                    "resolution: [2, 2]}\n"
+                    "materials: {w: {type: diffuse, albedo: 0.5}}\n"
+                    "shapes: [{name: wall, file: wall.obj, material: w}]\n"
+                    "lights: [{name: flash, type: point, position: [437250, 5418298, 0], intensity: 10}]\n");
+  EXPECT_EQ(error_of([&] { load_scene(scene); }),
+            scene +
+                ":3:9: shapes: the scene of size 2.45 lies at coordinates of 5.42e+06, where rays, in single "
+                "precision, do not "
+                "see it (at most a thousand times its size, as by `transform: {translate: ...}` of every shape)");
+}
+
 TEST_F(FieldMesh, RoundingInDoublePrecisionLeavesNoSeam) {
   // The seam of a cylinder whose last column is computed again, a whole turn on.
   constexpr int kSides = 12;
