@@ -50,7 +50,7 @@ def scene(laser):
 
 def parameters(case, vertices, albedos):
     def rotation(name, axis, target):
-        return {"name": name, "type": "rotation", "shape": "board", "axis": axis, "pivot": "center", "initial": target / 2,
+        return {"name": name, "type": "rotation", "shape": "board", "axis": axis, "pivot": "center", "initial": 0.8 * target,
                 "target": target}
 
     if case == "letter":
@@ -59,7 +59,7 @@ def parameters(case, vertices, albedos):
                "smoothing": {"slopes": PENALTY["relief"]}, "initial": 0, "target": relief.tolist()}
     yield rotation("tilt_x", [1, 0, 0], 5)
     yield rotation("tilt_y", [0, 1, 0], -4)
-    yield {"name": "z", "type": "translation", "shape": "board", "direction": [0, 0, 1], "initial": 0, "target": 0.01}
+    yield {"name": "z", "type": "translation", "shape": "board", "direction": [0, 0, 1], "initial": 0.008, "target": 0.01}
     paint = {"name": "paint", "type": "albedo", "shape": "board", "per": "vertex", "initial": 0.3, "target": albedos.tolist()}
     if case == "letter":
         paint["smoothing"] = {"slopes": PENALTY["paint"]}
@@ -82,7 +82,7 @@ def write(directory, case):
                   "target": {"samples": 4096, "noise": {"counts": True}},
                   "samples": {"primal": SAMPLES, "interior": SAMPLES, "visibility": 0, "path_length": 0},
                   "loss": {"kind": "poisson"},
-                  "optimizer": {"method": "levenberg_marquardt", "iterations": 9},
+                  "optimizer": {"method": "levenberg_marquardt", "iterations": 12},
                   "output": {"geometry": "none", "frames": 0, "histogram_samples": 1}}
     (directory / "experiment.yaml").write_text(yaml.safe_dump(experiment), encoding="ascii")
     return {p["name"]: p["target"] for p in unknowns}
