@@ -15,7 +15,7 @@ from .values import SceneError, Value
 
 OBJECTS = {"bsdf", "emitter", "film", "integrator", "medium", "phase", "rfilter", "sampler", "scene", "sensor", "shape",
            "subsurface", "texture", "volume"}
-STRUCTURE = {*OBJECTS, "ref", "default", "include", "alias", "path", "transform"}
+STRUCTURE = {"ref", "default", "include", "alias", "path"}
 MOST_INCLUDES = 15
 
 
@@ -136,7 +136,7 @@ class Node:
         """What nobody asked for, as errors."""
         for name, value in self.values.items():
             if name not in self.used:
-                yield SceneError(value.place, f"{self}: {name} is not understood here")
+                yield value.value if isinstance(value.value, SceneError) else SceneError(value.place, f"{self}: {name} is not understood here")
         for index, (name, child) in enumerate(self.children):
             if index not in self.used and name not in self.used:
                 node = self.document.resolve(child)
@@ -221,20 +221,21 @@ class Context:
 
     def add(self, node, element):
         tag, place = element.tag, element.place
-        try:
-            attributes = self.attributes(element)
-        except SceneError as error:  # what nobody asks for may lack a value
-            name = element.attributes.get("name", "")
-            if tag in STRUCTURE or not name:
-                raise
-            node.values[self.name(name)] = Value(tag, error, place)
+        is_object = tag in OBJECTS or tag == "spectrum" and "type" in element.attributes
+        if not is_object and tag not in STRUCTURE:
+            name = self.name(values.required(element.attributes, "name", tag, place))
+            try:
+                node.values[name] = self.value(element)
+            except SceneError as error:  # for who asks for it
+                node.values[name] = Value(tag, error, place)
             return
+        attributes = self.attributes(element)
 
         def needed(name):
             return values.required(attributes, name, tag, place)
 
         name = self.name(attributes.get("name", ""))
-        if tag in OBJECTS or tag == "spectrum" and "type" in attributes:
+        if is_object:
             node.children.append((name, self.node(element)))
         elif tag == "ref":
             node.children.append((name, Reference(needed("id"), place)))
@@ -249,16 +250,14 @@ class Context:
                 self.document.ids[needed("as")] = original
         elif tag == "path":
             self.document.folders.insert(0, self.path.parent / needed("value"))
-        else:
-            needed("name")
-            node.values[name] = self.value(element, attributes)
 
     def name(self, text):
         return snake_case(text) if self.old else text
 
-    def value(self, element, attributes):
+    def value(self, element):
         if element.tag == "transform":
             return Value(element.tag, self.transform(element), element.place)
+        attributes = self.attributes(element)
         return Value(*values.value_of(element.tag, attributes, element.place), element.place)
 
     def transform(self, element):

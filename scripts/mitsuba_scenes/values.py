@@ -8,6 +8,9 @@ import numpy as np
 from . import matrices
 
 
+KINDS = ("float", "integer", "boolean", "string", "rgb", "srgb", "spectrum", "blackbody", "point", "vector")
+
+
 class SceneError(Exception):
     """What cannot be turned, and where it stands."""
 
@@ -52,6 +55,8 @@ def value_of(tag, attributes, place):
     def needed(name):
         return required(attributes, name, tag, place)
 
+    if tag not in KINDS:
+        raise SceneError(place, f"<{tag}> is not understood")
     if tag in ("point", "vector"):
         if "value" in attributes:
             return tag, np.array(numbers(attributes["value"], place, (3,)))
@@ -75,9 +80,7 @@ def value_of(tag, attributes, place):
         return tag, int(text)
     if tag == "boolean" and text.lower() in ("true", "false"):
         return tag, text.lower() == "true"
-    if tag in ("integer", "boolean"):
-        raise SceneError(place, f"'{text}' is no {tag}")
-    raise SceneError(place, f"<{tag}> is not understood")
+    raise SceneError(place, f"'{text}' is no {tag}")
 
 
 def spectrum(text, place):

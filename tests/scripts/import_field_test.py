@@ -78,6 +78,8 @@ class DocumentTest(FieldTest):
     def test_what_nobody_needs_may_lack_a_value(self):
         sampler = '<sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>'
         self.imported(scene(LIT.replace("<film", sampler + "<film"), shape("cube")))
+        moving = '<shape type="cube"><animation name="to_world"><transform time="0"/></animation></shape>'
+        self.assert_refused("<animation> is not understood$", scene(LIT, moving))
         lacking = shape("sphere", '<float name="radius" value="$r"/>')
         self.assert_refused(r"\$r has no value", scene(LIT, lacking))
 
