@@ -23,6 +23,7 @@
 #include "core/base/progress.h"
 #include "core/base/ranks.h"
 #include "core/base/yaml_reader.h"
+#include "core/image/hdf5_file.h"
 #include "optim/problem/problem.h"
 
 namespace {
@@ -77,6 +78,7 @@ int flushed(int status) {
 
 int run_program(int argc, char** argv) {
   isochron::keep_freed_memory();
+  isochron::end_without_hdf5();
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of its write
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
   spdlog::set_pattern("%n: %^%l%$: %v");

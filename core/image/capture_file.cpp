@@ -5,30 +5,18 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <mutex>
 #include <optional>
 #include <stdexcept>
 
 #include "core/base/file.h"
 #include "core/image/hdf5_file.h"
+#include "core/image/wall_plane.h"
 
 namespace isochron {
 namespace {
 
 constexpr std::size_t kSlabValues = std::size_t{1} << 20;  // read and written at a time
 constexpr double kSamePoint = 1e-5;                        // of a grid's extent: grids may be rounded to 32 bits
-
-/// HDF5 is for one thread at a time, and prints what it meets unless told not to.
-struct Hdf5Scope {
-  std::scoped_lock<std::mutex> lock{mutex()};
-  QuietHdf5 quiet;
-
- private:
-  static std::mutex& mutex() {
-    static std::mutex one;
-    return one;
-  }
-};
 
 /// A grid of points as the file has it: `shape` without the last dimension (3), points row after row.
 struct Grid {
@@ -73,6 +61,32 @@ std::vector<Vec3> read_normals(const Hdf5Reader& reader, const char* name, const
     normals.points[i] = normals.points[i] / size;
   }
   return normals.points;
+}
+
+/// Turns a wall's normal to the side where laser and sensor stand, if they are not in its plane.
+Vec3 towards_the_instrument(const Vec3& normal, const Grid& grid, const CaptureGeometry& geometry) {
+  constexpr double kInThePlane = 1e-3;                   // of the distance
+  if (!geometry.accounts_first_and_last) return normal;  // then files have zeros for them
+  for (const Vec3& origin : {geometry.sensor_origin, geometry.laser_origin}) {
+    const Vec3 way = origin - grid.points[0];
+    const double height = dot(way, normal);
+    if (std::abs(height) > kInThePlane * length(way)) return height > 0 ? normal : normal * -1;
+  }
+  return normal;
+}
+
+/// The file's normals or, where it has none, those of the plane that the grid spans or else of `wall`.
+std::vector<Vec3> find_normals(const Hdf5Reader& reader, const char* name, const Grid& grid, CaptureGeometry& geometry,
+                               const std::optional<Vec3>& wall = std::nullopt) {
+  if (reader.has_values(name)) return read_normals(reader, name, grid);
+  const std::optional<Vec3> own = plane_normal(grid.points);
+  if (!own && !wall) reader.fail(fmt::format("{} is missing, and the points span no plane", name));
+  const Vec3 normal = own ? towards_the_instrument(*own, grid, geometry) : *wall;
+  geometry.assumed.push_back(
+      fmt::format("{} is missing: the wall is taken as the plane of {}, its normal as "
+                  "({:.4g}, {:.4g}, {:.4g})",
+                  name, own ? "its points" : "the sensor's points", normal.x, normal.y, normal.z));
+  return std::vector<Vec3>(grid.points.size(), normal);
 }
 
 double read_number(const Hdf5Reader& reader, const char* name) {
@@ -149,20 +163,20 @@ CaptureGeometry read_geometry(const Hdf5Reader& reader) {
   CaptureGeometry geometry;
   geometry.columns = static_cast<int>(sensor.columns());
   geometry.rows = static_cast<int>(sensor.rows());
-  geometry.sensor_normal = read_normals(reader, "sensor_grid_normals", sensor);
-  geometry.confocal = is_confocal(reader, sensor, laser);
-  if (!geometry.confocal) {
-    geometry.laser_normal = read_normals(reader, "laser_grid_normals", *laser);
-    geometry.laser = laser->points;
-    if (sensor.rows() * laser->points.size() > std::numeric_limits<int>::max())
-      reader.fail(fmt::format("{} laser points are too many", laser->points.size()));
-  }
-  geometry.sensor = sensor.points;
   geometry.accounts_first_and_last = read_number(reader, "t_accounts_first_and_last_bounces") != 0;
   for (const auto& [name, origin] :
        {std::pair{"laser_xyz", &geometry.laser_origin}, std::pair{"sensor_xyz", &geometry.sensor_origin}}) {
     if (geometry.accounts_first_and_last || reader.has(name)) *origin = read_point(reader, name);
   }
+  geometry.sensor_normal = find_normals(reader, "sensor_grid_normals", sensor, geometry);
+  geometry.confocal = is_confocal(reader, sensor, laser);
+  if (!geometry.confocal) {
+    geometry.laser_normal = find_normals(reader, "laser_grid_normals", *laser, geometry, geometry.sensor_normal[0]);
+    geometry.laser = laser->points;
+    if (sensor.rows() * laser->points.size() > std::numeric_limits<int>::max())
+      reader.fail(fmt::format("{} laser points are too many", laser->points.size()));
+  }
+  geometry.sensor = sensor.points;
   return geometry;
 }
 
@@ -282,42 +296,16 @@ GatedImage read_counts(const Hdf5Reader& reader, const CaptureGeometry& geometry
     const std::size_t count = std::min(most, bins - first);
     reader.read_slab("H", first, count, slab.data());
     layout.for_each([&](std::size_t i, std::size_t pixel) {
-      for (std::size_t bin = 0; bin < count; ++bin) {
-        const double value = slab[bin * layout.size() + i];
-        if (!(value >= 0) || !std::isfinite(value))
-          reader.fail(fmt::format("H is {} in bin {}, column {}, row {}: no number of photons", value, first + bin,
-                                  pixel % layout.columns, pixel / layout.columns));
-        counts.data[pixel * bins + first + bin] = value;
-      }
+      for (std::size_t bin = 0; bin < count; ++bin)
+        counts.data[pixel * bins + first + bin] = slab[bin * layout.size() + i];
     });
   }
   return counts;
 }
 
-}  // namespace
-
-CaptureGeometry read_capture_geometry(const std::string& file) {
-  const Hdf5Scope scope;
-  return read_geometry(Hdf5Reader(file));
-}
-
-CaptureFile read_capture(const std::string& file) {
-  const Hdf5Scope scope;
-  const Hdf5Reader reader(file);
-  CaptureFile capture;
-  capture.delta_t = read_number(reader, "delta_t");
-  if (!(capture.delta_t > 0)) reader.fail(fmt::format("delta_t is {}, not positive", capture.delta_t));
-  capture.t_start = read_number(reader, "t_start");
-  if (!reader.has("H")) reader.fail("H is missing");
-  capture.geometry = read_geometry(reader);
-  capture.counts = read_counts(reader, capture.geometry);
-  return capture;
-}
-
-void write_capture(const std::string& file, const CaptureFile& capture) {
+/// The file of a capture.
+std::string contents_of(const CaptureFile& capture) {
   constexpr std::size_t kHeaders = std::size_t{1} << 16;
-  require_fit(capture);
-  const Hdf5Scope scope;
   Hdf5Writer writer(sizeof(float) * capture.counts.data.size() + kHeaders);
   write_counts(writer, capture.counts, capture.geometry);
   // The names and numbers of tal's own enumerations.
@@ -328,7 +316,40 @@ void write_capture(const std::string& file, const CaptureFile& capture) {
   writer.write_number("delta_t", capture.delta_t);
   writer.write_number("t_start", capture.t_start);
   writer.write_text("scene_info", "{original_format: isochron}");
-  write_file_atomically(file, writer.image());
+  return writer.image();
+}
+
+}  // namespace
+
+CaptureGeometry read_capture_geometry(const std::string& file) {
+  CaptureGeometry geometry;
+  use_hdf5([&] { geometry = read_geometry(Hdf5Reader(file)); });
+  return geometry;
+}
+
+CaptureFile read_capture(const std::string& file) {
+  CaptureFile capture;
+  use_hdf5([&] {
+    const Hdf5Reader reader(file);
+    capture.delta_t = read_number(reader, "delta_t");
+    if (!(capture.delta_t > 0)) reader.fail(fmt::format("delta_t is {}, not positive", capture.delta_t));
+    if (reader.has_values("t_start")) {
+      capture.t_start = read_number(reader, "t_start");
+    } else {
+      capture.assumed.push_back("t_start is missing: taken as 0, so that the first bin begins there");
+    }
+    if (!reader.has("H")) reader.fail("H is missing");
+    capture.geometry = read_geometry(reader);
+    capture.counts = read_counts(reader, capture.geometry);
+  });
+  return capture;
+}
+
+void write_capture(const std::string& file, const CaptureFile& capture) {
+  require_fit(capture);
+  std::string contents;
+  use_hdf5([&] { contents = contents_of(capture); });
+  write_file_atomically(file, contents);
 }
 
 }  // namespace isochron

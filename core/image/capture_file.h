@@ -17,6 +17,8 @@ struct CaptureGeometry {
   /// Times include the ways from the laser's origin to the spot and from the sensor point to the sensor's origin.
   bool accounts_first_and_last = false;
   Vec3 laser_origin, sensor_origin;  ///< tal's laser_xyz and sensor_xyz
+  /// A line for each thing that the file lacks, and what is taken in its place.
+  std::vector<std::string> assumed;
 
   int spots() const { return confocal ? 1 : static_cast<int>(laser.size()); }
 };
@@ -26,17 +28,21 @@ struct CaptureGeometry {
 struct CaptureFile {
   CaptureGeometry geometry;
   GatedImage counts;
-  double delta_t = 0;  ///< width of a bin: optical path, metres
-  double t_start = 0;  ///< where the first bin begins: optical path, metres
+  double delta_t = 0;                ///< width of a bin: optical path, metres
+  double t_start = 0;                ///< where the first bin begins: optical path, metres
+  std::vector<std::string> assumed;  ///< as of the geometry
 };
 
-/// Reads all but the counts, which the file need not have. Throws InputError naming the file and the first thing amiss,
-/// as all that reads does here.
+/// Reads all but the counts, which the file need not have. Where normals are missing or empty, the wall is the plane that
+/// the points span, or for spots of the laser that span none the sensor's; its normal points to the side where laser and
+/// sensor stand, if times include the ways from and to there, or else towards the positive end of the axis that it is closest
+/// to. Throws InputError naming the file and the first thing amiss, as all that reads does here.
 CaptureGeometry read_capture_geometry(const std::string& file);
 
 /// H is [T, Sx, Sy] (confocal, or one spot) or [T, Lx, Ly, Sx, Sy], of any kind of number; in grids of points in no
 /// order ([N, 3]) the pair Sx, Sy or Lx, Ly is one number. Without a laser grid, [T, Sx, Sy] is confocal. Spots are
-/// numbered as sensor points are: ly * Lx + lx.
+/// numbered as sensor points are: ly * Lx + lx. A t_start that is missing or empty is 0. Values are what the file has:
+/// below zero where a dark count was subtracted, not a number where a point is dead.
 CaptureFile read_capture(const std::string& file);
 
 /// Writes counts as 32-bit floats, by temporary name and rename; several spots as [T, spots, 1, Sx, Sy]. Throws

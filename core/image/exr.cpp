@@ -82,12 +82,36 @@ std::optional<ChannelName> parse_channel(std::string_view name) {
                                                                          : std::optional(ChannelName{gate, letter});
 }
 
+/// Whether a channel is one of opacity, beside the colours of its layer: those are multiplied by it already.
+bool is_alpha(std::string_view name) {
+  return name == "A" || name.ends_with(".A");
+}
+
+/// Whether the channels are those of an image without gates: one of the letters that gates have, without a layer.
+bool is_plain(const Imf::ChannelList& list) {
+  return list.findChannel("Y") != nullptr || list.findChannel("R") != nullptr || list.findChannel("G") != nullptr ||
+         list.findChannel("B") != nullptr;
+}
+
+/// The name of a gate's channel, or of that of an image without gates.
+std::string channel_name(bool plain, int gate, char letter) {
+  return plain ? std::string(1, letter) : gate_channel(gate, letter);
+}
+
 /// Checks that the channels are those of whole gates without a gap; sets `gates` and `channels`.
 void check_channels(const std::string& file, const Imf::ChannelList& list, GatedImage& image) {
+  const bool plain = is_plain(list);
+  if (list.findChannel("RY") != nullptr || list.findChannel("BY") != nullptr)
+    fail(file, "holds luminance and chroma (channels Y, RY, BY; allowed: R, G, B)");
   for (auto channel = list.begin(); channel != list.end(); ++channel) {
-    const std::optional<ChannelName> name = parse_channel(channel.name());
+    if (is_alpha(channel.name())) continue;
+    const std::string full = plain && std::string_view(channel.name()).size() == 1
+                                 ? gate_channel(0, channel.name()[0])
+                                 : std::string(plain ? "" : channel.name());
+    const std::optional<ChannelName> name = parse_channel(full);
     if (!name)
-      fail(file, fmt::format("channel {} is not one of a gated image (gateNNN.Y, or gateNNN.R, .G, .B)",
+      fail(file, fmt::format("channel {} is not one of a gated image (gateNNN.Y, or gateNNN.R, .G, .B; for one gate Y, "
+                             "or R, G, B; alpha is left out)",
                              quote(channel.name())));
     const int channels = name->letter == 'Y' ? 1 : 3;
     if (image.channels != 0 && image.channels != channels)
@@ -99,9 +123,10 @@ void check_channels(const std::string& file, const Imf::ChannelList& list, Gated
     image.channels = channels;
     image.gates = std::max(image.gates, name->gate + 1);
   }
+  if (image.gates == 0) fail(file, "has no channel but alpha");
   for (int gate = 0; gate < image.gates; ++gate) {
     for (int c = 0; c < image.channels; ++c) {
-      const std::string name = gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[c]);
+      const std::string name = channel_name(plain, gate, image.channels == 1 ? 'Y' : kRgb[c]);
       if (list.findChannel(name) == nullptr)
         fail(file, fmt::format("channel '{}' is missing (gates 0 to {})", name, image.gates - 1));
     }
@@ -118,6 +143,7 @@ GatedImage read_planes(const std::string& file) {
   if (window != input.header().displayWindow()) fail(file, "is cropped (data window and display window differ)");
   GatedImage image;
   check_channels(file, input.header().channels(), image);
+  const bool plain = is_plain(input.header().channels());
   image.width = window.max.x - window.min.x + 1;
   image.height = window.max.y - window.min.y + 1;
 
@@ -129,7 +155,7 @@ GatedImage read_planes(const std::string& file) {
     // One row for all scanlines (no stride in y); pixels beside each other as in the image.
     char* base =
         reinterpret_cast<char*>(row.data() + p) - sizeof(float) * planes * static_cast<std::ptrdiff_t>(window.min.x);
-    buffer.insert(gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[channel]),
+    buffer.insert(channel_name(plain, gate, image.channels == 1 ? 'Y' : kRgb[channel]),
                   Imf::Slice(Imf::FLOAT, base, sizeof(float) * planes, 0));
   }
   input.setFrameBuffer(buffer);

@@ -53,11 +53,26 @@ class Bytes {
   std::string_view rest_;
 };
 
-bool is_list_of_channels(std::string_view value) {
+/// How many channels a list has; empty where it is none.
+std::optional<int> count_channels(std::string_view value) {
   constexpr std::size_t kChannel = 16;
   Bytes bytes(value);
-  while (!bytes.text().empty()) bytes.take(kChannel);
-  return bytes.empty();
+  int count = 0;
+  for (; !bytes.text().empty(); ++count) bytes.take(kChannel);
+  return bytes.empty() ? std::optional(count) : std::nullopt;
+}
+
+/// OpenEXR makes room for a row of tiles before it looks at them.
+void require_small_tiles(std::string_view tiles, std::string_view window, int channels) {
+  constexpr double kMostBytes = 1 << 29, kSample = 4;
+  Bytes sizes(tiles), corners(window);
+  const std::int32_t across = sizes.integer(), down = sizes.integer();
+  const std::int32_t left = corners.integer();
+  corners.integer();  // the top
+  const std::int32_t right = corners.integer();
+  if (across < 1 || down < 1 || (double{1} * right - left + across) * down * channels * kSample > kMostBytes)
+    throw std::runtime_error("its tiles of " + std::to_string(across) + " x " + std::to_string(down) +
+                             " pixels are none, or too large (a row of them: half a gigabyte)");
 }
 
 }  // namespace
@@ -69,10 +84,16 @@ std::string read_checked_exr(const std::string& file) {
   std::string contents = std::move(*read);
 
   constexpr std::int32_t kMagic = 20000630, kTiled = 0x200, kDeep = 0x800, kParts = 0x1000;
+  constexpr std::size_t kTileDescription = 9;
   Bytes bytes(contents);
   if (bytes.integer() != kMagic) throw std::runtime_error("it does not begin like one");
-  if ((bytes.integer() & (kTiled | kDeep | kParts)) != 0)
-    throw std::runtime_error("it is tiled, deep or of several parts (allowed: scanlines of one image)");
+  const std::int32_t flags = bytes.integer();
+  if ((flags & kDeep) != 0) throw std::runtime_error("it is deep (allowed: one value per pixel and channel)");
+  if ((flags & kParts) != 0)
+    throw std::runtime_error("it has several parts (allowed: one image, in scanlines or tiles)");
+  const bool tiled = (flags & kTiled) != 0;
+  std::string_view tiles, window;
+  int channels = 0;
   for (std::string_view name; !(name = bytes.text()).empty();) {
     const std::string_view type = bytes.text();
     const std::int32_t size = bytes.integer();
@@ -80,12 +101,20 @@ std::string read_checked_exr(const std::string& file) {
     const Required* known = nullptr;
     for (const Required& required : kRequired)
       if (required.name == name) known = &required;
-    if (known == nullptr) {
+    if (name == "dataWindow") window = value;
+    if (name == "channels") channels = count_channels(value).value_or(0);
+    if (tiled && name == "tiles") {
+      if (type != "tiledesc" || value.size() != kTileDescription)
+        throw std::runtime_error("its attribute tiles is damaged");
+      tiles = value;
+    } else if (known == nullptr) {
       if (!type.empty()) contents[static_cast<std::size_t>(type.data() - contents.data())] = '\1';
-    } else if (known->type != type || (known->size != 0 ? value.size() != known->size : !is_list_of_channels(value))) {
+    } else if (known->type != type || (known->size != 0 ? value.size() != known->size : !count_channels(value))) {
       throw std::runtime_error("its attribute " + std::string(name) + " is damaged");
     }
   }
+  if (tiled && tiles.empty()) throw std::runtime_error("its attribute tiles is missing");
+  if (tiled && !window.empty()) require_small_tiles(tiles, window, channels);
   return contents;
 }
 

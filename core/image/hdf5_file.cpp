@@ -5,7 +5,10 @@
 #include <hdf5.h>
 
 #include <algorithm>
+#include <filesystem>
+#include <mutex>
 #include <stdexcept>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/file.h"
@@ -100,25 +103,59 @@ bool is_number(hid_t dataset) {
   return kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_ENUM;
 }
 
+/// Keeps HDF5 from printing its errors while it lives.
+class QuietHdf5 {
+ public:
+  QuietHdf5() {
+    H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~QuietHdf5() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+  QuietHdf5(const QuietHdf5&) = delete;
+  QuietHdf5& operator=(const QuietHdf5&) = delete;
+
+ private:
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
+};
+
+void work_quietly(const std::function<void()>& work) {
+  static std::mutex one;
+  const std::scoped_lock lock(one);
+  const QuietHdf5 quiet;
+  work();
+}
+
+std::function<void(const std::function<void()>&)>& runner() {
+  static std::function<void(const std::function<void()>&)> run;
+  return run;
+}
+
 }  // namespace
 
 std::string to_text(const Hdf5Shape& shape) {
   return fmt::format("{}", fmt::join(shape, " x "));
 }
 
-QuietHdf5::QuietHdf5() {
-  // At exit HDF5 would complain of files that were too damaged to be closed. There is nothing left to be written then.
-  H5dont_atexit();
-  H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
-  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+void use_hdf5(const std::function<void()>& work) {
+  const std::function<void(const std::function<void()>&)>& run = runner();
+  run ? run([&] { work_quietly(work); }) : work_quietly(work);
 }
 
-QuietHdf5::~QuietHdf5() {
-  H5Eset_auto2(H5E_DEFAULT, function_, data_);
+void run_hdf5_by(std::function<void(const std::function<void()>&)> run) {
+  runner() = std::move(run);
+}
+
+void end_without_hdf5() {
+  H5dont_atexit();
 }
 
 Hdf5Reader::Hdf5Reader(const std::string& file) : file_(file) {
   std::string problem;
+  if (std::error_code ignored; !std::filesystem::exists(file, ignored))
+    fail(
+        "does not exist (a measurement has to be had first, and scripts/import_capture.py makes such files of it; see "
+        "\"Captures\" in experiments/README.md)");
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   if (rank_count() == 1) {
     if (!is_regular_file(file, problem)) fail(problem);
@@ -147,6 +184,13 @@ bool Hdf5Reader::has(const char* name) const {
   if (dataset.failed()) return false;  // a group
   const Handle space(H5Dget_space(dataset), H5Sclose);
   return H5Sget_simple_extent_type(space) != H5S_NULL;
+}
+
+bool Hdf5Reader::has_values(const char* name) const {
+  if (!has(name)) return false;
+  const Handle dataset = open_dataset(id_, name);
+  const Handle space(H5Dget_space(dataset), H5Sclose);
+  return H5Sget_simple_extent_npoints(space) > 0;
 }
 
 Hdf5Shape Hdf5Reader::shape(const char* name) const {

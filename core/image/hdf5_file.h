@@ -1,8 +1,9 @@
-// What `capture_file.cpp` needs of HDF5's C interface, so that no other file includes it. One thread at a time:
-// HDF5 is not safe for more.
+// What captures need of HDF5's C interface, so that no other file includes it. One thread at a time:
+// HDF5 is not safe for more, so that all is done within use_hdf5.
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <initializer_list>
 #include <string>
 #include <string_view>
@@ -16,18 +17,15 @@ using Hdf5Shape = std::vector<std::size_t>;
 /// "512 x 64 x 64"
 std::string to_text(const Hdf5Shape& shape);
 
-/// Keeps HDF5 from printing its errors while it lives.
-class QuietHdf5 {
- public:
-  QuietHdf5();
-  ~QuietHdf5();
-  QuietHdf5(const QuietHdf5&) = delete;
-  QuietHdf5& operator=(const QuietHdf5&) = delete;
+/// Does what uses HDF5 while no other thread of the program does, and HDF5 prints none of its errors. Passes exceptions on.
+void use_hdf5(const std::function<void()>& work);
 
- private:
-  int (*function_)(std::int64_t, void*) = nullptr;
-  void* data_ = nullptr;
-};
+/// Makes use_hdf5 run its work by `run`, for processes in which others use HDF5, too.
+void run_hdf5_by(std::function<void(const std::function<void()>&)> run);
+
+/// At exit HDF5 complains of files that were too damaged to be closed, though nothing is left to be written. Keeps it from
+/// that. For programs, before they use HDF5; a library leaves a process's exit alone.
+void end_without_hdf5();
 
 /// A file to be read. All errors are InputErrors that begin with the file's name. HDF5 1.10 finds out that a file was cut
 /// off, but may crash where bytes in its headers were overwritten.
@@ -40,6 +38,8 @@ class Hdf5Reader {
 
   /// Whether there is a dataset of that name. One without a value, which is how a missing one may be written, is none.
   bool has(const char* name) const;
+  /// Whether it has at least one value.
+  bool has_values(const char* name) const;
   /// Of a dataset that there must be.
   Hdf5Shape shape(const char* name) const;
   /// All values of a small dataset of numbers (integers and enumerations too), the last dimension running fastest.

@@ -33,7 +33,8 @@ GatedImage combined(const GatedImage& counts, int first, int each, int count) {
 
 }  // namespace
 
-std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene) {
+std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene,
+                                      const std::function<void(const std::string&)>& warning) {
   const std::string& file = experiment.target.capture;
   if (file.empty()) return std::nullopt;
   const auto fail = [&](const std::string& what, const std::string& allowed) {
@@ -41,6 +42,8 @@ std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene
   };
   if (!scene.capture) fail("a capture is the target of a scene with a camera", "a scene with `capture`");
   CaptureFile capture = read_capture(file);
+  if (warning)
+    for (const std::string& line : capture.assumed) warning(file + ": " + line);
   const GatedImage& counts = capture.counts;
   if (counts.width != scene.camera.width || counts.height != scene.camera.height)
     fail(fmt::format("{} x {} sensor points (columns, rows times spots)", counts.width, counts.height),

@@ -1,5 +1,6 @@
 // Histograms of captures: counts of a target's file for the experiment's bins, and readings written like them.
 #pragma once
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -11,8 +12,9 @@ namespace isochron {
 
 /// Counts of the file that the target names, for the bins of the experiment's gates, each of which holds one or several of the
 /// file's; gates without bins of their own get the file's. Empty where the target is none of a capture. Throws InputError where
-/// bins or sensor points do not fit.
-std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene);
+/// bins or sensor points do not fit. `warning`, unless empty, receives a line for what the file lacks.
+std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene,
+                                      const std::function<void(const std::string&)>& warning = {});
 
 /// Whether readings are histograms of a capture, so that write_histograms has something to write.
 bool has_histograms(const Experiment& experiment, const Scene& scene);

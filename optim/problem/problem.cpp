@@ -95,7 +95,7 @@ void set_loss(const LossEstimate& estimate, Evaluation& into) {
 Problem::Problem(Experiment experiment, const std::function<void(const std::string&)>& warning)
     : experiment_(std::move(experiment)),
       scene_(load_scene_at(experiment_)),
-      counts_(read_counts(experiment_, scene_)),
+      counts_(read_counts(experiment_, scene_, warning)),
       gates_(make_gates(experiment_.gates)),
       readings_(make_readings(experiment_, gates_, scene_.camera.width, scene_.camera.height,
                               scene_.capture ? scene_.camera.height / scene_.capture->rows : 1)),
@@ -103,6 +103,10 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       caster_update_(caster_update(experiment_, scene_)),
       cache_(std::make_unique<SceneCache>(scene_, caster_update_)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
+  if (counts_) {
+    settle_unused(*counts_, readings_, experiment_.target.capture);
+    require_usable(*counts_, experiment_.target.capture);
+  }
   const SampleSpec& samples = experiment_.samples;
   choice_ = {
       {samples.primal, samples.interior, samples.visibility, samples.path_length}, experiment_.seed, evaluations_};
@@ -127,6 +131,8 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       if (const std::string complaint = behind_wall(parameters_->apply(*theta)); !complaint.empty())
         throw InputError(experiment_.scene + ": " + complaint);
   if (!warning) return;
+  if (scene_.capture)
+    for (const std::string& line : scene_.capture->assumed) warning(scene_.capture->file + ": " + line);
   if (const std::string name = light_that_leaves_the_camera(); !name.empty())
     warning(fmt::format(
         "{}: light '{}' is where the camera is: as one of them moves alone, shadows open on one side, so that "

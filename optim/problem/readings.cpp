@@ -55,9 +55,23 @@ void require_counts(const GatedImage& target, const Readings& readings, const st
       if (const double value = target.data[i]; !(value >= 0) || !std::isfinite(value))
         throw InputError(
             fmt::format("{}: {} at column {}, row {}, gate {} is no count (loss.kind: poisson needs numbers "
-                        "of at least 0; target.mask and target.window leave readings out)",
+                        "of at least 0; target.mask and target.window leave readings out, scripts/import_capture.py "
+                        "--mask writes a mask of such points)",
                         what, value, pixel % target.width, pixel / target.width, i / target.channels % target.gates));
     });
+}
+
+void settle_unused(GatedImage& target, const Readings& readings, const std::string& what) {
+  for (int pixel = 0; pixel < target.pixels(); ++pixel)
+    for_each_reading(target, readings, pixel, [&](std::size_t i) {
+      if (!std::isfinite(target.data[i]))
+        throw InputError(fmt::format(
+            "{}: {} at column {}, row {}, gate {} (target.mask and target.window leave readings "
+            "out; scripts/import_capture.py --mask writes a mask of dead points)",
+            what, target.data[i], pixel % target.width, pixel / target.width, i / target.channels % target.gates));
+    });
+  for (double& value : target.data)
+    if (!std::isfinite(value)) value = 0;
 }
 
 }  // namespace isochron

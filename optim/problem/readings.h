@@ -37,4 +37,8 @@ Readings make_readings(const Experiment& experiment, const GateSet& gates, int w
 /// Throws InputError, which begins with `what`, where a reading that counts is no count: negative or not finite.
 void require_counts(const GatedImage& target, const Readings& readings, const std::string& what);
 
+/// Throws InputError, which begins with `what`, where a reading that counts is not finite; those that do not count become
+/// zero, so that nothing else meets them.
+void settle_unused(GatedImage& target, const Readings& readings, const std::string& what);
+
 }  // namespace isochron

@@ -1,4 +1,5 @@
-"""Arrays of MATLAB (5 and 7.3) and NumPy files, with their axes in the order of the program that wrote them."""
+"""Arrays of MATLAB (5 and 7.3), HDF5 and NumPy files, with their axes in the order of the program that wrote them: HDF5 is taken to
+be MATLAB's."""
 
 import warnings
 import zipfile
@@ -6,6 +7,7 @@ import zipfile
 import h5py
 import numpy as np
 import scipy.io
+import scipy.sparse
 from isochron.captures import CaptureError
 
 
@@ -28,6 +30,8 @@ class Arrays:
         member = self.members[name]
         if not slices:
             slices = (slice(None),) * member.ndim
+        if scipy.sparse.issparse(member):
+            member = member.toarray()
         # MATLAB stores the first axis fastest, HDF5 names the fastest last.
         part = member[slices[::-1]].T if isinstance(member, h5py.Dataset) else member[slices]
         if part.dtype.kind not in "biuf":
@@ -51,24 +55,34 @@ class Arrays:
         return names[0]
 
 
+def _sparse(group):
+    """MATLAB 7.3 keeps the columns of a sparse matrix: where each begins, and the rows and values of what is not zero."""
+    starts = group["jc"][()]
+    shape = int(group.attrs["MATLAB_sparse"]), len(starts) - 1
+    if "data" not in group:
+        return scipy.sparse.csc_matrix(shape)
+    return scipy.sparse.csc_matrix((group["data"][()], group["ir"][()], starts), shape)
+
+
 def _matlab(path):
     if h5py.is_hdf5(path):  # version 7.3, with or without the header that MATLAB writes before it
         file = h5py.File(path, "r")
-        members = {name: member for name, member in file.items() if isinstance(member, h5py.Dataset)}
+        members = {name: member for name, member in file.items() if isinstance(member, h5py.Dataset) and member.shape is not None}
+        members |= {name: _sparse(member) for name, member in file.items() if "MATLAB_sparse" in member.attrs}
     else:
         members = scipy.io.loadmat(path)
     return {n: m for n, m in members.items() if not n.startswith("__")}
 
 
 def open_arrays(path):
-    """The arrays of a .mat, .npy or .npz file."""
+    """The arrays of a .mat, .hdf5, .h5, .npy or .npz file."""
     readers = {
-        ".mat": _matlab,
+        **dict.fromkeys((".mat", ".hdf5", ".h5"), _matlab),
         ".npy": lambda p: {"array": np.load(p, mmap_mode="r")},
         ".npz": lambda p: dict(np.load(p)),
     }
     if path.suffix not in readers:
-        raise CaptureError(f"{path}: not a file of MATLAB or NumPy (.mat, .npy, .npz)")
+        raise CaptureError(f"{path}: not a file of MATLAB, HDF5 or NumPy (.mat, .hdf5, .h5, .npy, .npz)")
     try:
         path.open("rb").close()  # the readers do not all say why it fails
         with warnings.catch_warnings():

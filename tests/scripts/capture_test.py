@@ -194,8 +194,8 @@ samples: {primal: 256, interior: 256, visibility: 0, path_length: 0}
             del file["H"]
             file["H"] = h
 
-        for change, words in ((set_counts(-1), "no number of photons"), (set_counts(np.nan), "no number of photons"), (without("H"), "H"),
-                              (without("delta_t"), "delta_t"), (reshaped, "sensor grid")):
+        for change, words in ((set_counts(-1), "is no count (loss.kind: poisson"), (set_counts(np.nan), "target.mask"),
+                              (without("H"), "H"), (without("delta_t"), "delta_t"), (reshaped, "sensor grid")):
             self.counts(rendered, change)
             done, _ = self.fit()
             lines = done.stderr.strip().split("\n")

@@ -218,7 +218,7 @@ class ImportTest(unittest.TestCase):
         self.save("a.npy", a=numbered(3, 2, 6))
         good = ("--bin-ps", 4, "--width", 1)
         self.assert_fails("none.mat: cannot be read: No such file", "none.mat")
-        self.assert_fails(r"not a file of MATLAB or NumPy \(.mat, .npy, .npz\)", "a.txt")
+        self.assert_fails(r"not a file of MATLAB, HDF5 or NumPy \(.mat, .hdf5, .h5, .npy, .npz\)", "a.txt")
         for name in ("bad.mat", "bad.npy", "bad.npz"):
             (self.folder / name).write_bytes(b"neither of them" * 50)
             self.assert_fails(f"{name}: cannot be read: ", name)

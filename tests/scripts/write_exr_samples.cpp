@@ -1,9 +1,11 @@
 // Writes small EXR files with OpenEXR itself, for exr_test.py to try the scripts' reader on: per compression,
-// one with smooth and one with incompressible pixels.
+// one with smooth and one with incompressible pixels, each in scanlines and in tiles.
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
 #include <OpenEXR/ImfOutputFile.h>
+#include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfTiledOutputFile.h>
 
 #include <cstdint>
 #include <cstring>
@@ -25,7 +27,7 @@ float pixel(bool smooth, int channel, int x, int y) {
   return value;
 }
 
-void write(const std::string& file, Imf::Compression compression, bool smooth) {
+void write(const std::string& file, Imf::Compression compression, bool smooth, bool tiled) {
   const std::vector<std::string> names = {"gate000.Y", "interior.gate001.Y", "path_length.gate010.with.a.long.name.Y"};
   Imf::Header header(kWidth, kHeight);
   header.compression() = compression;
@@ -38,6 +40,14 @@ void write(const std::string& file, Imf::Compression compression, bool smooth) {
     header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
     buffer.insert(names[c], Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(values.data()), sizeof(float),
                                        sizeof(float) * kWidth));
+  }
+  if (tiled) {
+    header.setTileDescription(Imf::TileDescription(8, 16, Imf::MIPMAP_LEVELS));
+    Imf::TiledOutputFile out(file.c_str(), header);
+    out.setFrameBuffer(buffer);
+    for (int level = 0; level < out.numLevels(); ++level)
+      out.writeTiles(0, out.numXTiles(level) - 1, 0, out.numYTiles(level) - 1, level);
+    return;
   }
   Imf::OutputFile out(file.c_str(), header);
   out.setFrameBuffer(buffer);
@@ -52,8 +62,10 @@ int main(int argc, char** argv) {
   const std::map<std::string, Imf::Compression> compressions = {
       {"none", Imf::NO_COMPRESSION}, {"zips", Imf::ZIPS_COMPRESSION}, {"zip", Imf::ZIP_COMPRESSION}};
   for (const auto& [name, compression] : compressions) {
-    write(directory + "/" + name + "_smooth.exr", compression, true);
-    write(directory + "/" + name + "_rough.exr", compression, false);
+    for (const bool tiled : {false, true})
+      for (const bool smooth : {false, true})
+        write(directory + "/" + name + (smooth ? "_smooth" : "_rough") + (tiled ? "_tiles.exr" : ".exr"), compression,
+              smooth, tiled);
   }
   return 0;
 }

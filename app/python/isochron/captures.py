@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import os
 import pathlib
+import warnings
 from collections.abc import Iterator
 from typing import Any
 
@@ -39,21 +40,65 @@ class Capture:
     """Where the first bin begins, as optical path."""
     origins: tuple[np.ndarray, np.ndarray] | None
     """Of laser and sensor, where the ways from and to there count in the optical path; else None."""
+    laser_normals: np.ndarray | None = None
+    """[Lx, Ly, xyz]"""
+
+
+def _find(file: h5py.File, name: str) -> np.ndarray | None:
+    """A dataset's values; None where it is missing or empty, which is how tal writes what is unknown."""
+    if name not in file or not isinstance(file[name], h5py.Dataset) or not file[name].size:
+        return None
+    return np.asarray(file[name][()])
+
+
+def _plane_normal(points: np.ndarray, origins: tuple[np.ndarray, np.ndarray] | None) -> np.ndarray | None:
+    """As the program takes it, see core/image/capture_file.h."""
+    flat = np.asarray(points, float).reshape(-1, 3)
+    extents, axes = np.linalg.svd(flat - flat.mean(axis=0), full_matrices=False)[1:]
+    if len(extents) < 3 or not extents[1] > 1e-5 * extents[0]:
+        return None
+    normal = axes[2] * np.sign(axes[2][np.abs(axes[2]).argmax()])
+    for origin in (origins or ())[::-1]:
+        way = np.asarray(origin, float).reshape(3) - flat[0]
+        if abs(way @ normal) > 1e-3 * np.linalg.norm(way):
+            return np.asarray(normal * np.sign(way @ normal))
+    return np.asarray(normal)
+
+
+def _normals(file: h5py.File, name: str, points: np.ndarray, origins: tuple[np.ndarray, np.ndarray] | None,
+             wall: np.ndarray | None = None) -> np.ndarray:
+    """The file's, or those of the plane that the points span, or else of `wall`."""
+    normals = _find(file, name)
+    if normals is not None:
+        return normals
+    normal = _plane_normal(points, origins)
+    normal = wall if normal is None else normal
+    if normal is None:
+        raise ValueError(f"{name} is missing, and the points span no plane")
+    warnings.warn(f"{file.filename}: {name} is missing: the wall is taken as the plane of the points", stacklevel=3)
+    return np.broadcast_to(normal, np.shape(points))
 
 
 def read_capture(path: Any) -> Capture:
-    """A measurement, or a rendering of one such as a run's final.h5. Raises CaptureError."""
+    """A measurement, or a rendering of one such as a run's final.h5. What is missing is taken as the program takes it, with a
+    warning. Raises CaptureError."""
     try:
         with h5py.File(path, "r") as file:
             counted = bool(file["t_accounts_first_and_last_bounces"][()])
+            origins = (file["laser_xyz"][()], file["sensor_xyz"][()]) if counted else None
+            points, laser, start = file["sensor_grid_xyz"][()], _find(file, "laser_grid_xyz"), _find(file, "t_start")
+            normals = _normals(file, "sensor_grid_normals", points, origins)
+            if start is None:
+                warnings.warn(f"{path}: t_start is missing: taken as 0", stacklevel=2)
             return Capture(
                 counts=np.asarray(file["H"][()], np.float32),
-                points=file["sensor_grid_xyz"][()],
-                normals=file["sensor_grid_normals"][()],
-                laser=file["laser_grid_xyz"][()] if "laser_grid_xyz" in file else None,
+                points=points,
+                normals=normals,
+                laser=laser,
                 delta_t=float(file["delta_t"][()]),
-                t_start=float(file["t_start"][()]),
-                origins=(file["laser_xyz"][()], file["sensor_xyz"][()]) if counted else None,
+                t_start=0.0 if start is None else float(start.reshape(-1)[0]),
+                origins=origins,
+                laser_normals=None if laser is None else _normals(file, "laser_grid_normals", laser, origins, normals.reshape(-1, 3)[0]),
             )
     except (OSError, KeyError, ValueError, TypeError) as error:
         reason = str(error).strip("'\"").splitlines()[0]
@@ -85,24 +130,39 @@ def write_response(path: pathlib.Path, offsets: np.ndarray, values: np.ndarray) 
         temporary.write_text("offset,value\n" + "".join(lines), encoding="ascii")
 
 
+def write_array(path: pathlib.Path, values: np.ndarray) -> None:
+    """A NumPy file, such as the mask of a target. Raises CaptureError."""
+    with _temporary(pathlib.Path(path)) as temporary, open(temporary, "wb") as file:
+        np.save(file, values)
+
+
 def write_capture(path: Any, counts: np.ndarray, delta_t: float, t_start: float, points: np.ndarray, normal: Any, laser: Any = None,
-                  original_format: str = "arrays") -> None:
-    """A measurement that experiments can read. counts [bin, Sx, Sy]; points [Sx, Sy, xyz] in metres, as are the bins' width and
-    start (optical path); normal: of the wall, or [Sx, Sy, xyz]; laser is one point, or None: confocal. Raises CaptureError."""
+                  original_format: str = "arrays", *, laser_normal: Any = None, origins: Any = None) -> None:
+    """A measurement that experiments can read. counts [bin, Sx, Sy], of several spots [bin, Lx, Ly, Sx, Sy]; points [Sx, Sy, xyz] in
+    metres, as are the bins' width and start (optical path); normal: of the wall, or [Sx, Sy, xyz]; laser is one point,
+    [Lx, Ly, xyz], or None: confocal; laser_normal like `normal`, which it is where it is None; origins of laser and sensor, where
+    times include the ways from and to there. Raises CaptureError."""
     path = pathlib.Path(path)
-    grid = points if laser is None else np.asarray(laser, float).reshape(1, 1, 3)
+    spots = points if laser is None else np.asarray(laser, float).reshape(np.shape(laser) if np.ndim(laser) == 3 else (1, 1, 3))
+    several = np.ndim(counts) == 5
+    expected = (*spots.shape[:2], *points.shape[:2]) if several else points.shape[:2]
+    if np.shape(counts)[1:] != expected or (several and laser is None) or (not several and laser is not None and spots.size != 3):
+        raise CaptureError(f"{path}: counts of {np.shape(counts)} do not fit {points.shape[:2]} points and {spots.shape[:2]} spots")
+    if laser_normal is None:
+        wall = np.asarray(normal, float)
+        laser_normal = wall if laser is None or wall.ndim == 1 else wall.reshape(-1, 3)[0]
     # In memory: where a disk is full, HDF5 fails in ways that cannot be caught.
     with h5py.File("capture", "w", driver="core", backing_store=False) as file:
         file.create_dataset("H", data=counts, dtype="f4", compression="gzip", shuffle=True)
-        _write_enumeration(file, "H_format", H_FORMATS, "T_Sx_Sy")
-        for name, xyz in (("sensor", points), ("laser", grid)):
+        _write_enumeration(file, "H_format", H_FORMATS, "T_Lx_Ly_Sx_Sy" if several else "T_Sx_Sy")
+        for name, xyz, of_wall in (("sensor", points, normal), ("laser", spots, laser_normal)):
             file[f"{name}_grid_xyz"] = xyz
-            file[f"{name}_grid_normals"] = np.broadcast_to(np.asarray(normal, float), xyz.shape)
+            file[f"{name}_grid_normals"] = np.broadcast_to(np.asarray(of_wall, float), xyz.shape)
             _write_enumeration(file, f"{name}_grid_format", GRID_FORMATS, "X_Y_3")
-            file[f"{name}_xyz"] = np.zeros(3)
+        file["laser_xyz"], file["sensor_xyz"] = (np.zeros(3), np.zeros(3)) if origins is None else origins
         file["delta_t"] = delta_t
         file["t_start"] = t_start
-        file["t_accounts_first_and_last_bounces"] = False
+        file["t_accounts_first_and_last_bounces"] = origins is not None
         file["scene_info"] = f"{{original_format: {original_format}}}"
         file.flush()
         image = file.id.get_file_image()

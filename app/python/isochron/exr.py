@@ -1,7 +1,7 @@
-"""A small reader and writer of OpenEXR files: single-part scanline images, NO, ZIPS or ZIP compression.
+"""A small reader and writer of OpenEXR files: single-part images in scanlines or tiles, NO, ZIPS or ZIP compression.
 
-Follows the OpenEXR documentation ("OpenEXR File Layout"). Samples are 32-bit floats; halves and 32-bit
-integers are read too.
+Of tiled images with several resolutions the finest is read. Follows the OpenEXR documentation ("OpenEXR File Layout"). Samples are
+32-bit floats; halves and 32-bit integers are read too.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def _header(data):
     if len(data) < 8 or struct.unpack_from("<I", data)[0] != MAGIC:
         raise ExrError("not an OpenEXR file")
     version = struct.unpack_from("<I", data, 4)[0]
-    if version & 0x1A00:
-        raise ExrError("tiled, deep and multi-part files are not supported")
+    if version & 0x1800:
+        raise ExrError("deep and multi-part files are not supported")
     attributes, position = {}, 8
     while data[position] != 0:
         name, position = _text(data, position)
@@ -73,6 +73,26 @@ def _inflate(block, size):
     return out.tobytes()
 
 
+def _blocks(data, position, width, height, step):
+    """Of scanlines: first column and row, columns, rows, and the stored pixels of each block."""
+    for start in struct.unpack_from(f"<{-(-height // step)}Q", data, position):
+        y, size = struct.unpack_from("<ii", data, start)
+        yield 0, y, width, step, data[start + 8 : start + 8 + size]
+
+
+def _tiles(data, position, width, height, tiles):
+    """The same of the tiles of the finest level, whose offsets come first."""
+    across, down = struct.unpack_from("<II", tiles)
+    if not across or not down:
+        raise ExrError("tiles without pixels")
+    count = -(-width // across) * -(-height // down)
+    for start in struct.unpack_from(f"<{count}Q", data, position):
+        x, y, level_x, level_y, size = struct.unpack_from("<iiiii", data, start)
+        if (level_x, level_y) != (0, 0):
+            raise ExrError("a tile is of another level than its place says")
+        yield x * across, y * down, min(across, width - x * across), down, data[start + 20 : start + 20 + size]
+
+
 def _parse(data):
     attributes, position = _header(data)
     channels = _channels(attributes["channels"])
@@ -81,25 +101,25 @@ def _parse(data):
         raise ExrError(f"compression {compression} is not supported; allowed: none, ZIPS, ZIP")
     x0, y0, x1, y1 = struct.unpack("<iiii", attributes["dataWindow"])
     width, height = x1 - x0 + 1, y1 - y0 + 1
-    step = LINES_PER_BLOCK[compression]
-    blocks = -(-height // step)
-    bytes_per_line = width * sum(kind.itemsize for _, kind in channels)
     images = {name: np.empty((height, width), dtype=kind.newbyteorder("=")) for name, kind in channels}
-    for start in struct.unpack_from(f"<{blocks}Q", data, position):
-        y, size = struct.unpack_from("<ii", data, start)
-        row = y - y0
-        if not 0 <= row < height:
+    if struct.unpack_from("<I", data, 4)[0] & 0x200:
+        blocks = _tiles(data, position, width, height, attributes["tiles"])
+    else:
+        # Rows of scanlines are numbered by the data window, those of tiles from its first.
+        blocks = ((x, y - y0, *rest) for x, y, *rest in _blocks(data, position, width, height, LINES_PER_BLOCK[compression]))
+    for column, row, columns, lines, block in blocks:
+        if not 0 <= row < height or not 0 <= column < width:
             raise ExrError("a block of pixels lies outside the image")
-        lines = min(step, height - row)
-        block = data[start + 8 : start + 8 + size]
+        lines = min(lines, height - row)
+        size = lines * columns * sum(kind.itemsize for _, kind in channels)
         # A block that compression would have made larger is stored as it is.
-        if compression and size < lines * bytes_per_line:
-            block = _inflate(block, lines * bytes_per_line)
+        if compression and len(block) < size:
+            block = _inflate(block, size)
         at = 0
         for line in range(lines):
             for name, kind in channels:
-                images[name][row + line] = np.frombuffer(block, kind, width, at)
-                at += width * kind.itemsize
+                images[name][row + line, column : column + columns] = np.frombuffer(block, kind, columns, at)
+                at += columns * kind.itemsize
     return images
 
 

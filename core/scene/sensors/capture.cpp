@@ -103,6 +103,7 @@ Capture read_capture_of(const std::string& file) {
   const CaptureGeometry g = read_capture_geometry(file);
   Capture capture;
   capture.file = file;
+  capture.assumed = g.assumed;
   capture.columns = g.columns;
   capture.rows = g.rows;
   capture.sensor = wall_points(g.sensor, g.sensor_normal);

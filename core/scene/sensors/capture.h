@@ -28,6 +28,7 @@ struct Capture {
     Vec3 laser, sensor;
   };
   std::optional<Origin> origin;
+  std::vector<std::string> assumed;  ///< lines of what the file of the geometry lacks and what is taken in its place
 
   bool confocal() const { return spots.empty(); }
   /// Images have the grid's columns, and its rows once for each spot.
