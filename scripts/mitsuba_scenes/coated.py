@@ -27,6 +27,22 @@ def index_of(reflected):
     return (1 + root) / (1 - root)
 
 
+def internal_reflectance(ior):
+    """The share of a base's diffuse light that a smooth coat sends back to it."""
+    cosine = (np.arange(4096) + 0.5) / 4096
+    refracted = np.sqrt(ior**2 - 1 + cosine**2)
+    across, along = (cosine - refracted) / (cosine + refracted), (ior**2 * cosine - refracted) / (ior**2 * cosine + refracted)
+    from_outside = np.mean((across**2 + along**2) * cosine)
+    return 1 - (1 - from_outside) / ior**2
+
+
+def base_albedo(reflectance, ior):
+    """Our base that looks like one of Mitsuba's without `nonlinear`: there reflections from inside are as many as white has, and
+    reflectance / (1 - F) = albedo / (1 - albedo F)."""
+    inside = internal_reflectance(ior)
+    return reflectance / (1 - inside + reflectance * inside)
+
+
 class Coated:
     """`materials`: what it shares with the other materials."""
 
@@ -36,10 +52,12 @@ class Coated:
     def plastic(self, node, sides):
         albedo = self.colours.reflectance(node, "diffuse_reflectance", 0.5)
         gloss = self.colours.reflectance(node, "specular_reflectance", 1.0)
-        node.ignore("nonlinear", "specular_sampling_weight")
+        node.ignore("specular_sampling_weight")
         inside, outside = self.materials.ior(node, "int_ior", "polypropylene"), self.materials.ior(node, "ext_ior", "air")
         if not inside > outside > 0:
             node.fail(f"int_ior {inside:g} and ext_ior {outside:g} make no coat", "int_ior")
+        if not node.boolean("nonlinear"):
+            albedo = base_albedo(albedo, inside / outside)
         return text(albedo, self.materials.roughness(node), inside / outside, gloss, sides)
 
     def phong(self, node, sides):

@@ -167,8 +167,17 @@ class MaterialsTest(FieldTest):
                                delta=0.08)
 
     def test_plastic(self):
-        self.assertEqual(self.material('<bsdf type="plastic"/>'), {
-            "type": "plastic", "albedo": 0.5, "roughness": 0.05, "ior": round(1.49 / 1.000277, 8), "reflectance": 1})
+        found = self.material('<bsdf type="plastic"/>')
+        # The base that is as bright as Mitsuba's, whose light is reflected inside as if it were white: by Walsh's closed form.
+        n = 1.49 / 1.000277
+        outside = (0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) ** 2) +
+                   n**2 * (n**2 - 1) ** 2 / (n**2 + 1) ** 3 * np.log((n - 1) / (n + 1)) -
+                   2 * n**3 * (n**2 + 2 * n - 1) / ((n**2 + 1) * (n**4 - 1)) +
+                   8 * n**4 * (n**4 + 1) / ((n**2 + 1) * (n**4 - 1) ** 2) * np.log(n))
+        inside = 1 - (1 - outside) / n**2
+        albedo = found.pop("albedo")
+        self.assertAlmostEqual(albedo / (1 - albedo * inside), 0.5 / (1 - inside), delta=1e-6)
+        self.assertEqual(found, {"type": "plastic", "roughness": 0.05, "ior": round(n, 8), "reflectance": 1})
         self.assertIn("no smooth surfaces here; with the roughness 0.05 (--smooth)", self.said)
         rough = self.material("""<bsdf type="twosided"><bsdf type="roughplastic"><float name="alpha" value="0.2"/>
           <string name="distribution" value="ggx"/><rgb name="diffuse_reflectance" value="0.1 0.2 0.3"/>
