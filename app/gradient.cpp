@@ -13,9 +13,24 @@
 #include "optim/problem/estimates.h"
 #include "optim/problem/heavy_tail.h"
 #include "optim/problem/memory.h"
+#include "optim/run/zero_gradient.h"
 
 namespace isochron {
 namespace {
+
+/// The gradient of the first unknowns of each parameter, with standard errors.
+std::string on_screen(const Parameters& parameters, const Statistics& gradient) {
+  constexpr int kMostRows = 4;
+  std::string text;
+  for (const Parameters::Block& block : parameters.blocks()) {
+    const int shown = block.count > kMostRows ? kMostRows - 1 : block.count;
+    for (int i = block.begin; i < block.begin + shown; ++i)
+      text += fmt::format("  {}: {:.5g} +- {:.2g}\n", parameters.component_names()[i], gradient.mean[i],
+                          gradient.standard_error[i]);
+    if (shown < block.count) text += fmt::format("  {}: {} more\n", block.name, block.count - shown);
+  }
+  return text;
+}
 
 int gradient(const CommonOptions& options) {
   begin_session(options);
@@ -54,6 +69,9 @@ int gradient(const CommonOptions& options) {
   write_file_atomically(folder + "/gradient.yaml", fmt::format("seconds: {}\nthreads: {}\nrepeats: {}\n", seconds,
                                                                thread_count(options), estimate.gradient.replicates));
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
+  if (!options.quiet)
+    fmt::print("{}{}", on_screen(parameters, estimate.gradient),
+               zero_gradient_report(parameters, estimate.gradient.mean));
   say_written(folder, {"gradient.csv", "gradient.yaml"});
   return 0;
 }

@@ -65,6 +65,19 @@ void remove_entry(YAML::Node& list, std::size_t index) {
   list = shorter;
 }
 
+/// The entry of a list of maps that has this name.
+std::size_t named_entry(const YAML::Node& list, const std::string& name, const std::string& source) {
+  std::string names;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const YAML::Node found = list[i].IsMap() ? list[i]["name"] : YAML::Node();
+    if (!found.IsDefined() || !found.IsScalar()) continue;
+    if (found.Scalar() == name) return i;
+    names += (names.empty() ? "" : ", ") + found.Scalar();
+  }
+  throw InputError(fmt::format("{}: there is no entry of the name '{}' (allowed: {})", source, name,
+                               names.empty() ? "a number in brackets, as in [0]" : names + ", or a number as in [0]"));
+}
+
 }  // namespace
 
 std::string one_line(std::string text) {
@@ -123,18 +136,20 @@ void apply_override(YAML::Node node, const std::string& text, std::vector<std::s
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
     const bool last = i + 1 == steps.size();
-    here += step.index ? fmt::format("[{}]", *step.index) : (i > 0 ? "." : "") + step.key;
+    const std::optional<std::size_t> index =
+        !step.index && node.IsSequence() ? std::optional(named_entry(node, step.key, source)) : step.index;
+    here += index ? fmt::format("[{}]", *index) : (i > 0 ? "." : "") + step.key;
     YAML::Node next;
-    if (step.index) {
-      if (!node.IsSequence() || *step.index >= node.size())
-        throw InputError(fmt::format("{}: there is no entry {} (the list has {})", source, *step.index,
+    if (index) {
+      if (!node.IsSequence() || *index >= node.size())
+        throw InputError(fmt::format("{}: there is no entry {} (the list has {})", source, *index,
                                      node.IsSequence() ? node.size() : 0));
       if (last && removes) {
-        remove_entry(node, *step.index);
+        remove_entry(node, *index);
         return;
       }
-      if (last) node[*step.index] = value;
-      next.reset(node[*step.index]);
+      if (last) node[*index] = value;
+      next.reset(node[*index]);
     } else {
       if (!node.IsMap())
         throw InputError(fmt::format("{}: '{}' is looked for in {}, not in a map", source, step.key, describe(node)));
@@ -155,7 +170,7 @@ void apply_override(YAML::Node node, const std::string& text, std::vector<std::s
     }
     node.reset(next);
   }
-  overridden.push_back(path);
+  overridden.push_back(here);
 }
 
 }  // namespace isochron

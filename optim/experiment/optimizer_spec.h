@@ -27,16 +27,26 @@ struct RateDecay {
   }
 };
 
+inline constexpr int kStopOfMethod = -1;
+
 struct OptimizerSpec {
   OptimizerMethod method = OptimizerMethod::adam;
   /// adam: scales of the parameter (ParameterSpec::scale) per iteration. lbfgs: length of the first trial step, same unit.
   /// levenberg_marquardt, quasi_newton: without meaning.
   double learning_rate = 0.02;
   int iterations = 100;
-  double tolerance = 0;      ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
-  int stop_window = 0;       ///< converged once the loss has settled over so many iterations (safeguard.h); 0: never
-  RateDecay decay = {};      ///< adam
-  int inner_iterations = 5;  ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
+  double tolerance = 0;  ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
+  int stop_window = kStopOfMethod;  ///< see window()
+  RateDecay decay = {};             ///< adam
+  int inner_iterations = 5;         ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
+
+  /// Converged once the loss has settled over so many iterations (safeguard.h); 0: never. Unless given: 5 where an iteration
+  /// solves the problem of its own random numbers, so that of ten without a visible fall none found more than noise. Never for
+  /// adam, whose losses may lie on a plateau for as long as they like before they fall.
+  int window() const {
+    constexpr int kSolvingWindow = 5;
+    return stop_window != kStopOfMethod ? stop_window : method == OptimizerMethod::adam ? 0 : kSolvingWindow;
+  }
 };
 
 inline void describe(Keys& keys, OptimizerSpec& optimizer) {
@@ -49,13 +59,15 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   keys.value("tolerance", field::non_negative(optimizer.tolerance),
              "converged once the images' RMSE is at most this; 0: never", {.unit = "RMS of the target"});
   const auto stop = [&](Keys& inner) {
-    // Two losses are the least that have a standard error.
-    inner.value("window", field::integer(optimizer.stop_window, 2, 100000), "iterations that are averaged",
+    inner.value("window", field::integer(optimizer.stop_window, 0, 100000), "iterations that are averaged; 0: never",
                 {.required = true});
+    inner.check([&](const YamlValue& value) {
+      if (optimizer.stop_window == 1) value.fail("a window of 1 has no standard error", "window: 0, or at least 2");
+    });
   };
   keys.map("stop", stop,
            "converged once the loss falls by less than its standard error; the result is the mean over the last window",
-           {.unset = optimizer.stop_window == 0});
+           {.unset = optimizer.stop_window == kStopOfMethod, .otherwise = "`{window: 5}`; adam: never"});
   RateDecay& decay = optimizer.decay;
   const auto halving = [&](Keys& inner) {
     inner.value("half_life", field::positive(decay.half_life), "iterations after which steps are half as long",

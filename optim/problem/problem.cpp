@@ -13,7 +13,6 @@
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
 #include "optim/problem/loss.h"
-#include "optim/problem/photon_noise.h"
 
 namespace isochron {
 namespace {
@@ -237,57 +236,6 @@ GatedImage Problem::render(const std::vector<double>& theta, const Stream& strea
 
 Renderer Problem::renderer(const Scene& scene, const EstimatorOptions& options, const TangentBasis* basis) const {
   return Renderer(scene, gates_, options, basis, cache_.get());
-}
-
-GatedImage Problem::read_target(const std::string& file) const {
-  GatedImage image = read_exr(file);
-  const Camera& camera = scene_.camera;
-  const auto require = [&](bool equal, const std::string& found, const std::string& wanted) {
-    if (!equal)
-      throw InputError(fmt::format("{}: {} in the target images (the experiment has {})", file, found, wanted));
-  };
-  require(image.width == camera.width && image.height == camera.height,
-          fmt::format("{} x {} pixels", image.width, image.height),
-          fmt::format("{} x {}", camera.width, camera.height));
-  require(image.gates == gates_.size(), fmt::format("{} gates", image.gates), fmt::format("{}", gates_.size()));
-  const int channels = scene_.grey ? 1 : 3;
-  require(image.channels == channels, image.channels == 1 ? "one grey channel (Y)" : "three channels (R, G, B)",
-          channels == 1 ? "one grey channel, Y" : "three channels, R, G and B");
-  require_usable(image, file);
-  return image;
-}
-
-GatedImage Problem::render_in_parts(const std::vector<double>& theta, const EstimatorOptions& options,
-                                    const Stream& stream, int samples, const std::string& name,
-                                    const Poll& poll) const {
-  const int parts = std::min(32, samples);
-  const Scene scene = parameters_->apply(theta);
-  const Renderer renderer(scene, gates_, options);
-  ImageMean mean;
-  ProgressStage stage(name, parts);
-  for (int i = 0; i < parts; ++i) {
-    const SampleRange range = Share{i, parts}.of(samples);
-    mean.add(renderer.render(stream, range), range.count());
-    stage.advance();
-    poll();
-  }
-  return mean.mean();
-}
-
-GatedImage Problem::make_target(const Poll& poll) const {
-  const TargetSpec& target = experiment_.target;
-  if (!target.images.empty()) return read_target(target.images);
-  if (counts_) return *counts_;
-  const Stream stream{target.seed, 0, pass_number(Pass::target)};
-  EstimatorOptions options = estimator();
-  options.max_bounces = target.max_bounces;
-  GatedImage image =
-      render_in_parts(parameters_->target(), options, stream, target.samples, "rendering the target", poll);
-  const Stream noise{target.seed, 0, pass_number(Pass::photon_noise)};
-  if (target.photons > 0) add_photon_noise(image, target.photons, noise);
-  if (target.counts) draw_counts(image, noise);
-  require_usable(image, experiment_.file + ": target");
-  return image;
 }
 
 void Problem::require_usable(const GatedImage& target, const std::string& what) const {

@@ -107,6 +107,11 @@ class Problem {
   GatedImage render_in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
                              int samples, const std::string& stage, const Poll& poll) const;
 
+  /// The same in two halves, where there are two samples.
+  SplitImage render_halves_in_parts(const std::vector<double>& theta, const EstimatorOptions& options,
+                                    const Stream& stream, int samples, const std::string& stage,
+                                    const Poll& poll) const;
+
   /// A renderer of a scene that parameters() made. Scene and basis must outlive it.
   Renderer renderer(const Scene& scene, const EstimatorOptions& options, const TangentBasis* basis = nullptr) const;
 
@@ -156,6 +161,11 @@ class Problem {
                                SampleRange range) const;
 
  private:
+  /// Renders `samples` in parts: use(image, samples, index of the part of so many).
+  template <class F>
+  void render_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
+                    int samples, const std::string& stage, const Poll& poll, F&& use) const;
+
   /// The name of a light at the camera that parameters move away from it; empty where there is none.
   std::string light_that_leaves_the_camera() const;
 

@@ -6,18 +6,29 @@
 #include <iterator>
 
 namespace isochron {
+namespace {
+
+bool reaches(double value, double bound, bool upper) {
+  constexpr double kRounding = 1e-12;  // of a mean over some hundred rows, relative to the bound
+  const double beyond = upper ? value - bound : bound - value;
+  return std::isfinite(bound) && beyond >= -kRounding * std::abs(bound);
+}
+
+}  // namespace
+
+bool is_at_bound(const Parameters& parameters, const std::vector<double>& theta, std::size_t i) {
+  return reaches(theta[i], parameters.lower()[i], false) || reaches(theta[i], parameters.upper()[i], true);
+}
 
 std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vector<double>& theta) {
   constexpr std::size_t kMostIndices = 10;
-  constexpr double kRounding = 1e-12;  // of a mean over some hundred rows, relative to the bound
   std::vector<AtBound> found;
   for (const Parameters::Block& block : parameters.blocks())
     for (const bool upper : {false, true}) {
       AtBound at{block.name, upper, 0, 0, block.count, {}};
       for (int i = 0; i < block.count; ++i) {
         const double bound = (upper ? parameters.upper() : parameters.lower())[block.begin + i];
-        const double beyond = upper ? theta[block.begin + i] - bound : bound - theta[block.begin + i];
-        if (!std::isfinite(bound) || !(beyond >= -kRounding * std::abs(bound))) continue;
+        if (!reaches(theta[block.begin + i], bound, upper)) continue;
         if (at.count++ == 0) at.bound = bound;
         if (at.first.size() < kMostIndices) at.first.push_back(i);
       }

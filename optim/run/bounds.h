@@ -16,8 +16,10 @@ struct AtBound {
   std::vector<int> first;  ///< indices within the parameter, rising; 10 at most
 };
 
-/// In the order of the parameters, lower bounds first. A mean of values that all lay on a bound counts, though it may have been
-/// rounded off it.
+/// Whether unknown i lies on its lower or upper bound. A mean of values that all did counts, though it may have been rounded off it.
+bool is_at_bound(const Parameters& parameters, const std::vector<double>& theta, std::size_t i);
+
+/// In the order of the parameters, lower bounds first.
 std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vector<double>& theta);
 
 /// A line for each, indented by two blanks: `gain ended at its lower bound 0.01`.

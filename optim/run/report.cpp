@@ -10,6 +10,7 @@
 #include <iterator>
 
 #include "optim/run/bounds.h"
+#include "optim/run/fit.h"
 
 namespace isochron {
 namespace {
@@ -91,7 +92,8 @@ std::string what_errors_say(const ParameterErrors& errors) {
 }  // namespace
 
 std::string run_report(const LoopResult& result, const Checkpoint& state, const LogRow& last,
-                       const Parameters& parameters, const ParameterErrors& errors) {
+                       const Parameters& parameters, const ParameterErrors& errors,
+                       const std::optional<GoodnessOfFit>& fit) {
   const int rejected = state.safeguard.rejected + state.steps_rejected;
   std::string text = fmt::format("{} after {} iterations, {:.3g} s{}; final parameters: {} (row {} of log.csv)\n",
                                  name(result.status), state.iteration, std::max(state.seconds, last.seconds),
@@ -99,6 +101,7 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
                                  last.iteration);
   text += table(rows_of(parameters, state.theta)) + bounds_report(find_at_bounds(parameters, state.theta)) +
           what_errors_say(errors);
+  text += fit_report(fit);
   auto out = std::back_inserter(text);
   if (!std::isnan(last.loss)) {
     fmt::format_to(out, "  loss {:.3g} +- {:.2g} (at the start {:.3g} +- {:.2g}){}\n", last.loss, last.loss_noise,

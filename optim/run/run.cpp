@@ -24,6 +24,7 @@
 #include "optim/problem/rendered_objective.h"
 #include "optim/problem/vector_math.h"
 #include "optim/run/checkpoint.h"
+#include "optim/run/fit.h"
 #include "optim/run/frames.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/inputs.h"
@@ -31,6 +32,7 @@
 #include "optim/run/report.h"
 #include "optim/run/run_folder.h"
 #include "optim/run/summary.h"
+#include "optim/run/zero_gradient.h"
 
 namespace isochron {
 namespace {
@@ -90,10 +92,10 @@ class Run {
     const long long rays = result.status == RunStatus::interrupted ? problem_.rays() : sum_over_ranks(problem_.rays());
     RunCost cost{first, seconds_since(start), rays, peak_memory(), {{"target", target_seconds_}}};
     for (PassKind kind : kPassKinds) cost.passes.emplace_back(name(kind), problem_.times().seconds(kind));
-    write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_, cost, errors_));
+    write_file_atomically(path("summary.yaml"), summary_yaml(result, state_, last_, parameters_, cost, errors_, fit_));
     if (options_.report)
       options_.report((had_ended && state_.iteration == first ? nothing_left(result, options_.folder) : "") +
-                      run_report(result, state_, last_, parameters_, errors_));
+                      run_report(result, state_, last_, parameters_, errors_, fit_) + zero_gradients_);
     return result.status;
   }
 
@@ -168,12 +170,14 @@ class Run {
       save();
       stage.advance();
     };
-    const LoopResult result = run_loop(objective, *optimizer, spec.stop_window, loop, state_);
+    LoopResult result = run_loop(objective, *optimizer, spec.window(), loop, state_);
     geometry.write("final", state_.theta);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);
     errors_ = find_errors(*optimizer, final);
-    write_expected_counts();
+    judge_expected_counts();
+    if (fit_ && left_its_data(*fit_, state_, last_)) result.status = RunStatus::diverged;
+    zero_gradients_ = zero_gradient_report(parameters_, final.gradient);
     return result;
   }
 
@@ -195,13 +199,16 @@ class Run {
                              blocks, names, theta);
   }
 
-  void write_expected_counts() const {
+  /// What the final parameters make of the counts, with far less noise than an iteration's image.
+  void judge_expected_counts() {
     const Experiment& experiment = problem_.experiment();
-    if (!has_histograms(experiment, problem_.scene())) return;
-    const GatedImage expected =
-        problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
-                                 experiment.output.histogram_samples, "rendering the expected counts", [] {});
-    write_histograms(path("final.h5"), experiment, problem_.scene(), expected);
+    const bool counts = has_fit(problem_, target_), histograms = has_histograms(experiment, problem_.scene());
+    if ((!counts && !histograms) || !problem_.can_render(state_.theta)) return;
+    const SplitImage expected = problem_.render_halves_in_parts(
+        state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
+        counts ? fit_samples(problem_) : experiment.output.histogram_samples, "rendering the expected counts", [] {});
+    if (counts) fit_ = judge_fit(problem_, state_.theta, expected, target_);
+    if (histograms) write_histograms(path("final.h5"), experiment, problem_.scene(), expected.image);
   }
 
   double scaled_norm(std::vector<double> gradient) const {
@@ -227,6 +234,8 @@ class Run {
   double target_seconds_ = 0;
   LogRow last_;
   ParameterErrors errors_;
+  std::optional<GoodnessOfFit> fit_;  ///< of counts
+  std::string zero_gradients_;        ///< for the screen
 };
 
 /// Goes on in a locked folder that holds a run.
@@ -247,6 +256,8 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_two_samples(problem);
     require_jacobian_fits(problem);
     require_memory(problem, run_memory(problem));
+    // Here, so that a message names the user's file and not the run's copy of it.
+    if (!experiment.target.images.empty()) problem.read_target(experiment.target.images);
   }
   std::optional<FolderLock> lock;
   on_first_rank([&] {

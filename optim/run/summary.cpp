@@ -8,6 +8,7 @@
 
 #include "optim/experiment/files.h"
 #include "optim/run/bounds.h"
+#include "optim/run/fit.h"
 
 namespace isochron {
 namespace {
@@ -50,7 +51,8 @@ std::string errors_yaml(const Parameters& parameters, const ParameterErrors& err
 }  // namespace
 
 std::string summary_yaml(const LoopResult& result, const Checkpoint& state, const LogRow& last,
-                         const Parameters& parameters, const RunCost& cost, const ParameterErrors& errors) {
+                         const Parameters& parameters, const RunCost& cost, const ParameterErrors& errors,
+                         const std::optional<GoodnessOfFit>& fit) {
   std::string text =
       fmt::format("status: {}\niterations: {}\nseconds: {}\nrejected_steps: {}\nrate: {}\nfinal: {}\n",
                   name(result.status), state.iteration, std::max(state.seconds, last.seconds),
@@ -69,6 +71,7 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
     fmt::format_to(out, "  {}: {{initial: {}, final: {}}}\n", block.name,
                    optional_number(parameters.distance_to_target(parameters.initial(), block)),
                    optional_number(parameters.distance_to_target(state.theta, block)));
+  text += fit_yaml(fit);
   text += bounds_yaml(find_at_bounds(parameters, state.theta));
   text += errors_yaml(parameters, errors);
   std::vector<std::string> passes;

@@ -1,8 +1,10 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "optim/problem/goodness_of_fit.h"
 #include "optim/problem/standard_errors.h"
 #include "optim/run/log.h"
 #include "optim/run/loop.h"
@@ -23,6 +25,7 @@ struct RunCost {
 /// `state` holds those parameters. Unknown numbers are null. `noise_share` is that of
 /// loss_spread().
 std::string summary_yaml(const LoopResult& result, const Checkpoint& state, const LogRow& last,
-                         const Parameters& parameters, const RunCost& cost = {}, const ParameterErrors& errors = {});
+                         const Parameters& parameters, const RunCost& cost = {}, const ParameterErrors& errors = {},
+                         const std::optional<GoodnessOfFit>& fit = {});
 
 }  // namespace isochron

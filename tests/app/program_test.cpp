@@ -198,6 +198,7 @@ TEST_F(Program, CommandsWriteTheirFiles) {
     EXPECT_NE(derive.find(row), std::string::npos);
 
   ASSERT_EQ(run({"gradient", file, "-o", out, "--at", "target"}).status, 0);
+  EXPECT_NE(folder_.read("stdout").find("  height: "), std::string::npos);
   const std::string gradient = folder_.read("out/gradient.csv");
   EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error,degrees_of_freedom,effective_count\nheight,0,", 0),
             0u);

@@ -146,6 +146,40 @@ TEST_F(Program, AnOptimiserThatLeavesTheWorldIsSentBack) {
   }
 }
 
+// A plate before a wall, 20 cm too far away: no bin that it could reach has light at first.
+TEST_F(Program, ARunThatLosesTheLightOfItsCountsDiverges) {
+  folder_.write("plane.obj", "v -0.2 -0.2 0\nv 0.2 -0.2 0\nv 0.2 0.2 0\nv -0.2 0.2 0\nf 1 2 3 4\n");
+  folder_.write("wall.yaml",
+                "capture:\n"
+                "  sensor: {corner: [-0.3, 0.3, 0], across: [0.6, 0, 0], down: [0, -0.6, 0], size: [6, 6]}\n"
+                "  normal: [0, 0, 1]\n  laser: confocal\n"
+                "materials: {paint: {type: diffuse, albedo: 0.5, two_sided: true}}\n"
+                "shapes: [{name: plane, file: plane.obj, material: paint, transform: {translate: [0, 0, 0.5]}}]\n");
+  const std::string file = folder_.write(
+      "counts.yaml",
+      "scene: wall.yaml\nmax_bounces: 1\n"
+      "gates: {kind: bins, unit: ps, scene_unit_m: 1, start: 1600, width: 32, count: 120}\n"
+      "parameters:\n"
+      "  - {name: z, type: translation, shape: plane, direction: [0, 0, 1], initial: 0.2, target: 0}\n"
+      "  - {name: gain, type: gain, initial: 50, target: 60}\n"
+      "  - {name: dark, type: background, initial: 1, target: 0.5}\n"
+      "target: {samples: 256, noise: {counts: true}}\nloss: {kind: poisson}\n"
+      "samples: {primal: 64, interior: 64, visibility: 0, path_length: 0}\n"
+      "optimizer: {method: quasi_newton, iterations: 4}\noutput: {histogram_samples: 256}\n");
+  const auto go = [&](const char* out, const char* z) {
+    return run({"run", file, "-o", folder_.file(out), "--no-plots", "--at", z}).status;
+  };
+  EXPECT_EQ(go("far", "z=0.2"), 1);
+  const std::string lost = folder_.read("far/summary.yaml");
+  EXPECT_TRUE(lost.starts_with("status: diverged\n")) << lost;
+  EXPECT_NE(lost.find("verdict: unexplained}"), std::string::npos) << lost;
+  EXPECT_NE(folder_.read("stdout").find("start nearer"), std::string::npos);
+  for (const char* name : {"far/checkpoint.yaml", "far/final.exr", "far/final.h5", "far/log.csv"})
+    EXPECT_TRUE(folder_.has(name)) << name;
+  EXPECT_EQ(go("near", "z=0.01"), 0);
+  EXPECT_EQ(folder_.read("near/summary.yaml").find("status: diverged"), std::string::npos);
+}
+
 TEST_F(Program, CoordinatesThatCannotBeRenderedAreRefused) {
   const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
   for (const std::vector<std::string>& change : std::vector<std::vector<std::string>>{

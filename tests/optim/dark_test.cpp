@@ -85,7 +85,7 @@ TEST_F(Dark, EveryMethodFindsTheTruth) {
     options.iterations = spec.iterations;
     options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
     options.save = [] {};
-    EXPECT_EQ(run_loop(objective, *method, spec.stop_window, options, state).choice, FinalChoice::average)
+    EXPECT_EQ(run_loop(objective, *method, std::max(0, spec.stop_window), options, state).choice, FinalChoice::average)
         << c.optimizer;
     EXPECT_NEAR(state.theta[0] / problem.parameters().target()[0], 1, c.tolerance) << c.parameter << c.optimizer;
   }

@@ -119,7 +119,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
        "10:67: optimizer.decay.half_life: 0 is out of range (a number above 0)"},
       {"method: adam, learning_rate: 0.02, iterations: 6", "method: lbfgs, decay: {half_life: 5}",
        "10:28: optimizer.decay: belongs to adam, not to l"},
-      {"iterations: 6", "stop: {window: 1}", "10:63: optimizer.stop.window: 1 is out of range"},
+      {"iterations: 6", "stop: {window: 1}", "10:54: optimizer.stop: a window of 1 has no standard error"},
       {"seed: 7}", "seed: 7, noise: {photons: -1}}", "8:49: target.noise.photons: -1 is out of range"},
       {"seed: 3", "loss: {kind: absolute}",
        "11:14: loss.kind: 'absolute' is not known (allowed: squared, huber, cauchy"},

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
 #include "optim/run/bounds.h"
+#include "optim/run/fit.h"
 #include "optim/run/summary.h"
+#include "optim/run/zero_gradient.h"
 #include "tests/optim/temporary_folder.h"
 
 namespace isochron {
@@ -129,6 +132,50 @@ TEST_F(Report, SummaryHasErrorsAndCost) {
                       "  not at the minimum: a Newton step would move wall by -0.5: more than the standard errors\n"),
             std::string::npos)
       << text;
+}
+
+/// Of 100 readings: a deviance of 150 for 98, with and without light.
+GoodnessOfFit fit_of(double p, double light, double background) {
+  GoodnessOfFit fit;
+  fit.fit = {150, 98, 97, 14, p};
+  fit.background.p_value = background;
+  fit.light_p_value = light;
+  return fit;
+}
+
+TEST_F(Report, SaysWhetherTheDataAreExplained) {
+  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7})});
+  state_.theta = {0.6875};
+  const auto screen = [&](const GoodnessOfFit& fit) { return run_report({}, state_, last_, parameters, {}, fit); };
+  EXPECT_NE(
+      screen(fit_of(0.25, 0, 0)).find("  fit: explains the data (deviance 150, 98 +- 14 to be expected, p = 0.25)\n"),
+      std::string::npos)
+      << screen(fit_of(0.25, 0, 0));
+  EXPECT_NE(screen(fit_of(1e-4, 0, 0)).find("  fit: does not explain the data ("), std::string::npos);
+  EXPECT_NE(screen(fit_of(1e-4, 0.5, 0)).find("  fit: has lost the light of the data ("), std::string::npos);
+  EXPECT_NE(screen(fit_of(0.25, 0.5, 0.5)).find("  fit: no signal, "), std::string::npos);
+  const std::string summary = summary_yaml({}, state_, last_, parameters, {}, {}, fit_of(1e-4, 0, 0));
+  EXPECT_NE(summary.find("\nfit: {deviance: 150, degrees_of_freedom: 97, floor: 98, p_value: 0.0001, "
+                         "verdict: unexplained}\n"),
+            std::string::npos)
+      << summary;
+  EXPECT_EQ(summary_yaml({}, state_, last_, parameters).find("fit:"), std::string::npos);
+}
+
+TEST_F(Report, ARunLeftItsDataWhereItsLightIsGoneOrItIsWorseThanItsStart) {
+  EXPECT_TRUE(left_its_data(fit_of(1e-4, 0.5, 1e-4), state_, last_));
+  EXPECT_FALSE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));
+  last_.loss = state_.loss_initial + 3.1 * std::hypot(last_.loss_noise, state_.loss_noise_initial);
+  EXPECT_TRUE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));
+  EXPECT_FALSE(left_its_data(fit_of(0.25, 0, 0), state_, last_));
+  last_.loss = state_.loss_initial + 2.9 * std::hypot(last_.loss_noise, state_.loss_noise_initial);
+  EXPECT_FALSE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));
+}
+
+TEST_F(Report, NamesGradientsThatAreExactlyZero) {
+  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
+  EXPECT_EQ(zero_gradient_report(parameters, {1e-300, 0}),
+            "  thing: the gradient is exactly zero: nothing that was rendered depends on it\n");
 }
 
 TEST(ReportOfFiles, NamesWhatTheFolderHolds) {

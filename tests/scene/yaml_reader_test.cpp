@@ -172,6 +172,10 @@ TEST_F(YamlReader, Overrides) {
   EXPECT_EQ(map.require("list").list()[1].map().require("x").number(), 7);
   EXPECT_EQ(map.require("new").numbers(), (std::vector<double>{1, 2}));
 
+  const YamlMap named =
+      open("list: [{name: a, x: 1}, {name: b, x: 2}]\n", {"list.b.x=7"}).map().require("list").list()[1].map();
+  EXPECT_EQ(YamlMap(named).require("x").number(), 7);
+
   // Errors name the override where the value comes from it, and the file elsewhere.
   const auto inner = [&](const std::vector<std::string>& overrides, const std::string& key) {
     return error([&] { open(text, overrides).map().require("a").map().require(key).boolean(); });
@@ -188,6 +192,8 @@ TEST_F(YamlReader, Overrides) {
   EXPECT_EQ(open(text, {"c.d.e=7", "c.d.f=8"}).map().require("c").map().require("d").map().require("e").number(), 7);
   EXPECT_EQ(error([&] { open(text, {"c.d=7"}).map().require("c").number(); }).substr(0, 8), "--set c:");
   EXPECT_EQ(error([&] { open(text, {"nobody[0]=1"}); }), "--set nobody[0]: there is no key 'nobody'");
+  EXPECT_EQ(error([&] { open("list: [{name: a}, {name: b}]\n", {"list.c.x=1"}); }),
+            "--set list.c.x: there is no entry of the name 'c' (allowed: a, b, or a number as in [0])");
   EXPECT_EQ(error([&] { open(text, {"a.b.c=1"}); }), "--set a.b.c: 'c' is looked for in '1', not in a map");
 }
 

@@ -163,7 +163,9 @@ class ReportTest(unittest.TestCase):
         with open(self.folder / "summary.yaml", "a") as summary:
             summary.write("at_bounds:\n  height:\n    lower: {bound: -0.5, count: 1, first: [0]}\n"
                           "  colour:\n    upper: {bound: 1, count: 2, first: [0, 2]}\n")
+            summary.write("fit: {deviance: 1234.5, degrees_of_freedom: 1000, floor: 1100, p_value: 0.001, verdict: unexplained}\n")
         words = self.page().words
+        self.assertIn("The fit does not explain the data: deviance 1234.5, to be expected 1100, p = 0.001.", words)
         self.assertIn("height ended at its lower bound −0.5", words)
         self.assertIn("colour: 2 of 3 ended at their upper bound 1 (0, 2)", words)
 

@@ -251,7 +251,20 @@ def ending(run):
     if run.ended and isinstance(share, float):
         words.append(f"Noise makes {100 * share:.0f} % of the loss's variance over the last rows.")
     badge = element("span", run.state, class_=f"badge {run.state}")
-    return join([element("p", badge, " ", " ".join(words), class_="ending"), bounds(run), notes(run)])
+    return join([element("p", badge, " ", " ".join(words), class_="ending"), fit(run), bounds(run), notes(run)])
+
+
+FIT = {"explained": "The fit explains the data", "unexplained": "The fit does not explain the data",
+       "no_signal": "There is no signal: background alone explains the data"}
+
+
+def fit(run):
+    """Whether the counts are explained, with the numbers behind it."""
+    found = run.summary.get("fit") if run.ended else None
+    if not isinstance(found, dict) or found.get("verdict") not in FIT:
+        return ""
+    return element("p", f"{FIT[found['verdict']]}: deviance {number(found['deviance'], 6)}, to be expected "
+                   f"{number(found['floor'], 6)}, p = {number(found['p_value'], 2)}.", class_="fit")
 
 
 def bounds(run):

@@ -1,0 +1,225 @@
+#include "optim/problem/goodness_of_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "optim/problem/count_deviance.h"
+
+namespace isochron {
+namespace {
+
+/// One reading under a model.
+struct Reading {
+  double count, mean, light;  ///< light: the mean less the background
+  double first, second;       ///< the halves' means
+  int background;             ///< index of the unknown, -1: none
+};
+
+double largest_entry(const GatedImage& image) {
+  return image.data.empty() ? 0 : *std::max_element(image.data.begin(), image.data.end());
+}
+
+class Judge {
+ public:
+  Judge(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss)
+      : model_(model),
+        counts_(counts),
+        readings_(loss.readings),
+        law_(loss.scale, 2 * largest_entry(model.image->image)) {
+    project();
+  }
+
+  DevianceTest result() const {
+    DevianceTest test;
+    Totals all;
+    const double f = model_.image->first;
+    for (int pixel = 0; pixel < counts_.pixels(); ++pixel) {
+      double slopes = 0;  // of T by the image, times the halves' difference: gates of a pixel share their paths
+      for_each(pixel, [&](const Reading& r) { add(r, f, all, slopes); });
+      all.variance += f * (1 - f) * slopes * slopes;
+    }
+    const double n = readings_.count(counts_);
+    test.degrees_of_freedom = n - unknowns_;
+    test.floor = all.floor - taken_;
+    test.deviance = all.floor + all.excess;
+    const double left = std::max(1.0, test.degrees_of_freedom) / n;
+    const double counted = std::max(0.0, all.counted) * left;
+    test.spread = std::sqrt(counted + all.variance);
+    const double skewness = test.spread > 0 ? left * all.third / std::pow(test.spread, 3) : 0;
+    test.p_value = gamma_tail(all.excess - all.projected + taken_, 0, test.spread, skewness);
+    return test;
+  }
+
+ private:
+  struct Totals {
+    double excess = 0, projected = 0, floor = 0;
+    double counted = 0, third = 0;  ///< moments by the counts
+    double variance = 0;            ///< by the image's noise
+  };
+
+  void add(const Reading& r, double f, Totals& all, double& slopes) const {
+    const DevianceMoments at = law_.moments(r.mean);
+    const double h1 = h(r.first), h2 = h(r.second);
+    const double e = projected(r, r.mean), slope = r.mean > 0 ? at.covariance / r.mean : 0;
+    // q(N) - h(m) - (N - m) L(m), twice.
+    const double q = r.count * law_.logarithm(r.count) - law_.linear(r.count);
+    const double linear =
+        (r.count - r.first) * law_.logarithm(r.second) + (r.count - r.second) * law_.logarithm(r.first);
+    all.excess += 2 * (q - (2 * h(r.mean) - f * h1 - (1 - f) * h2)) - linear;
+    all.projected += ((r.count - r.first) * projected(r, r.second) + (r.count - r.second) * projected(r, r.first)) / 2;
+    all.floor += 2 * at.mean - f * law_.moments(r.first).mean - (1 - f) * law_.moments(r.second).mean;
+    all.counted += at.variance - 2 * e * at.covariance + e * e * r.mean;
+    all.third += at.third[0] - 3 * e * at.third[1] + 3 * e * e * at.third[2] - e * e * e * r.mean;
+    const double d = r.first - r.second;
+    slopes += (slope - e) * d;
+    all.variance += 4 * r.mean * f * (1 - f) * std::pow(law_.weight(r.mean) * d, 2);
+  }
+
+  template <class F>
+  void for_each(int pixel, F&& f) const {
+    const double background = model_.background[pixel], share = model_.image->first;
+    const int unknown = model_.background_unknown.empty() ? -1 : model_.background_unknown[pixel];
+    for_each_reading(counts_, readings_, pixel, [&](std::size_t i) {
+      const double m = std::max(0.0, model_.image->image.data[i]);
+      const double d = model_.image->halved() ? model_.image->difference.data[i] : 0;
+      f(Reading{counts_.data[i], m, std::max(0.0, m - background), std::max(0.0, m + (1 - share) * d),
+                std::max(0.0, m - share * d), unknown});
+    });
+  }
+
+  /// Weighted sums of 1 (a background's change), light and F', for each unknown background.
+  struct Sums {
+    double ones = 0, one_light = 0, one_slope = 0, information = 0;
+  };
+
+  void project() {
+    std::vector<Sums> sums;
+    double lights = 0, light_slope = 0, light_information = 0;
+    for (int pixel = 0; pixel < counts_.pixels(); ++pixel)
+      for_each(pixel, [&](const Reading& r) {
+        if (!(r.mean > 0)) return;
+        const DevianceMoments at = law_.moments(r.mean);
+        const double weight = law_.weight(r.mean) * law_.weight(r.mean) * r.mean;
+        const double slope = at.covariance * law_.weight(r.mean);
+        lights += weight * r.light * r.light;
+        light_slope += slope * r.light;
+        light_information += weight * r.light * r.light * at.information;
+        if (r.background < 0 || !model_.background_free[r.background]) return;
+        if (std::ssize(sums) <= r.background) sums.resize(r.background + 1);
+        Sums& own = sums[r.background];
+        own.ones += weight;
+        own.one_light += weight * r.light;
+        own.one_slope += slope;
+        own.information += weight * at.information;
+      });
+    const double all_lights = lights;
+    for (const Sums& own : sums)
+      if (own.ones > 0) {
+        lights -= own.one_light * own.one_light / own.ones;
+        light_slope -= own.one_light * own.one_slope / own.ones;
+        taken_ += own.information / own.ones;
+        ++unknowns_;
+      }
+    constexpr double kRounding = 1e-12;  // where light is like the background nothing is left of it
+    light_factor_ = lights > kRounding * all_lights ? light_slope / lights : 0;
+    for (const Sums& own : sums)
+      background_factor_.push_back(own.ones > 0 ? (own.one_slope - light_factor_ * own.one_light) / own.ones : 0);
+    if (all_lights > 0) taken_ += model_.other_unknowns * light_information / all_lights;
+    unknowns_ += model_.other_unknowns;
+  }
+
+  /// e of a reading whose mean is `mean`.
+  double projected(const Reading& r, double mean) const {
+    const double one =
+        r.background < 0 || r.background >= std::ssize(background_factor_) ? 0 : background_factor_[r.background];
+    return (one + light_factor_ * r.light) * law_.weight(mean);
+  }
+  double h(double m) const { return law_.moments(m).mean / 2 - law_.linear(m) + m * law_.logarithm(m); }
+
+  const CountModel& model_;
+  const GatedImage& counts_;
+  const Readings& readings_;
+  CountDeviance law_;
+  std::vector<double> background_factor_;
+  double light_factor_ = 0, taken_ = 0;  ///< taken: from the deviance by what was fitted
+  int unknowns_ = 0;
+};
+
+/// The model without light: each unknown background is the mean of its readings.
+SplitImage background_alone(const CountModel& model, const GatedImage& counts, const Readings& readings,
+                            std::vector<double>& background) {
+  std::vector<double> sum, count;
+  const auto unknown = [&](int pixel) {
+    return model.background_unknown.empty() ? -1 : model.background_unknown[pixel];
+  };
+  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
+    for_each_reading(counts, readings, pixel, [&](std::size_t i) {
+      const int b = unknown(pixel);
+      if (b < 0) return;
+      sum.resize(std::max<std::size_t>(sum.size(), b + 1));
+      count.resize(sum.size());
+      sum[b] += counts.data[i];
+      ++count[b];
+    });
+  background = model.background;
+  SplitImage image{counts, {}, 1};
+  for (int pixel = 0; pixel < counts.pixels(); ++pixel) {
+    const int b = unknown(pixel);
+    if (b >= 0 && b < std::ssize(sum) && count[b] > 0) background[pixel] = sum[b] / count[b];
+    for_each_reading(counts, readings, pixel, [&](std::size_t i) { image.image.data[i] = background[pixel]; });
+  }
+  return image;
+}
+
+}  // namespace
+
+bool are_whole_numbers(const GatedImage& counts, const Readings& readings) {
+  bool whole = true;
+  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
+    for_each_reading(counts, readings, pixel,
+                     [&](std::size_t i) { whole &= counts.data[i] == std::floor(counts.data[i]); });
+  return whole;
+}
+
+double gamma_tail(double value, double mean, double deviation, double skewness) {
+  if (!(deviation > 0)) return value > mean ? 0 : 1;
+  constexpr double kNormal = 1e-6;  // below, the cube root loses digits and gains nothing
+  double z = (value - mean) / deviation;
+  if (skewness > kNormal) {
+    const double shape = 4 / (skewness * skewness), ratio = 1 + z / std::sqrt(shape);
+    z = 3 * std::sqrt(shape) * (std::cbrt(std::max(0.0, ratio)) - 1 + 1 / (9 * shape));
+  }
+  return std::erfc(z / std::numbers::sqrt2) / 2;
+}
+
+DevianceTest test_deviance(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss) {
+  return Judge(model, counts, loss).result();
+}
+
+const char* name(FitVerdict verdict) {
+  constexpr const char* kNames[] = {"explained", "unexplained", "no_signal"};
+  return kNames[static_cast<int>(verdict)];
+}
+
+FitVerdict GoodnessOfFit::verdict() const {
+  if (!has_light() && background.p_value >= kRejection) return FitVerdict::no_signal;
+  return fit.p_value >= kRejection ? FitVerdict::explained : FitVerdict::unexplained;
+}
+
+GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss) {
+  GoodnessOfFit result;
+  result.fit = test_deviance(model, counts, loss);
+  CountModel dark = model;
+  dark.other_unknowns = 0;
+  dark.background_free.assign(model.background_free.size(), 1);
+  const SplitImage image = background_alone(model, counts, loss.readings, dark.background);
+  dark.image = &image;
+  result.background = test_deviance(dark, counts, loss);
+  const double k = std::max(1, model.other_unknowns);
+  result.light_p_value =
+      gamma_tail(result.background.deviance - result.fit.deviance, k, std::sqrt(2 * k), std::sqrt(8 / k));
+  return result;
+}
+
+}  // namespace isochron

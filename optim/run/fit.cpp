@@ -1,0 +1,82 @@
+#include "optim/run/fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "optim/run/bounds.h"
+
+namespace isochron {
+
+bool has_fit(const Problem& problem, const GatedImage& target) {
+  return problem.reading_loss(target).kind == LossKind::poisson && are_whole_numbers(target, problem.readings());
+}
+
+int fit_samples(const Problem& problem) {
+  constexpr int kIterations = 16;
+  const Experiment& experiment = problem.experiment();
+  const int wanted = std::max(2, experiment.output.histogram_samples), primal = experiment.samples.primal;
+  return problem.scene().capture ? wanted : std::max(primal, std::min(wanted, kIterations * primal));
+}
+
+GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
+                        const GatedImage& target) {
+  const Scene scene = problem.parameters().apply(theta);
+  CountModel model;
+  model.image = &image;
+  const auto background_of = [&](int pixel) { return scene.detector.background_of(scene.capture, pixel); };
+  for (int pixel = 0; pixel < target.pixels(); ++pixel)
+    model.background.push_back(scene.detector.background[background_of(pixel)]);
+  std::vector<char> free(theta.size());
+  for (std::size_t i = 0; i < theta.size(); ++i) free[i] = !is_at_bound(problem.parameters(), theta, i);
+  for (std::size_t b = 0; b < problem.parameters().blocks().size(); ++b) {
+    const Parameters::Block& block = problem.parameters().blocks()[b];
+    const auto begin = free.begin() + block.begin, end = begin + block.count;
+    if (problem.experiment().parameters[b].type != ParameterType::background) {
+      model.other_unknowns += static_cast<int>(std::count(begin, end, 1));
+      continue;
+    }
+    model.background_free.assign(begin, end);
+    for (int pixel = 0; pixel < target.pixels(); ++pixel)
+      model.background_unknown.push_back(block.count == 1 ? 0 : background_of(pixel));
+  }
+  return judge_fit(model, target, problem.reading_loss(target));
+}
+
+bool left_its_data(const GoodnessOfFit& fit, const Checkpoint& state, const LogRow& last) {
+  const double noise = std::hypot(last.loss_noise, state.loss_noise_initial);
+  return fit.lost() || (fit.verdict() == FitVerdict::unexplained && state.iteration > 0 &&
+                        last.loss > state.loss_initial + 3 * noise);
+}
+
+std::string fit_yaml(const std::optional<GoodnessOfFit>& fit) {
+  if (!fit) return {};
+  return fmt::format("fit: {{deviance: {}, degrees_of_freedom: {}, floor: {}, p_value: {:.6g}, verdict: {}}}\n",
+                     fit->fit.deviance, fit->fit.degrees_of_freedom, fit->fit.floor, fit->fit.p_value,
+                     name(fit->verdict()));
+}
+
+std::string fit_report(const std::optional<GoodnessOfFit>& fit) {
+  if (!fit) return {};
+  const DevianceTest& test = fit->fit;
+  const std::string numbers = fmt::format("deviance {:.6g}, {:.6g} +- {:.2g} to be expected, p = {:.2g}", test.deviance,
+                                          test.floor, test.spread, test.p_value);
+  if (fit->lost())
+    return fmt::format(
+        "  fit: has lost the light of the data ({}); start nearer to where it comes from (captures: the "
+        "back-projection in "
+        "capture.png shows it)\n",
+        numbers);
+  switch (fit->verdict()) {
+    case FitVerdict::explained:
+      return fmt::format("  fit: explains the data ({})\n", numbers);
+    case FitVerdict::unexplained:
+      return fmt::format("  fit: does not explain the data ({})\n", numbers);
+    case FitVerdict::no_signal:
+      break;
+  }
+  return fmt::format("  fit: no signal, background alone explains the data ({})\n", numbers);
+}
+
+}  // namespace isochron

@@ -1,0 +1,35 @@
+// Whether a run's result explains its counts: goodness_of_fit.h for an experiment.
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "optim/problem/goodness_of_fit.h"
+#include "optim/problem/problem.h"
+#include "optim/run/checkpoint.h"
+#include "optim/run/log.h"
+
+namespace isochron {
+
+/// Whether the target is counts: the loss is Poisson's and all readings are whole numbers.
+bool has_fit(const Problem& problem, const GatedImage& target);
+
+/// Samples of the expected counts that the fit is judged by: output.histogram_samples; where there is a camera no more than 16
+/// iterations take.
+int fit_samples(const Problem& problem);
+
+/// `image`: expected counts at theta.
+GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
+                        const GatedImage& target);
+
+/// Whether a run has left its data behind: they hold light of which the fit has nothing (GoodnessOfFit::lost), or the fit
+/// neither explains them nor is as good as its start, by three standard errors of the loss.
+bool left_its_data(const GoodnessOfFit& fit, const Checkpoint& state, const LogRow& last);
+
+/// The key `fit` of summary.yaml; nothing where there is none.
+std::string fit_yaml(const std::optional<GoodnessOfFit>& fit);
+
+/// A line for the screen, indented by two blanks; nothing where there is none.
+std::string fit_report(const std::optional<GoodnessOfFit>& fit);
+
+}  // namespace isochron
