@@ -173,7 +173,7 @@ void MethodRun::gate_by_gate(const Scene& scene, const TangentBasis* basis, std:
   for (int g = 0; g < gates.size(); ++g) {
     const GateSet gate(gates.shape(), {gates.center(g)});
     const Renderer renderer(scene, gate, problem_.estimator(problem_.experiment().samples.visibility), basis);
-    render(renderer, iteration * count + static_cast<std::uint32_t>(g), g);
+    render(renderer, number_of_gate(iteration, count, static_cast<std::uint32_t>(g)), g);
     poll();
   }
 }
@@ -248,7 +248,6 @@ int SampleTrial::last_within(double seconds, int repeats) const {
 
 SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,
                         double core_seconds, const Poll& poll) {
-  constexpr std::uint32_t kTrialIteration = 0x80000000u;
   constexpr int kMostSteps = 24;
   SampleTrial trial{std::exp2(std::ceil(std::log2(run.least_factor()))), {}};
   for (int step = 0; step < kMostSteps; ++step) {

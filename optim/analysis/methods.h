@@ -101,6 +101,15 @@ struct SampleTrial {
   int last_within(double seconds, int repeats) const;
 };
 
+/// Trials of try_samples() have iterations of their own, from here on.
+inline constexpr std::uint32_t kTrialIteration = 0x80000000u;
+
+/// Which random numbers one of `gates` gates takes where each is rendered by itself: gates and iterations differ as long as
+/// iterations times gates stay below 2^31, those of trials from all others, too.
+constexpr std::uint32_t number_of_gate(std::uint32_t iteration, std::uint32_t gates, std::uint32_t gate) {
+  return (iteration & kTrialIteration) | ((iteration & ~kTrialIteration) * gates + gate);
+}
+
 /// Goes on up to where `repeats` of the next step would take more than `core_seconds`. Takes other random
 /// numbers than iterations below 2^31.
 SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,

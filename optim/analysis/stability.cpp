@@ -49,7 +49,7 @@ double reconstruct(const Problem& problem, const GatedImage& target, int iterati
   spec.learning_rate *= larger;
   spec.decay.start = static_cast<int>(std::lround(spec.decay.start / larger));
   spec.decay.half_life /= larger;
-  const std::unique_ptr<Optimizer> optimizer = make_optimizer(spec, problem.preconditioner());
+  const std::unique_ptr<Optimizer> optimizer = make_optimizer(spec, problem.preconditioner(), parameters.scales());
   const RenderedObjective objective(problem, target, poll);
   LoopOptions options;
   options.iterations = iterations;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <set>
 
 #include "optim/experiment/experiment.h"
 #include "tests/optim/tiny_scene.h"
@@ -58,6 +59,17 @@ TEST(Methods, AllOfThemKnowTheSlopeOfALikelihood) {
     run.set_factor(run.least_factor());
     const std::vector<double> theta = run.problem().parameters().initial();
     EXPECT_NO_THROW(run.gradient(theta, run.problem().make_target(poll), 0, poll));
+  }
+}
+
+TEST(Methods, TrialsHaveRandomNumbersOfTheirOwn) {
+  for (const std::uint32_t gates : {1u, 2u, 10u}) {
+    std::set<std::uint32_t> numbers;
+    for (const std::uint32_t first : {0u, kTrialIteration})
+      for (std::uint32_t iteration = 0; iteration < 5; ++iteration)
+        for (std::uint32_t gate = 0; gate < gates; ++gate)
+          numbers.insert(number_of_gate(first + iteration, gates, gate));
+    EXPECT_EQ(numbers.size(), 2 * 5 * gates);
   }
 }
 
