@@ -81,6 +81,23 @@ class Rng {
     return (block_[used_++] + 0.5) * 0x1p-32;
   }
 
+  /// The same number with 20 more random bits behind it: for a choice among many, the rest of which is used again. The next
+  /// number is that which follows uniform().
+  double fine_uniform() {
+    uniform();
+    // What follows the leading bits need only be well mixed and another for each number.
+    const auto mixed = [](std::uint64_t x) {
+      x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+      x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+      return x ^ (x >> 31);
+    };
+    const auto pair = [](std::uint32_t high, std::uint32_t low) { return std::uint64_t{high} << 32 | low; };
+    const std::uint32_t place = 4 * counter_[0] + static_cast<std::uint32_t>(used_);
+    const std::uint64_t bits =
+        mixed(mixed(mixed(pair(key_[0], key_[1])) + pair(counter_[1], counter_[2])) + pair(counter_[3], place));
+    return (static_cast<double>(std::uint64_t{block_[used_ - 1]} << 20 | bits >> 44) + 0.5) * 0x1p-52;
+  }
+
  private:
   Rng(const std::array<std::uint32_t, 2>& key, const std::array<std::uint32_t, 4>& counter)
       : key_(key), counter_(counter) {}

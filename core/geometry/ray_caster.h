@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include "core/scene/scene.h"
@@ -22,8 +23,8 @@ double ray_offset(const Scene& scene);
 
 class RayCaster {
  public:
+  /// Throws std::runtime_error where Embree cannot make its hierarchy, as does `update`: there is too little memory.
   explicit RayCaster(const Scene& scene, CasterUpdate update = CasterUpdate::rebuild);
-  ~RayCaster();
   RayCaster(const RayCaster&) = delete;
   RayCaster& operator=(const RayCaster&) = delete;
 
@@ -35,7 +36,7 @@ class RayCaster {
     set_ray(query.ray, origin, direction, far);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(scene_, &context, &query);
+    rtcIntersect1(scene_.get(), &context, &query);
     return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? -1
                                                        : first_[query.hit.geomID] + static_cast<int>(query.hit.primID);
   }
@@ -45,7 +46,7 @@ class RayCaster {
     rtcInitIntersectContext(&context);
     RTCRay ray;
     set_ray(ray, from, to - from, 1.0f);
-    rtcOccluded1(scene_, &context, &ray);
+    rtcOccluded1(scene_.get(), &context, &ray);
     return ray.tfar < 0;
   }
 
@@ -58,7 +59,7 @@ class RayCaster {
   double offset() const { return offset_; }
 
   /// The committed Embree scene.
-  RTCScene embree_scene() const { return scene_; }
+  RTCScene embree_scene() const { return scene_.get(); }
 
  private:
   using Float4 [[gnu::vector_size(16)]] = float;
@@ -76,11 +77,15 @@ class RayCaster {
   }
 
   void build(const Scene& scene);
+  void commit();
   void attach(const Scene& scene, int first_vertex, int vertices, int first_triangle, int triangles);
   void fill_vertices(const Scene& scene, unsigned geometry, int first_vertex, int vertices) const;
 
   const CasterUpdate update_;
-  RTCScene scene_ = nullptr;
+  struct Release {
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+  };
+  std::unique_ptr<RTCSceneTy, Release> scene_;
   std::vector<int> first_;  ///< triangle of each of Embree's geometries: one for all, or one per shape
   double offset_ = 0;
 };

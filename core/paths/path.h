@@ -1,12 +1,14 @@
 // Light transport paths x0 (camera), x1, ..., xn (scattering), x(n+1) (on an emitter).
 #pragma once
+#include <stdexcept>
 #include <vector>
 
 #include "core/paths/prepared_scene.h"
 
 namespace isochron {
 
-/// Stack of fixed capacity. Pushing moves nothing: references to entries below stay valid.
+/// Stack of fixed capacity, beyond which it throws std::logic_error. Pushing moves nothing: references to entries below stay
+/// valid.
 template <class T>
 class FixedStack {
  public:
@@ -15,7 +17,11 @@ class FixedStack {
     items_[0] = first;
     size_ = 1;
   }
-  void push_back(const T& item) { items_[size_++] = item; }
+  void push_back(const T& item) {
+    if (size_ == items_.size()) [[unlikely]]
+      throw std::logic_error("a path has more vertices than there is room for");
+    items_[size_++] = item;
+  }
   void pop_back() { --size_; }
   const T& back() const { return items_[size_ - 1]; }
   const T& operator[](std::size_t i) const { return items_[i]; }

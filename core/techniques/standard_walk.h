@@ -135,7 +135,7 @@ class StandardWalk {
   /// Takes the step by hidden geometry sampling; intersect() goes on. False where the walk ends.
   bool step_to_hidden(const SurfacePoint& x, Rng& rng) {
     const PreparedScene& scene = worker_.scene;
-    double u0 = rng.uniform();
+    double u0 = rng.fine_uniform();
     const double u1 = rng.uniform();
     const SurfacePoint z = scene.sample_hidden(u0, u1);
     draw_light(rng);

@@ -28,7 +28,7 @@ double Worker::start_path(int pixel, Rng& rng, double hidden) {
 double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
   const SurfacePoint s = path.back();
   // One number for the choice and for what is chosen: so the points of each way remain as evenly spread.
-  double u0 = rng.uniform();
+  double u0 = rng.fine_uniform();
   const double u1 = rng.uniform();
   const bool by_area = u0 < hidden;
   u0 = by_area ? u0 / hidden : (u0 - hidden) / (1 - hidden);

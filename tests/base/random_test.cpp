@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "tests/base/chi_square.h"
+#include "tests/seed.h"
 
 namespace isochron {
 namespace {
@@ -63,6 +64,26 @@ TEST(Rng, NeighbouringStreamsAreIndependent) {
       ++counts[y * kSide + x];
     }
     EXPECT_LT(std::abs(chi_square_z(counts, double(kPairs) / counts.size())), 5) << "component " << component;
+  }
+}
+
+// What a choice among 2^24 leaves of a number is uniform, too: with 32 bits it would have 256 values. |z| < 5: false alarm 1e-6.
+TEST(Rng, FineNumbersHaveARestAfterAChoiceAmongMany) {
+  constexpr int kBins = 1024, kSamples = 1 << 18;
+  for (const bool points : {false, true}) {
+    std::vector<int> counts(kBins);
+    const Rng first({test_seed(1), 0, 0}, 0, 0);
+    for (std::uint32_t i = 0; i < kSamples; ++i) {
+      Rng rng = points ? first.with_point(i, first.scramble_key(), i) : first.with_sample(i);
+      Rng coarse = rng;
+      const double u = rng.fine_uniform(), rest = u * 0x1p24 - std::floor(u * 0x1p24);
+      ASSERT_NEAR(u, coarse.uniform(), 0x1p-33);
+      ASSERT_EQ(rng.uniform(), coarse.uniform());
+      ASSERT_GT(u, 0);
+      ASSERT_LT(u, 1);
+      ++counts[static_cast<int>(rest * kBins)];
+    }
+    EXPECT_LT(std::abs(chi_square_z(counts, double(kSamples) / kBins)), 5) << (points ? "points" : "random");
   }
 }
 
