@@ -1,7 +1,9 @@
 #include "core/paths/prepared_scene.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -56,6 +58,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   scene.texture = source.texture;
   std::vector<char> moved_shapes(scene.shapes.size(), 0);
   const std::vector<char> moved = move_vertices(source.positions, moved_shapes);
+  stacked.update(scene, first ? std::vector<char>(moved_shapes.size(), 1) : moved_shapes, caster.offset());
   const bool same_pattern = !first && same_columns(basis);
   if (same_pattern) {
     differentiable.find_bounds(scene);
@@ -88,7 +91,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   flows.update(*this, follow);
   moving_bounds = differentiable.bounds.grown(caster.offset());
   flowing_bounds = flows.near().grown(caster.offset());
-  if (any_changed)
+  if (any_changed || first)
     for (auto& hierarchy : hierarchies_) hierarchy = std::make_unique<LazyHierarchy>();
 }
 
@@ -109,6 +112,25 @@ void PreparedScene::update_shapes() {
     has_medium_ = true;
     least_index_ = std::min(least_index_, index);
   }
+}
+
+int PreparedScene::top_face(int triangle, const Vec3& p, const Vec3& w) const {
+  const auto rank = [&](int t) {
+    if (dot(normal(t), w) < 0) return emits(t) ? 3 : 2;
+    return two_sided(t) || transparent(t) ? 1 : 0;
+  };
+  const auto holds_p = [&](int t) {
+    if (!(std::abs(height_over(t, p)) <= caster.offset())) return false;
+    return std::ranges::min(barycentrics({p, normal(t), t})) >= 0;
+  };
+  int top = triangle, best = rank(triangle);
+  for (const auto& [_, t] : stacked.of(triangle)) {
+    const int own = rank(t);
+    if (std::tie(own, t) <= std::tie(best, top) || !holds_p(t)) continue;
+    top = t;
+    best = own;
+  }
+  return top;
 }
 
 void PreparedScene::update_record(int t) {

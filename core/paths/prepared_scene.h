@@ -20,6 +20,7 @@
 #include "core/paths/vertex_flow.h"
 #include "core/scene/scene.h"
 #include "core/scene/sensors/pinhole.h"
+#include "core/scene/stacked_faces.h"
 
 namespace isochron {
 
@@ -48,6 +49,7 @@ class PreparedScene {
   Differentiable differentiable;
   VertexFlows flows;
   RayCaster caster;
+  StackedFaces stacked;
   /// Of the triangles with a vertex that moves, grown by the rounding error of rays; and of all vertices but x1
   /// that may follow or be followed.
   Bounds moving_bounds, flowing_bounds;
@@ -242,13 +244,22 @@ class PreparedScene {
     return {origin + direction * distance, r.normal, triangle};
   }
 
+  /// The triangle that the ray from exactly `from` along w hits first, up to `far` lengths of w, or -1.
+  int first_hit(const Vec3& from, const Vec3& w, float far = std::numeric_limits<float>::infinity()) const {
+    const int t = caster.closest_hit(from, w, far);
+    return t < 0 || stacked.empty() ? t : top_face(t, point_on_triangle(t, from, w).p, w);
+  }
+  /// Of the triangles that lie on each other at the point p of `triangle` the one that is seen along w: an emitter that faces
+  /// the viewer, else one that faces the viewer, else one with a back that scatters, else a black back; among those the last in
+  /// the scene.
+  int top_face(int triangle, const Vec3& p, const Vec3& w) const;
   /// The triangle that the ray from `x` (offset off its surface) along the unit direction w hits first, or -1. Its record is
   /// prefetched: a caller that has other work to do first does not wait for it.
   int closest_hit(const SurfacePoint& x, const Vec3& w) const { return prefetched_hit(offset_ray_origin(x, w), w); }
   /// The same up to `distance`, or a little more; without the prefetch.
   int closest_hit_within(const SurfacePoint& x, const Vec3& w, double distance) const {
     const Vec3 start = offset_ray_origin(x, w);
-    return caster.closest_hit(start, w, static_cast<float>(distance + 4 * caster.offset()));
+    return first_hit(start, w, static_cast<float>(distance + 4 * caster.offset()));
   }
   /// The same of a ray from the camera.
   int closest_camera_hit(const Vec3& direction) const { return prefetched_hit(camera.position, direction); }
@@ -264,8 +275,10 @@ class PreparedScene {
   std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
     return end_point(closest_camera_hit(direction), camera.position, direction);
   }
+  /// Whether light from x meets y, which is the last point on its way or covered by nothing that lies on it.
   bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
     const Vec3 d = y.p - x.p;
+    if (!stacked.empty() && y.triangle >= 0 && top_face(y.triangle, y.p, d) != y.triangle) return false;
     return !caster.occluded(offset_ray_origin(x, d), offset_ray_origin(y, -d));
   }
 
@@ -283,7 +296,7 @@ class PreparedScene {
     return x.triangle >= 0 && transparent(x.triangle) && dot(x.n, d) < 0;
   }
   int prefetched_hit(const Vec3& from, const Vec3& w) const {
-    const int t = caster.closest_hit(from, w);
+    const int t = first_hit(from, w);
     if (t >= 0) prefetch(t);
     return t;
   }

@@ -45,7 +45,11 @@ Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
 bool is_flat(const PreparedScene& scene, const Edge& edge) {
   if (edge.face[1] < 0) return false;
   const Vec3 &a = scene.normal(edge.face[0]), &b = scene.normal(edge.face[1]);
-  return dot(a, b) > 0 && length_squared(cross(a, b)) <= kCoplanarAngle * kCoplanarAngle;
+  if (!(dot(a, b) > 0) || !(length_squared(cross(a, b)) <= kCoplanarAngle * kCoplanarAngle)) return false;
+  const auto along = [&](int i) {
+    return runs_along(scene.scene.triangles[edge.face[i]].vertex, edge.vertex[0], edge.vertex[1]);
+  };
+  return along(0) != along(1);  // else they lie on each other
 }
 
 /// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat
@@ -66,6 +70,7 @@ bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int
     const bool moves[2] = {differentiable.triangle[edge.face[0]] != 0,
                            edge.face[1] >= 0 && differentiable.triangle[edge.face[1]]};
     if (!moves[0] && !moves[1]) continue;
+    if (edge.sector) return false;  // it opens to both sides of a face
     if (!moves[0] || !moves[1]) {
       open = true;
       continue;

@@ -1,7 +1,5 @@
 #include "core/scene/mesh.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -10,13 +8,11 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/scene/around_edge.h"
+#include "core/scene/stacked_faces.h"
 
 namespace isochron {
 namespace {
-
-std::string show(const Vec3& p) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g})", p.x, p.y, p.z);
-}
 
 /// For each vertex the first one at the same position.
 std::vector<int> first_at_position(const Mesh& mesh) {
@@ -43,7 +39,7 @@ std::vector<int> first_at_position(const Mesh& mesh) {
 }
 
 /// Marks repetitions of earlier faces.
-std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces, const std::vector<Vec3>& positions) {
+std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces) {
   struct Key {
     std::array<int, 3> corners;  // ascending
     int face;
@@ -57,20 +53,28 @@ std::vector<bool> repeated_faces(const std::vector<std::array<int, 3>>& faces, c
     if (!even) std::swap(c[1], c[2]);
     keys[f] = {c, static_cast<int>(f), even};
   }
-  std::sort(keys.begin(), keys.end(),
-            [](const Key& a, const Key& b) { return std::tie(a.corners, a.face) < std::tie(b.corners, b.face); });
+  std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+    return std::tie(a.corners, a.even, a.face) < std::tie(b.corners, b.even, b.face);
+  });
   std::vector<bool> repeated(faces.size(), false);
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    if (keys[i].corners != keys[i - 1].corners) continue;
-    if (keys[i].even != keys[i - 1].even)
-      throw InputError(
-          fmt::format("two faces with corners {} {} {} lie back to back (one face, and two_sided in its "
-                      "material, is allowed)",
-                      show(positions[keys[i].corners[0]]), show(positions[keys[i].corners[1]]),
-                      show(positions[keys[i].corners[2]])));
-    repeated[keys[i].face] = true;
-  }
+  for (std::size_t i = 1; i < keys.size(); ++i)
+    repeated[keys[i].face] = keys[i].corners == keys[i - 1].corners && keys[i].even == keys[i - 1].even;
   return repeated;
+}
+
+/// Entries of an edge that more than two faces share.
+void add_sectors(const Mesh& mesh, const std::array<int, 2>& vertex, const std::vector<int>& faces,
+                 std::vector<Edge>& edges) {
+  const Vec3 axis = normalize(mesh.positions[vertex[1]] - mesh.positions[vertex[0]]);
+  std::vector<Vec3> inward;
+  for (const int f : faces) {
+    Vec3 d;  // to the corner off the edge
+    for (const int v : mesh.faces[f])
+      if (v != vertex[0] && v != vertex[1]) d = mesh.positions[v] - mesh.positions[vertex[0]];
+    inward.push_back(cross(cross(axis, d), axis));
+  }
+  for (int i = 0; i < static_cast<int>(faces.size()); ++i)
+    edges.push_back({vertex, {faces[i], faces[next_around(axis, inward, i).number]}, true});
 }
 
 }  // namespace
@@ -86,7 +90,7 @@ Mesh clean_mesh(const Mesh& mesh) {
     if (cross(mesh.positions[f[1]] - a, mesh.positions[f[2]] - a) == Vec3{}) continue;
     faces.push_back(f);
   }
-  const std::vector<bool> repeated = repeated_faces(faces, mesh.positions);
+  const std::vector<bool> repeated = repeated_faces(faces);
 
   Mesh clean;
   std::vector<int> number(mesh.positions.size(), -1);
@@ -129,14 +133,18 @@ std::vector<Edge> build_edges(const Mesh& mesh) {
             [](const Side& a, const Side& b) { return std::tie(a.edge, a.face) < std::tie(b.edge, b.face); });
 
   std::vector<Edge> edges;
+  std::vector<int> faces;
   edges.reserve(sides.size() / 2);
   for (std::size_t i = 0, end = 0; i < sides.size(); i = end) {
     while (end < sides.size() && sides[end].edge == sides[i].edge) ++end;
     const int low = static_cast<int>(sides[i].edge >> 32), high = static_cast<int>(sides[i].edge & 0xffffffffu);
-    if (end - i > 2)
-      throw InputError(fmt::format("the edge from {} to {} has {} faces (at most two are allowed)",
-                                   show(mesh.positions[low]), show(mesh.positions[high]), end - i));
-    edges.push_back({{low, high}, {sides[i].face, end - i == 2 ? sides[i + 1].face : -1}});
+    if (end - i <= 2) {
+      edges.push_back({{low, high}, {sides[i].face, end - i == 2 ? sides[i + 1].face : -1}});
+      continue;
+    }
+    faces.clear();
+    for (std::size_t k = i; k < end; ++k) faces.push_back(sides[k].face);
+    add_sectors(mesh, {low, high}, faces, edges);
   }
   return edges;
 }
@@ -153,9 +161,11 @@ int add_shape(Scene& scene, Shape shape, const Mesh& mesh, const std::vector<Edg
   for (const auto& f : mesh.faces) scene.triangles.push_back({{f[0] + v, f[1] + v, f[2] + v}, index});
   for (const Edge& e : edges) {
     const int other = e.face[1] < 0 ? -1 : e.face[1] + t;
-    scene.edges.push_back({{e.vertex[0] + v, e.vertex[1] + v}, {e.face[0] + t, other}});
+    scene.edges.push_back({{e.vertex[0] + v, e.vertex[1] + v}, {e.face[0] + t, other}, e.sector});
   }
   if (mesh.file_vertices) shape.file_vertices = std::make_shared<const FileVertices>(*mesh.file_vertices);
+  for (const auto& pair : stacked_faces(mesh.positions, mesh.faces))
+    scene.stacked.push_back({pair[0] + t, pair[1] + t});
   scene.shapes.push_back(std::move(shape));
   return index;
 }

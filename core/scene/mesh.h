@@ -29,13 +29,12 @@ Mesh read_mesh(const std::string& file);
 ///   rounding in double precision explains counts as equal: 2^-44 of the largest coordinate of a face;
 /// - degenerate faces (two equal corners, or exactly no area) and repetitions of a face are dropped;
 /// - vertices of no remaining face are set apart; the others are in the order of their first appearance in
-/// `mesh`, whose numbers `file_vertices` keeps. Throws InputError when no face is left, or when two faces have the same corners but opposite
-/// orientation: which of the two a ray meets would be undefined.
+/// `mesh`, whose numbers `file_vertices` keeps. A front and a back with the same corners are two faces. Throws InputError when
+/// no face is left.
 Mesh clean_mesh(const Mesh& mesh);
 
 /// Edges of a clean mesh, by ascending vertices: vertex[0] < vertex[1], and face[0] < face[1] unless it is a
-/// border. The two faces may be oriented inconsistently. Throws InputError for an edge of more than two
-/// faces.
+/// border. The two faces may be oriented inconsistently. Where more than two meet: see Edge; by ascending face[0].
 std::vector<Edge> build_edges(const Mesh& mesh);
 
 /// Adds a shape of the mesh as it is, whose edges these are; sets the shape's ranges. Returns its index.

@@ -25,10 +25,13 @@ struct Triangle {
 /// Faces whose normals differ by less than this angle are one plane: a file in single precision cannot tell.
 inline constexpr double kCoplanarAngle = 1e-6;
 
-/// Mesh edge between welded vertices. `face[1]` is -1 on an open border.
+/// Mesh edge between welded vertices. `face[1]` is -1 on an open border. Where more than two faces meet there are as many
+/// entries, one after the other, each for the sector between two faces that are next to each other: from face[0]
+/// counter-clockwise about the direction from vertex[0] to vertex[1] to face[1], as the file has them.
 struct Edge {
   std::array<int, 2> vertex;
   std::array<int, 2> face;
+  bool sector = false;  ///< one of several with these vertices
 };
 
 /// The vertices of a mesh file, where they are not one by one those of the shape: some have no face, or lie at one position.
@@ -36,6 +39,11 @@ struct FileVertices {
   std::vector<int> vertex;  ///< of the shape, for each of the file; -1: without a face
   std::vector<Vec3> loose;  ///< where those are, in their order; they stay whatever moves
 };
+
+/// Whether a face that has both vertices goes on from the first to the second. Of two faces with one outside, one does.
+inline bool runs_along(const std::array<int, 3>& face, int from, int to) {
+  return face[0] == from ? face[1] == to : face[1] == from ? face[2] == to : face[0] == to;
+}
 
 /// One mesh: contiguous ranges of Scene::positions, Scene::triangles and Scene::edges.
 struct Shape {
@@ -91,6 +99,7 @@ struct Scene {
   std::vector<double> texture;  ///< per vertex, linear over triangles; empty: no shape is textured
   std::vector<Triangle> triangles;
   std::vector<Edge> edges;
+  std::vector<std::array<int, 2>> stacked;  ///< triangles of one shape that lie on each other, see StackedFaces
   bool grey = true;  ///< every albedo, reflectance and emission in the file was given as a single number
 
   int find_shape(const std::string& name) const;     ///< -1 when there is none

@@ -68,13 +68,11 @@ void check_areas(const YamlValue& cause, const Mesh& mesh) {
   }
 }
 
-/// Throws InputError unless the mesh bounds a solid: every edge has two faces, which run along it in opposite directions.
+/// Throws InputError unless the mesh bounds a solid: every edge has two faces, which run along it in opposite directions, or
+/// pairs of such faces, each about a sector that is all inside or all outside.
 void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
-  const auto runs_along = [&](int face, const Edge& edge) {
-    const auto& f = mesh.faces[face];
-    for (int i = 0; i < 3; ++i)
-      if (f[i] == edge.vertex[0]) return f[(i + 1) % 3] == edge.vertex[1];
-    return false;
+  const auto along = [&](int face, const Edge& edge) {
+    return runs_along(mesh.faces[face], edge.vertex[0], edge.vertex[1]);
   };
   for (const Edge& edge : edges) {
     const auto complain = [&](const char* what) {
@@ -85,7 +83,7 @@ void check_solid(const Mesh& mesh, const std::vector<Edge>& edges) {
                       what, a.x, a.y, a.z, b.x, b.y, b.z));
     };
     if (edge.face[1] < 0) complain("this one ends at the edge from");
-    if (runs_along(edge.face[0], edge) == runs_along(edge.face[1], edge))
+    if (along(edge.face[0], edge) == along(edge.face[1], edge))
       complain("the faces of this one disagree about its outside at the edge from");
   }
 }
@@ -136,7 +134,15 @@ void add_shape(const ShapeKeys& keys, Scene& scene) {
   constexpr std::size_t kMost = std::numeric_limits<int>::max() / 16;  // degrees of freedom are counted by int
   if (scene.positions.size() + mesh.positions.size() > kMost || scene.triangles.size() + mesh.faces.size() > kMost)
     file.fail("the scene has too many vertices or triangles", fmt::format("at most {} of each", kMost));
+  const std::size_t stacked = scene.stacked.size();
   add_shape(scene, std::move(shape), mesh, edges);
+  if (transparent && scene.stacked.size() > stacked) {
+    const Vec3& p = scene.positions[scene.triangles[scene.stacked[stacked][0]].vertex[0]];
+    file.fail(
+        fmt::format("a transparent material needs a surface that lies nowhere on itself; this one does at the face "
+                    "of ({:.6g}, {:.6g}, {:.6g})",
+                    p.x, p.y, p.z));
+  }
 }
 
 /// The name of one of the scene's materials.

@@ -6,16 +6,53 @@
 #include "core/base/fast_angle.h"
 #include "core/base/parallel.h"
 #include "core/geometry/mesh_intersections.h"
+#include "core/scene/around_edge.h"
 
 namespace isochron {
 namespace {
 
 /// Unit direction in the plane of face t, perpendicular to the edge, towards the face's third vertex.
 Vec3 inward_direction(const PreparedScene& scene, int t, const Edge& edge, const Vec3& tangent) {
-  const auto& v = scene.scene.triangles[t].vertex;
-  const int i = v[0] == edge.vertex[0] ? 0 : v[1] == edge.vertex[0] ? 1 : 2;
-  const bool along = v[(i + 1) % 3] == edge.vertex[1];
+  const bool along = runs_along(scene.scene.triangles[t].vertex, edge.vertex[0], edge.vertex[1]);
   return cross(scene.normal(t), along ? tangent : -tangent);
+}
+
+/// What lies counter-clockwise beside face[0] of an edge that more than two faces share, as these lie now.
+struct Sector {
+  int face;  ///< the next one
+  double angle;
+  bool holds_camera;
+};
+Sector sector_beside(const PreparedScene& scene, std::size_t number, const Vec3& tangent) {
+  const std::vector<Edge>& edges = scene.scene.edges;
+  const Edge& edge = edges[number];
+  const auto is_same = [&](std::size_t i) { return edges[i].sector && edges[i].vertex == edge.vertex; };
+  std::size_t begin = number;
+  while (begin > 0 && is_same(begin - 1)) --begin;
+  std::vector<int> faces;
+  std::vector<Vec3> inward;
+  int own = -1;
+  for (std::size_t i = begin; i < edges.size() && is_same(i); ++i) {
+    const int face = edges[i].face[0];
+    if (!(scene.area(face) > 0)) continue;
+    if (i == number) own = static_cast<int>(faces.size());
+    faces.push_back(face);
+    inward.push_back(inward_direction(scene, face, edge, tangent));
+  }
+  if (own < 0 || faces.size() < 2) return {edge.face[1], 0, false};
+  const NextAround next = next_around(tangent, inward, own);
+  // All of the edge is seen from one sector: the half-plane to the camera takes its place among the faces.
+  inward.push_back(scene.camera.position - scene.scene.positions[edge.vertex[0]]);
+  const bool holds_camera = next_around(tangent, inward, own).number == static_cast<int>(faces.size());
+  return {faces[next.number], next.angle, holds_camera};
+}
+
+/// Whether the faces run along the edge in opposite directions, as those of an oriented mesh do.
+bool is_oriented(const PreparedScene& scene, const BoundaryEdge& edge) {
+  const auto along = [&](int i) {
+    return runs_along(scene.scene.triangles[edge.face[i]].vertex, edge.vertex[0], edge.vertex[1]);
+  };
+  return along(0) != along(1);
 }
 
 /// How often the camera samples an edge: by its length in the image, and between two faces that are both
@@ -33,8 +70,8 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
       seen[i] = dot(scene.normal(edge.face[i]), a) <= kCoplanarAngle * length(a);
       dark &= !seen[i] && !scene.two_sided(edge.face[i]) && !scene.transparent(edge.face[i]);
     }
-    if (dark) return 0;
-    within_outline = seen[0] == seen[1];
+    within_outline = (seen[0] == seen[1]) == is_oriented(scene, edge);
+    if (dark && within_outline) return 0;
   }
   const double in_image = length(cross(a, b)) / (r * (r * r + length_squared(b - a)));
   return in_image * (within_outline ? std::min(1.0, wedge) : 1.0);
@@ -88,7 +125,9 @@ bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all
     std::vector<int> edges;
     for (int i = begin; i < end; ++i) {
       const auto& face = scene.scene.edges[i].face;
-      if (all || scene.changed(face[0]) > revision_ || (face[1] >= 0 && scene.changed(face[1]) > revision_))
+      // What is next to a face may depend on all that meet there.
+      if (all || scene.scene.edges[i].sector || scene.changed(face[0]) > revision_ ||
+          (face[1] >= 0 && scene.changed(face[1]) > revision_))
         edges.push_back(i);
     }
     for (std::size_t k = 0; k < edges.size(); ++k) {
@@ -112,12 +151,18 @@ void BoundaryEdges::set_group(std::size_t group, int first, int count) {
 
 void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool wedge) {
   primary_.weights[i] = secondary_.weights[i] = 0;
-  const Edge& e = scene.scene.edges[i];
-  const int faces = e.face[1] < 0 ? 1 : 2;
+  Edge e = scene.scene.edges[i];
   const Vec3 &origin = scene.scene.positions[e.vertex[0]], &end = scene.scene.positions[e.vertex[1]];
   const Vec3 d = end - origin;
   const double edge_length = length(d);
-  bool degenerate = !(edge_length > 0);
+  bool degenerate = !(edge_length > 0), camera_beside = true, may_graze = true;
+  if (e.sector && !degenerate) {
+    const Sector sector = sector_beside(scene, i, d / edge_length);
+    e.face[1] = sector.face;
+    camera_beside = sector.holds_camera;
+    may_graze = sector.angle > kPi;  // else a line past the edge meets a face on either side
+  }
+  const int faces = e.face[1] < 0 ? 1 : 2;
   for (int k = 0; k < faces; ++k) degenerate |= !(scene.area(e.face[k]) > 0);
   const Vec3 tangent = degenerate ? Vec3() : d / edge_length;
   Vec3 inward[2];
@@ -138,8 +183,9 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
   b.moves = sharp && (scene.differentiable.vertex[e.vertex[0]] || scene.differentiable.vertex[e.vertex[1]]);
   if (!sharp) return;
   moves_[i] = b.moves;
-  if (b.moves || scene.flows.camera_possible()) primary_.weights[i] = primary_weight(scene, b, b.azimuths);
-  secondary_.weights[i] = edge_length * b.azimuths;
+  if (camera_beside && (b.moves || scene.flows.camera_possible()))
+    primary_.weights[i] = primary_weight(scene, b, b.azimuths);
+  if (may_graze) secondary_.weights[i] = edge_length * b.azimuths;
 }
 
 void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {

@@ -27,10 +27,14 @@ std::optional<SurfacePoint> seen_beside(Worker& worker, const BoundaryEdge& edge
   // The point itself is off the edge, too: where the edge of a standing object lies in a floor, rays from the
   // edge start within a surface, or behind one.
   const double offset = scene.caster.offset();
-  if (front >= 0) return SurfacePoint{y + into_front * offset, scene.normal(front), front};
+  if (front >= 0) {
+    const Vec3 p = y + into_front * offset;
+    if (!scene.stacked.empty()) front = scene.top_face(front, p, d);
+    return SurfacePoint{p, scene.normal(front), front};
+  }
   ++worker.rays;
   const Vec3 beside = normalize(y + side * offset - scene.camera.position);
-  const int t = scene.caster.closest_hit(scene.camera.position, beside);
+  const int t = scene.first_hit(scene.camera.position, beside);
   if (t < 0 || dot(scene.normal(t), beside) == 0) return std::nullopt;
   return scene.point_on_triangle(t, scene.camera.position, beside);
 }
@@ -50,7 +54,7 @@ PrimaryBoundary::PrimaryBoundary(Worker& worker, const BoundaryEdges& edges, con
 void PrimaryBoundary::sample(double scale, Rng& rng) {
   const int table = BoundaryGuide::table(BoundaryGuide::primary);
   const Warp& warp = guide_.warp(table);
-  const double x = warp.sample(rng.uniform());
+  const double x = warp.sample(rng.fine_uniform());
   const BoundaryEdges::Sample point = edges_.sample_primary(x);
   const BoundaryEdge* edge = point.edge;
   const Vec3 y = point.y;

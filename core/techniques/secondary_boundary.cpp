@@ -41,7 +41,7 @@ Vec3 SecondaryBoundary::Segment::offset_ray_origin(double offset) const {
 
 void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
   Segment g;
-  const double x = edge_warp().sample(rng.uniform());
+  const double x = edge_warp().sample(rng.fine_uniform());
   g.y = edges_.sample_secondary(x);
   const double pick = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   int aimed_at = -1;
@@ -69,7 +69,7 @@ void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
 void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
   Segment g;
   const int table = BoundaryGuide::table(BoundaryGuide::from_light);
-  const double x = guide_.warp(table).sample(rng.uniform());
+  const double x = guide_.warp(table).sample(rng.fine_uniform());
   g.y = edges_.sample_secondary(x);
   const int count = static_cast<int>(scene_.lights.size());
   const int light = scene_.captures()
@@ -154,7 +154,7 @@ double SecondaryBoundary::direction_pdf(const Segment& g) const {
 bool SecondaryBoundary::find_light_end(Segment& g) {
   ++worker_.rays;
   const Vec3 start = g.offset_ray_origin(scene_.caster.offset());
-  const int t = scene_.caster.closest_hit(start, g.w);
+  const int t = scene_.first_hit(start, g.w);
   if (t < 0 || !faces(t, -g.w)) return false;
   g.light = scene_.point_on_triangle(t, start, g.w);  // beside the occluder even where it touches the surface
   g.r_s = length(g.light.p - g.y.y);
@@ -163,10 +163,12 @@ bool SecondaryBoundary::find_light_end(Segment& g) {
 
 bool SecondaryBoundary::find_camera_end(Segment& g) {
   ++worker_.rays;
-  const int t = scene_.caster.closest_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
+  const int t = scene_.first_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
   if (t < 0 || !faces(t, g.w)) return false;
   g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
   g.r_d = length(g.camera_end.p - g.y.y);
+  // A surface that holds the edge is S, see offset_ray_origin: rays that graze it too closely end on it both ways.
+  if (!(g.r_d > scene_.caster.offset())) return false;
   return differentiate(g) || may_flow(g.camera_end) || may_flow(g.light);
 }
 
@@ -267,7 +269,7 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double sc
 }
 
 BoundaryEdges::Pick SecondaryBoundary::pick_from_camera(int pixel, int bounces, Rng& rng) const {
-  return edges_.pick_secondary(camera_warp(pixel, bounces).sample(rng.uniform()));
+  return edges_.pick_secondary(camera_warp(pixel, bounces).sample(rng.fine_uniform()));
 }
 
 void SecondaryBoundary::connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Pick& pick, Rng& rng) {
@@ -278,7 +280,7 @@ void SecondaryBoundary::connect_edge(int pixel, const Rgb& throughput, const Bou
 }
 
 void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng) {
-  const double u_edge = rng.uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+  const double u_edge = rng.fine_uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   double pdf_area;
   const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
   if (is_light(emitter)) return;

@@ -8,7 +8,7 @@
 
 #include "core/base/error.h"
 #include "core/scene/behind_wall.h"
-#include "core/scene/coincidence.h"
+#include "core/scene/stacked_faces.h"
 #include "core/scene/scene_loader.h"
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
@@ -137,10 +137,10 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
         "{}: light '{}' is where the camera is: as one of them moves alone, shadows open on one side, so that "
         "derivatives are one-sided",
         experiment_.file, name));
-  std::string coincidences = coincidence_warning(parameters_->apply(parameters_->initial()));
-  if (coincidences.empty() && parameters_->target_known())
-    coincidences = coincidence_warning(parameters_->apply(parameters_->target()));
-  if (!coincidences.empty()) warning(experiment_.scene + ": " + coincidences);
+  std::string stacked = stacked_warning(parameters_->apply(parameters_->initial()));
+  if (stacked.empty() && parameters_->target_known())
+    stacked = stacked_warning(parameters_->apply(parameters_->target()));
+  if (!stacked.empty()) warning(experiment_.scene + ": " + stacked);
 }
 
 std::string Problem::light_that_leaves_the_camera() const {

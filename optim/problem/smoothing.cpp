@@ -13,7 +13,9 @@ std::vector<std::array<int, 2>> edges_of(const Scene& scene, const Parameters::V
   std::vector<int> place(scene.positions.size(), -1);
   for (std::size_t i = 0; i < field.vertices.size(); ++i) place[field.vertices[i]] = static_cast<int>(i);
   std::vector<std::array<int, 2>> edges;
-  for (const Edge& edge : scene.edges) {
+  for (std::size_t i = 0; i < scene.edges.size(); ++i) {
+    const Edge& edge = scene.edges[i];
+    if (edge.sector && i > 0 && scene.edges[i - 1].vertex == edge.vertex) continue;  // once, whatever meets there
     const int a = place[edge.vertex[0]], b = place[edge.vertex[1]];
     if (a >= 0 && b >= 0) edges.push_back({a, b});
   }

@@ -158,6 +158,24 @@ inline std::vector<std::vector<Estimate>> term_means(const Renderer& renderer, T
   return out;
 }
 
+/// Mean and standard error of value({seed, ...}) over streams that share nothing, not even the points that cover their samples.
+template <class F>
+Estimate replicated(int replicates, std::uint32_t seed, F&& value) {
+  Batches sum;
+  for (int i = 0; i < replicates; ++i) sum.add(value(Stream{seed, static_cast<std::uint32_t>(i), 0}));
+  return sum.estimate();
+}
+
+/// The derivative of the image's mean under gate 0, all terms together. `renderer` has one column.
+inline double total_derivative(const Renderer& renderer, int samples, Stream stream) {
+  double sum = 0;
+  for (const Term term : kTerms) {
+    stream.pass = 1 + static_cast<std::uint32_t>(term);
+    sum += renderer.derive(term, stream, {0, samples_of(term, samples)})[0].mean(0);
+  }
+  return sum;
+}
+
 /// Central difference of image means with common random numbers, [gate].
 inline std::vector<Estimate> finite_difference(const Scene& scene, const Motion& motion, double step,
                                                const GateSet& gates, const EstimatorOptions& options, int samples,

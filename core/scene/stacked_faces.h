@@ -1,0 +1,46 @@
+// Faces that lie on each other: doubled ones, a front and a back, a patch in the plane of a floor.
+#pragma once
+#include <array>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/base/vec.h"
+#include "core/scene/scene.h"
+
+namespace isochron {
+
+/// Pairs of faces that have an area in common and no more than 2^-20 of the largest coordinate between them there, each pair
+/// ascending, all in order. Faces that merely touch are none.
+std::vector<std::array<int, 2>> stacked_faces(const std::vector<Vec3>& positions,
+                                              const std::vector<std::array<int, 3>>& faces);
+
+/// All triangles of a scene that lie on others, kept while shapes move: between shapes as they lie now, within a shape as
+/// Scene::stacked has them.
+class StackedFaces {
+ public:
+  StackedFaces();
+  ~StackedFaces();
+  /// `moved`: shapes to search again. `touching`: as far as this from each other faces lie on each other.
+  void update(const Scene& scene, std::vector<char> moved, double touching);
+  bool empty() const { return pairs_.empty(); }
+  /// {triangle, another one that lies on it}, for each of them.
+  std::span<const std::array<int, 2>> of(int triangle) const;
+  /// Pairs of triangles of different shapes, each once, ascending.
+  const std::vector<std::array<int, 2>>& between_shapes() const { return between_; }
+
+ private:
+  struct ShapeBox;
+  void find_between(const Scene& scene, int a, int b);
+
+  std::vector<ShapeBox> boxes_;              ///< of each shape
+  std::vector<std::array<int, 2>> between_;  ///< of different shapes
+  std::vector<std::array<int, 2>> pairs_;    ///< all, both ways, in order
+  double touching_ = -1;
+};
+
+/// One line that names shapes that lie on each other and face the same way; empty where there are none. Only one of the two
+/// is seen there.
+std::string stacked_warning(const Scene& scene);
+
+}  // namespace isochron
