@@ -157,7 +157,7 @@ TEST_F(Program, ARunThatLosesTheLightOfItsCountsDiverges) {
                 "shapes: [{name: plane, file: plane.obj, material: paint, transform: {translate: [0, 0, 0.5]}}]\n");
   const std::string file = folder_.write(
       "counts.yaml",
-      "scene: wall.yaml\nmax_bounces: 1\n"
+      "name: counts\nscene: wall.yaml\nmax_bounces: 1\n"
       "gates: {kind: bins, unit: ps, scene_unit_m: 1, start: 1600, width: 32, count: 120}\n"
       "parameters:\n"
       "  - {name: z, type: translation, shape: plane, direction: [0, 0, 1], initial: 0.2, target: 0}\n"

@@ -116,21 +116,26 @@ TEST(GammaTail, IsThatOfChiSquared) {
 // Kolmogorov and Smirnov exceeds 0.230 with 50 draws once in a hundred times, 0.275 once in 1000.
 TEST(GoodnessOfFit, ProbabilitiesOfRightModelsAreUniform) {
   constexpr int kDraws = 50;
-  std::vector<double> p;
-  for (std::uint32_t i = 0; i < kDraws; ++i) {
-    Fit fit;
-    fit.draw(i);
-    fit.maximise();
-    const GoodnessOfFit found = fit.judge(i);
-    p.push_back(found.fit.p_value);
-    EXPECT_TRUE(found.has_light());
-    EXPECT_EQ(found.fit.degrees_of_freedom, kPixels * kGates - 2);
+  // Of few counts the deviance says mostly what the fit has chosen itself: scale and background.
+  for (const auto& [gain, background] : {std::pair{1.5, 0.3}, {0.3, 0.04}}) {
+    std::vector<double> p;
+    for (std::uint32_t i = 0; i < kDraws; ++i) {
+      Fit fit;
+      fit.gain = gain;
+      fit.background = background;
+      fit.draw(i);
+      fit.maximise();
+      const GoodnessOfFit found = fit.judge(i);
+      p.push_back(found.fit.p_value);
+      EXPECT_TRUE(found.has_light());
+      EXPECT_EQ(found.fit.degrees_of_freedom, kPixels * kGates - 2);
+    }
+    std::sort(p.begin(), p.end());
+    double distance = 0;
+    for (int i = 0; i < kDraws; ++i)
+      distance = std::max({distance, p[i] - double(i) / kDraws, double(i + 1) / kDraws - p[i]});
+    EXPECT_LT(distance, 0.275) << gain;
   }
-  std::sort(p.begin(), p.end());
-  double distance = 0;
-  for (int i = 0; i < kDraws; ++i)
-    distance = std::max({distance, p[i] - double(i) / kDraws, double(i + 1) / kDraws - p[i]});
-  EXPECT_LT(distance, 0.275);
 }
 
 TEST(GoodnessOfFit, TellsWhatIsLeft) {
