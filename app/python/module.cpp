@@ -34,6 +34,7 @@ PYBIND11_MODULE(_core, module) {
   using namespace isochron;
   using namespace pybind11::literals;
   translate_errors();
+  share_hdf5();
   module.def("version", program_version);
   module.def("use_threads", use_threads, "count"_a);
   module.def("used_threads", used_threads);

@@ -27,7 +27,13 @@ void require_all_finite(const std::vector<double>& values, const std::string& wh
 Session::Session(const std::string& file, const std::vector<std::string>& overrides) {
   std::vector<std::string> warnings;
   run_work([&](Work&) {
-    experiment_ = read_experiment({file, overrides, {}, {}});
+    // What only renders needs no target values: they are missed where they are needed.
+    try {
+      experiment_ = read_experiment({file, overrides, {}, {}});
+    } catch (const InputError& error) {
+      experiment_ = read_experiment({file, overrides, {}, {}}, false);
+      no_target_ = error.what();
+    }
     problem_ = std::make_unique<Problem>(experiment_, [&](const std::string& text) { warnings.push_back(text); });
   });
   own_evaluations_ = std::max(1, experiment_.optimizer.iterations);
@@ -109,12 +115,12 @@ py::array Session::vjp(const Array& array, const Array& adjoint, Samples samples
 
 py::dict Session::evaluate(const Array& array, std::uint32_t iteration) {
   const std::vector<double> theta = point(array);
-  target();
   Evaluation found = run_work_for([&] {
+    const std::shared_ptr<const GatedImage> target = shared_target();
     choose_own();
     problem_->require_parameters();
     require_two_samples(*problem_);
-    return RenderedObjective(*problem_, *target_, throw_if_stopped).evaluate(theta, iteration);
+    return RenderedObjective(*problem_, *target, throw_if_stopped).evaluate(theta, iteration);
   });
   py::dict result;
   result["loss"] = found.loss;
@@ -128,6 +134,7 @@ py::dict Session::evaluate(const Array& array, std::uint32_t iteration) {
 py::dict Session::gradient(const Array& array, Samples samples, Seed seed) {
   const std::vector<double> theta = point(array);
   Statistics found = run_work_for([&] {
+    require_target();
     choose(samples, seed, 1);
     require_renderable(theta);
     problem_->require_parameters();
@@ -141,17 +148,25 @@ py::dict Session::gradient(const Array& array, Samples samples, Seed seed) {
   return result;
 }
 
+void Session::require_target() const {
+  if (!no_target_.empty()) throw InputError(no_target_);
+}
+
+std::shared_ptr<const GatedImage> Session::shared_target() {
+  require_target();
+  if (!target_) {
+    choose_own();
+    GatedImage image = problem_->make_target(throw_if_stopped);
+    require_finite(image, "the target");
+    // Runs read it from a file of such numbers.
+    for (double& value : image.data) value = static_cast<float>(value);
+    target_ = std::make_shared<const GatedImage>(std::move(image));
+  }
+  return target_;
+}
+
 py::array Session::target() {
-  if (!target_)
-    target_ = run_work_for([&] {
-      choose_own();
-      GatedImage image = problem_->make_target(throw_if_stopped);
-      require_finite(image, "the target");
-      // Runs read it from a file of such numbers.
-      for (double& value : image.data) value = static_cast<float>(value);
-      return image;
-    });
-  return to_array(*target_);
+  return to_array(*run_work_for([&] { return shared_target(); }));
 }
 
 }  // namespace isochron

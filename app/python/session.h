@@ -49,6 +49,10 @@ class Session {
   std::vector<double> point(const Array& theta) const;
   /// Throws InputError where coordinates are too large.
   void require_renderable(const std::vector<double>& theta) const;
+  /// Throws InputError where a parameter lacks the target value that a target is rendered with.
+  void require_target() const;
+  /// What optimisations aim at, computed when first asked for. For tasks of run_work alone, which take turns.
+  std::shared_ptr<const GatedImage> shared_target();
   /// Sets samples, seed and how many evaluations they are for.
   void choose(Samples samples, Seed seed, int evaluations);
   /// As the experiment says, for an optimisation.
@@ -57,7 +61,8 @@ class Session {
   Experiment experiment_;  ///< with its overrides
   int own_evaluations_;
   std::unique_ptr<Problem> problem_;
-  std::optional<GatedImage> target_;
+  std::shared_ptr<const GatedImage> target_;
+  std::string no_target_;  ///< why there is none: a parameter without a target value; empty where there is one
 };
 
 /// Goes on with the run in a folder.

@@ -53,6 +53,7 @@ void execute(const std::string& folder, bool force, const py::object& row,
 
 std::string Session::run(const std::string& folder, const std::optional<Array>& start, const py::object& row,
                          bool force) {
+  require_target();
   Experiment experiment = experiment_;
   if (start) start_at(point(*start), problem_->parameters(), experiment);
   const std::string output = output_folder(folder, experiment);

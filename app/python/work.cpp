@@ -10,6 +10,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/progress.h"
+#include "core/image/hdf5_file.h"
 
 namespace py = pybind11;
 
@@ -22,6 +23,7 @@ constexpr std::chrono::milliseconds kPause{20};
 std::timed_mutex busy;              // held by the one task that is under way
 thread_local int calls_inside = 0;  // of Work::call that this thread is in: what holds `busy` waits for it
 int threads = 0;
+thread_local Work* current = nullptr;  // whose task this thread runs
 
 /// Runs f with the interpreter's lock; what Python raised in it.
 template <class F>
@@ -54,6 +56,7 @@ class ThreadedWork : public Work {
         raised = raised_by(run_handlers_of_signals);
       if (!raised) {
         std::thread thread([&] {
+          current = this;
           try {
             task(*this);
           } catch (...) {
@@ -122,7 +125,42 @@ class ThreadedWork : public Work {
   bool call_raised_ = false, ended_ = false;
 };
 
+/// h5py's lock of HDF5, taken while it lives. A thread that has it may take it again.
+class H5pyLock {
+ public:
+  H5pyLock() {
+    const py::object module = py::module_::import("sys").attr("modules").attr("get")("h5py._objects");
+    if (module.is_none()) return;
+    lock_ = module.attr("phil");
+    lock_.attr("acquire")();
+  }
+  ~H5pyLock() {
+    if (lock_) lock_.attr("release")();
+  }
+  H5pyLock(const H5pyLock&) = delete;
+  H5pyLock& operator=(const H5pyLock&) = delete;
+
+ private:
+  py::object lock_;
+};
+
 }  // namespace
+
+void share_hdf5() {
+  run_hdf5_by([](const std::function<void()>& work) {
+    if (!current) return work();
+    std::exception_ptr failure;
+    current->call([&] {
+      const H5pyLock lock;
+      try {
+        work();
+      } catch (...) {
+        failure = std::current_exception();
+      }
+    });
+    if (failure) std::rethrow_exception(failure);
+  });
+}
 
 void run_work(const std::function<void(Work&)>& task) {
   ThreadedWork().run(task);

@@ -32,6 +32,10 @@ auto run_work_for(F&& task) {
   return std::move(*result);
 }
 
+/// Makes tasks read and write HDF5 in the thread that Python called from, with the interpreter's lock and h5py's, where that is
+/// loaded: both may stand on the same library, which serves one thread at a time.
+void share_hdf5();
+
 /// Gives each line to Python's module `warnings`, as of who called the package's function that is running.
 void warn_python(const std::vector<std::string>& lines);
 

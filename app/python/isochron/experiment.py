@@ -130,6 +130,31 @@ def _overrides(overrides: Overrides) -> list[str]:
     return [f"{key}={text(key, value)}" for key, value in overrides.items()]
 
 
+class Scaled:
+    """An experiment as optimisers of others want it: unknowns x, theta in units of the parameters' scales, and the loss as a
+    part of the loss at the start, both of one iteration's random numbers."""
+
+    def __init__(self, experiment: Experiment, start: Theta = None, iteration: int = 0) -> None:
+        self._experiment, self._iteration = experiment, iteration
+        self._scale = np.concatenate([np.full(p.initial.size, p.scale) for p in experiment.parameters.values()] or [np.empty(0)])
+        self.initial = experiment.theta(start) / self._scale
+        """[unknown]: x at the start."""
+        self.bounds = list(zip(experiment.lower / self._scale, experiment.upper / self._scale))
+        """The least and the most of each x, infinite where there is no bound."""
+        self.loss_at_start = experiment.evaluate(start, iteration).loss
+        if not self.loss_at_start > 0:
+            raise InputError(f"scaled: the loss at the start is {self.loss_at_start:g}: nothing to be made smaller")
+
+    def theta(self, x: Any) -> np.ndarray:
+        """[unknown]"""
+        return np.asarray(x, dtype=float) * self._scale
+
+    def loss_and_gradient(self, x: Any) -> tuple[float, np.ndarray]:
+        """As scipy.optimize.minimize(..., jac=True) wants them."""
+        loss, gradient = self._experiment.loss_and_gradient(self.theta(x), self._iteration)
+        return loss / self.loss_at_start, gradient * self._scale / self.loss_at_start
+
+
 class Experiment:
     """An experiment's file made ready: scene, gates, parameters, samples.
 
@@ -254,6 +279,10 @@ class Experiment:
         """Loss and gradient [unknown] of `evaluate`, as scipy.optimize.minimize(..., jac=True) wants them."""
         found = self.evaluate(theta, iteration)
         return found.loss, found.gradient
+
+    def scaled(self, start: Theta = None, iteration: int = 0) -> Scaled:
+        """For optimisers of others, which know neither scales of unknowns nor that of the loss."""
+        return Scaled(self, start, iteration)
 
     def gradient(self, theta: Theta = None, samples: int | None = None, seed: int | None = None) -> Gradient:
         """The loss's gradient with standard errors, what `isochron gradient` writes."""
