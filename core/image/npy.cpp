@@ -101,8 +101,8 @@ NumberArray read_npy(const std::string& file) {
   const bool little = type.size() == 3 && (type[0] == '<' || type[0] == '|');
   const auto known = element_types().find(little ? type.substr(1) : "");
   if (known == element_types().end())
-    fail(fmt::format("holds elements of type '{}' (allowed: booleans, integers and 32 or 64-bit floats, little-endian)",
-                     type));
+    fail(fmt::format("holds elements of type {} (allowed: booleans, integers and 32 or 64-bit floats, little-endian)",
+                     quote(type)));
   const ElementType& element = known->second;
   const auto shape = parse_shape(entry(header, "shape"));
   const std::string_view order = entry(header, "fortran_order");

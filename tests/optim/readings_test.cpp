@@ -57,6 +57,7 @@ TEST(Npy, SaysWhatIsAmiss) {
             "is no NumPy array (allowed: .npy as numpy.save writes it)");
   for (const char* type : {">f8", "<c16", "|O", ""})
     EXPECT_TRUE(said(npy(type, false, "1", "12345678")).starts_with("holds elements of type '")) << type;
+  EXPECT_EQ(said(npy("\n\1", false, "1", "1")).find_first_of("\n\1"), std::string::npos);
   EXPECT_EQ(said(npy("<f8", false, "2, 2", "12345678")), "ends before its 2 x 2 elements");
   EXPECT_EQ(said(npy("|u1", false, "4294967296, 4294967296, 4294967296", "1")),
             "ends before its 4294967296 x 4294967296 x 4294967296 elements");
