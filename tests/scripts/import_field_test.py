@@ -216,6 +216,19 @@ class MaterialsTest(FieldTest):
                          {"type": "rough_conductor", "roughness": 0.36, "reflectance": [0.2, 0.4, 0.6]})
         self.assertEqual(material(spec_trans=1, eta=1.3), {"type": "rough_dielectric", "roughness": 0.25, "ior": 1.3})
 
+    def test_coated_materials_are_rendered(self):
+        """What the base adds to the gloss is proportional to its reflectance, unless `nonlinear` says otherwise."""
+        def mean(reflectance, nonlinear):
+            self.material(f"""<bsdf type="twosided"><bsdf type="roughplastic"><float name="alpha" value="0.3"/>
+              <float name="diffuse_reflectance" value="{reflectance}"/> <boolean name="nonlinear" value="{nonlinear}"/>
+              </bsdf></bsdf>""")
+            return self.image("--samples", 64).mean()
+
+        for nonlinear, least, most in (("false", 1.98, 2.02), ("true", 2.3, 4)):
+            dark, grey, bright = (mean(reflectance, nonlinear) for reflectance in (0, 0.4, 0.8))
+            self.assertGreater(dark, 0)
+            self.assertTrue(least < (bright - dark) / (grey - dark) < most)
+
     def test_what_lies_about_a_material(self):
         covered = shape("cube", """<bsdf type="mask"><float name="opacity" value="0.5"/>
           <bsdf type="diffuse"><float name="reflectance" value="0.3"/></bsdf></bsdf>""")
