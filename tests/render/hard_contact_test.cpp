@@ -1,8 +1,8 @@
 // Objects in contact: a cube that stands on the floor (coplanar faces, edges that lie in another surface) and
 // a lamp whose border lies in a wall.
 //
-// Statistics: z-tests at 4.5 standard errors with fixed seeds (false alarms: 7e-6 each, 10 of them), whose
-// errors must be a few per cent of what is compared.
+// Statistics: z-tests at 4.5 standard errors with fixed seeds (false alarms: 7e-6 each, 10 of them), whose errors must be
+// below 3 % of what is compared: 0.8 to 2 % were measured. The smallest term that is not zero makes 12 %.
 //
 // Light between two surfaces that touch is for contact_test.cpp; a black cube has none, but everything else about standing
 // on a floor.
@@ -68,7 +68,7 @@ TEST_P(StandingCube, SidewaysDerivativeIsThatOfFiniteDifferences) {
       scale = std::hypot(scale, term[m][0].mean);
     }
     const double error = std::hypot(total.standard_error, difference.standard_error);
-    EXPECT_LT(error, 0.06 * scale);
+    EXPECT_LT(error, 0.03 * scale);
     EXPECT_LT(std::abs(z_score(total, difference)), 4.5)
         << "motion " << m << ": " << total.mean << " +- " << total.standard_error << ", finite difference "
         << difference.mean << " +- " << difference.standard_error;
