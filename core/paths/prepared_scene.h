@@ -247,7 +247,8 @@ class PreparedScene {
   /// The triangle that the ray from exactly `from` along w hits first, up to `far` lengths of w, or -1.
   int first_hit(const Vec3& from, const Vec3& w, float far = std::numeric_limits<float>::infinity()) const {
     const int t = caster.closest_hit(from, w, far);
-    return t < 0 || stacked.empty() ? t : top_face(t, point_on_triangle(t, from, w).p, w);
+    if (t < 0 || !stacked.may_cover(t, normal(t), w)) return t;
+    return top_face(t, point_on_triangle(t, from, w).p, w);
   }
   /// Of the triangles that lie on each other at the point p of `triangle` the one that is seen along w: an emitter that faces
   /// the viewer, else one that faces the viewer, else one with a back that scatters, else a black back; among those the last in
@@ -278,7 +279,8 @@ class PreparedScene {
   /// Whether light from x meets y, which is the last point on its way or covered by nothing that lies on it.
   bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
     const Vec3 d = y.p - x.p;
-    if (!stacked.empty() && y.triangle >= 0 && top_face(y.triangle, y.p, d) != y.triangle) return false;
+    if (y.triangle >= 0 && stacked.may_cover(y.triangle, y.n, d) && top_face(y.triangle, y.p, d) != y.triangle)
+      return false;
     return !caster.occluded(offset_ray_origin(x, d), offset_ray_origin(y, -d));
   }
 

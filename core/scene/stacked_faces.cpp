@@ -136,6 +136,14 @@ Corners corners_of(const std::vector<Vec3>& positions, const std::array<int, 3>&
   return {positions[v[0]], positions[v[1]], positions[v[2]]};
 }
 
+bool face_alike(const Scene& scene, int a, int b) {
+  const auto normal = [&](int t) {
+    const Corners c = corners_of(scene.positions, scene.triangles[t].vertex);
+    return cross(c[1] - c[0], c[2] - c[0]);
+  };
+  return dot(normal(a), normal(b)) > 0;
+}
+
 double touching_distance(const std::vector<Vec3>& positions) {
   double largest = 0;
   for (const Vec3& p : positions) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -186,6 +194,9 @@ void StackedFaces::update(const Scene& scene, std::vector<char> moved, double to
       pairs_.push_back({b, a});
     }
   std::sort(pairs_.begin(), pairs_.end());
+  kind_.assign(scene.triangles.size(), Kind::free);
+  for (const auto& [a, b] : pairs_)
+    kind_[a] = std::max(kind_[a], face_alike(scene, a, b) ? Kind::alike : Kind::opposite);
 }
 
 void StackedFaces::find_between(const Scene& scene, int a, int b) {
@@ -216,13 +227,9 @@ std::string stacked_warning(const Scene& scene) {
   constexpr std::size_t kMostNamed = 4;
   StackedFaces stacked;
   stacked.update(scene, std::vector<char>(scene.shapes.size(), 1), touching_distance(scene.positions));
-  const auto normal = [&](int t) {
-    const Corners c = corners_of(scene.positions, scene.triangles[t].vertex);
-    return cross(c[1] - c[0], c[2] - c[0]);
-  };
   std::map<std::array<int, 2>, std::vector<int>> found;  // by shapes: triangles of the second
   for (const auto& [a, b] : stacked.between_shapes())
-    if (dot(normal(a), normal(b)) > 0) found[{scene.triangles[a].shape, scene.triangles[b].shape}].push_back(b);
+    if (face_alike(scene, a, b)) found[{scene.triangles[a].shape, scene.triangles[b].shape}].push_back(b);
   if (found.empty()) return {};
   std::string names;
   std::size_t named = 0;

@@ -1,6 +1,7 @@
 // Faces that lie on each other: doubled ones, a front and a back, a patch in the plane of a floor.
 #pragma once
 #include <array>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,6 +25,11 @@ class StackedFaces {
   /// `moved`: shapes to search again. `touching`: as far as this from each other faces lie on each other.
   void update(const Scene& scene, std::vector<char> moved, double touching);
   bool empty() const { return pairs_.empty(); }
+  /// Whether another face may be seen in place of the triangle by who looks along w, `normal` being the triangle's. Of a box
+  /// that stands on a floor, say, this is only so from behind.
+  bool may_cover(int triangle, const Vec3& normal, const Vec3& w) const {
+    return !empty() && kind_[triangle] != Kind::free && (kind_[triangle] == Kind::alike || !(dot(normal, w) < 0));
+  }
   /// {triangle, another one that lies on it}, for each of them.
   std::span<const std::array<int, 2>> of(int triangle) const;
   /// Pairs of triangles of different shapes, each once, ascending.
@@ -31,11 +37,14 @@ class StackedFaces {
 
  private:
   struct ShapeBox;
+  /// Of a triangle: on no other, on such as face the other way, on one that faces the same way.
+  enum class Kind : std::uint8_t { free, opposite, alike };
   void find_between(const Scene& scene, int a, int b);
 
   std::vector<ShapeBox> boxes_;              ///< of each shape
   std::vector<std::array<int, 2>> between_;  ///< of different shapes
   std::vector<std::array<int, 2>> pairs_;    ///< all, both ways, in order
+  std::vector<Kind> kind_;                   ///< of each triangle
   double touching_ = -1;
 };
 

@@ -29,7 +29,7 @@ std::optional<SurfacePoint> seen_beside(Worker& worker, const BoundaryEdge& edge
   const double offset = scene.caster.offset();
   if (front >= 0) {
     const Vec3 p = y + into_front * offset;
-    if (!scene.stacked.empty()) front = scene.top_face(front, p, d);
+    if (scene.stacked.may_cover(front, scene.normal(front), d)) front = scene.top_face(front, p, d);
     return SurfacePoint{p, scene.normal(front), front};
   }
   ++worker.rays;
