@@ -5,6 +5,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <atomic>
+#include <memory>
 #include <mutex>
 
 #include "core/base/progress.h"
@@ -12,25 +14,28 @@
 namespace isochron {
 namespace {
 
-int thread_count = 0;
+std::atomic<int> thread_count = 0;
 
-/// Kept from call to call, each of which would else hire its threads anew.
-tbb::task_arena& arena() {
-  static tbb::task_arena kept;
-  static int threads_of_kept = -1;
+/// Kept from call to call, each of which would else hire its threads anew. Callers share it, so that another number of
+/// threads does not end the one that another thread works in.
+std::shared_ptr<tbb::task_arena> arena() {
+  static std::shared_ptr<tbb::task_arena> kept;
+  static int threads_of_kept = 0;
   static std::mutex mutex;
+  const int threads = thread_count;
   const std::lock_guard lock(mutex);
-  if (threads_of_kept != thread_count) {
-    kept.terminate();
-    kept.initialize(thread_count > 0 ? thread_count : tbb::task_arena::automatic);
-    threads_of_kept = thread_count;
+  if (!kept || threads_of_kept != threads) {
+    const int concurrency = threads > 0 ? threads : tbb::task_arena::automatic;
+    kept = std::make_shared<tbb::task_arena>(concurrency);
+    threads_of_kept = threads;
   }
   return kept;
 }
 
 template <class F>
 void run(int count, const F& f) {
-  arena().execute([&] {
+  const std::shared_ptr<tbb::task_arena> shared = arena();
+  shared->execute([&] {
     tbb::parallel_for(
         tbb::blocked_range<int>(0, count, 1),
         [&](const tbb::blocked_range<int>& range) {

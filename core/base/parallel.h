@@ -4,7 +4,8 @@
 
 namespace isochron {
 
-/// Threads that renderers use; 0: all cores. Results do not depend on it.
+/// Threads that renderers use; 0: all cores. Results do not depend on it. May be called while other threads are in
+/// `parallel`, which then go on with those that they began with.
 void set_thread_count(int threads);
 
 /// From now on, memory that one pass frees stays with the process for the next: fresh pages can cost more than what they

@@ -2,6 +2,7 @@
 // from: techniques that start in a pixel have a set of points per pixel, those that may land anywhere have one set for the
 // whole image, which every pixel's samples are a part of.
 #pragma once
+#include <algorithm>
 #include <cmath>
 
 #include "core/base/progress.h"
@@ -32,10 +33,10 @@ struct SamplePart {
 class PointSet {
  public:
   PointSet(const Stream& stream, Technique technique, std::uint32_t place, SampleRange range, Numbers numbers)
-      : rng_(Rng(stream, static_cast<std::uint64_t>(technique) << 32 | place, 0)
-                 .in_set(static_cast<std::uint32_t>(range.begin))),
-        together_(numbers == Numbers::low_discrepancy),
-        key_(together_ ? rng_.scramble_key() : 0) {}
+      : stream_(stream),
+        index_(static_cast<std::uint64_t>(technique) << 32 | place),
+        set_(static_cast<std::uint32_t>(range.begin)),
+        together_(numbers == Numbers::low_discrepancy) {}
 
   /// sample(rng) for the points from number `from` up to `to` of a set that goes on from part to part. Both may be
   /// fractions: all of a set's parts are then shifted by the same random number, so that each has to - from samples
@@ -43,21 +44,37 @@ class PointSet {
   template <class F>
   void visit(double from, double to, SamplePart part, F&& sample) const {
     const bool whole = from == std::floor(from) && to == std::floor(to);
-    const double shift = whole ? 0 : rng_.shift();
+    const double shift = whole ? 0 : of_run(0).shift();
     const auto begin = static_cast<std::int64_t>(from + shift), count = static_cast<std::int64_t>(to + shift) - begin;
     const std::int64_t end = begin + count * (part.index + 1) / part.count;
-    for (std::int64_t i = begin + count * part.index / part.count; i < end; ++i) {
-      throw_if_stopped();
-      const auto number = static_cast<std::uint32_t>(i);
-      Rng rng = together_ ? rng_.with_point(number, key_, number) : rng_.with_sample(number);
-      sample(rng);
+    for (std::int64_t i = begin + count * part.index / part.count; i < end;) {
+      const std::int64_t run = i / kRun;
+      const Rng rng_of_run = of_run(run);
+      const std::uint64_t key = together_ ? rng_of_run.scramble_key() : 0;
+      for (const std::int64_t run_end = std::min(end, (run + 1) * kRun); i < run_end; ++i) {
+        throw_if_stopped();
+        const auto number = static_cast<std::uint32_t>(i - run * kRun);
+        Rng rng = together_ ? rng_of_run.with_point(number, key, number) : rng_of_run.with_sample(number);
+        sample(rng);
+      }
     }
   }
 
  private:
-  Rng rng_;
+  /// Samples have numbers of 32 bits, the largest of which is none's (see Rng). So a set has other random numbers, and points
+  /// with another scramble, after each run of so many.
+  static constexpr std::int64_t kRun = std::int64_t{1} << 31;
+  /// Bits of `index_`: those of the place, then of the technique, then of the run.
+  static constexpr int kRunBits = 40;
+
+  Rng of_run(std::int64_t run) const {
+    return Rng(stream_, static_cast<std::uint64_t>(run) << kRunBits | index_, 0).in_set(set_);
+  }
+
+  Stream stream_;
+  std::uint64_t index_;
+  std::uint32_t set_;
   bool together_;
-  std::uint64_t key_;
 };
 
 class SamplePoints {

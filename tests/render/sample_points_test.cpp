@@ -55,6 +55,31 @@ TEST(SamplePoints, EverySampleHasNumbersOfItsOwn) {
   }
 }
 
+/// Beyond what 32 bits count, points do not come again: each 256 that belong to a pixel cover as many intervals, and differ from
+/// those of all other pixels. (Of 3000 numbers of 32 bits two are equal by chance in 1e-3 of such sets, and 256 independent
+/// ones never have an interval each.)
+TEST(SamplePoints, SetsGoOnBeyondThirtyTwoBits) {
+  constexpr int kSamples = 256, kPixels = 1 << 24;  // times kSamples: 2^32 points
+  for (const Numbers numbers : {Numbers::low_discrepancy, Numbers::independent}) {
+    const SamplePoints points(kStream, {0, kSamples}, numbers);
+    std::set<double> all;
+    std::size_t count = 0;
+    for (const int begin : {0, kPixels / 2, kPixels, 3 * kPixels, 5 * kPixels})
+      for (int pixel = std::max(0, begin - 1); pixel <= begin + 1; ++pixel) {
+        std::set<int> intervals;
+        for (const double x : numbers_of(points, Technique::from_edge, pixel, pixel + 1, 1)) {
+          intervals.insert(static_cast<int>(x * kSamples));
+          all.insert(x);
+          ++count;
+        }
+        if (numbers == Numbers::low_discrepancy) {
+          EXPECT_EQ(intervals.size(), std::size_t{kSamples}) << pixel;
+        }
+      }
+    EXPECT_EQ(all.size(), count);
+  }
+}
+
 TEST(SamplePoints, PartsMakeUpTheWhole) {
   for (const double rate : {1.0, 1.7, 0.4}) {
     constexpr int kParts = 3, kPixel = 6;

@@ -1,0 +1,37 @@
+// Loops on several threads, from several threads.
+#include "core/base/parallel.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+
+namespace isochron {
+namespace {
+
+/// Another number of threads, while one thread is in the middle of a loop, counts for the loops that begin then.
+TEST(Parallel, ThreadCountChangesUnderALoop) {
+  for (int round = 0; round < 20; ++round) {
+    set_thread_count(2);
+    std::atomic<bool> began = false, changed = false;
+    std::atomic<int> outer = 0, inner = 0;
+    std::thread other([&] {
+      while (!began) std::this_thread::yield();
+      set_thread_count(1 + round % 3);
+      parallel(50, [&](int) { ++inner; });
+      changed = true;
+    });
+    parallel(50, [&](int) {
+      began = true;
+      while (!changed) std::this_thread::yield();
+      ++outer;
+    });
+    other.join();
+    EXPECT_EQ(outer, 50);
+    EXPECT_EQ(inner, 50);
+  }
+  set_thread_count(0);
+}
+
+}  // namespace
+}  // namespace isochron
