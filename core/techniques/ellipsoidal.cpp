@@ -7,6 +7,37 @@
 
 namespace isochron {
 
+double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
+                         double ArcDensities::*technique, double pdf_on_arc) {
+  const GatePick& pick = worker.pick;
+  // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
+  // densities of the length differ between the two techniques.
+  const bool same_length_pdf = pick.uniform() || path.size() != 3;
+  const double camera_rate = target.pair ? worker.rates.camera_pairs : worker.rates.camera_lengths;
+  const ArcDensities d = worker.techniques.arcs(path, technique, pdf_on_arc, false, [&](int from) {
+    const double rate = from == 0 ? camera_rate : worker.rates.walk;
+    if (same_length_pdf) return rate;
+    const int served = from == 0 ? GatePick::kImage : pixel;
+    // A pair serves one gate.
+    return rate * (from == 0 ? 1 : pick.rate(pixel)) *
+           (target.pair ? pick.probability(served, target.gate)
+                        : pick.length_pdf(served, path.length[path.size() - 1]));
+  });
+  const double sum = d.surface + d.emitter;
+  if (!(sum > 0)) return 0;
+  // No other technique finds lengths at a jump.
+  const double share = worker.ellipsoidal_share, gain = target.pair ? worker.antithetic_factor : 1;
+  const double ours =
+      target.jump[side] || share == 1 ? 1 : worker.techniques.ellipsoidal_weight(path, pixel, share, gain);
+  return ours / share * (d.*technique / sum);
+}
+
+double gathered_weight(const Worker& worker, const Path& path, double ArcDensities::*technique, double pdf_on_arc) {
+  const ArcDensities d = worker.techniques.arcs(path, technique, pdf_on_arc, true, [](int) { return 1.0; });
+  const double sum = d.surface + d.emitter;
+  return sum > 0 ? d.*technique / sum : 0;
+}
+
 void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
   worker_.start_at_sensor(worker_.path, 0);
   draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
@@ -269,39 +300,13 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, const Fo
   out.point = y;
 }
 
-double EllipsoidalConnections::mis_weight(const TargetLength& target, int i, const ArcPoint& found,
-                                          double ArcDensities::*technique) const {
-  // No other technique finds lengths at a jump, and these serve one gate.
-  const bool jump = target.jump[i];
-  const Path& path = worker_.path;
-  const GatePick& pick = worker_.pick;
-  const int pixel = found.pixel;
-  // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
-  // densities of the length differ between the two techniques.
-  const bool same_length_pdf = pick.uniform() || path.size() != 3;
-  const ConnectionRates& rates = worker_.rates;
-  const double camera_rate = target.pair ? rates.camera_pairs : rates.camera_lengths;
-  const ArcDensities d = worker_.techniques.arcs(path, technique, found.pdf, receiver_ != nullptr, [&](int from) {
-    if (receiver_) return 1.0;
-    const double rate = from == 0 ? camera_rate : rates.walk;
-    if (same_length_pdf) return rate;
-    const int served = from == 0 ? GatePick::kImage : pixel;
-    return rate * (from == 0 ? 1 : pick.rate(pixel)) *
-           (jump ? pick.probability(served, target.gate) : pick.length_pdf(served, path.length[path.size() - 1]));
-  });
-  const double sum = d.surface + d.emitter;
-  if (!(sum > 0)) return 0;
-  if (receiver_) return d.*technique / sum;
-  const double share = worker_.ellipsoidal_share;
-  const double gain = target.pair ? worker_.antithetic_factor : 1;
-  const double ours = jump || share == 1 ? 1 : worker_.techniques.ellipsoidal_weight(path, pixel, share, gain);
-  return ours / share * (d.*technique / sum);
-}
-
 void EllipsoidalConnections::deliver(const TargetLength& target, int i, const ArcPoint& found,
                                      double inverse_probability, double ArcDensities::*technique) {
   if (!receiver_ && !worker_.contributes(worker_.path)) return;
-  const Rgb value = found.value * (inverse_probability * mis_weight(target, i, found, technique) * target.scale);
+  const double weight = receiver_
+                            ? gathered_weight(worker_, worker_.path, technique, found.pdf)
+                            : connection_weight(worker_, worker_.path, found.pixel, target, i, technique, found.pdf);
+  const Rgb value = found.value * (inverse_probability * weight * target.scale);
   if (receiver_)
     receiver_->take(target.index, worker_.path.size() - 2, value);
   else if (target.pair)

@@ -18,6 +18,15 @@
 
 namespace isochron {
 
+/// Multiple importance sampling of the complete path of a pixel, as long as that side of the target says: the part of it that
+/// connections by `technique` take, over the connections' share of the samples. `pdf_on_arc`: of the point that was found, per
+/// area and length.
+double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
+                         double ArcDensities::*technique, double pdf_on_arc);
+
+/// The same of a path that was gathered for its vertex 0: techniques by arcs alone share it.
+double gathered_weight(const Worker& worker, const Path& path, double ArcDensities::*technique, double pdf_on_arc);
+
 /// Takes the light that EllipsoidalConnections::gather finds.
 class LengthReceiver {
  public:
@@ -96,9 +105,6 @@ class EllipsoidalConnections {
                          const Rgb& throughput, ArcPoint& out) const;
   /// At the path's last vertex, which is not its first: from the one before, to the unit direction `w`.
   Directions scattering_to(const Vec3& w) const;
-
-  /// Share of a contribution found by `technique`, over the connections' share of the samples.
-  double mis_weight(const TargetLength& target, int i, const ArcPoint& found, double ArcDensities::*technique) const;
 
   /// The worker's path is complete, by the point `found`, and as long as side i of the target says.
   void deliver(const TargetLength& target, int i, const ArcPoint& found, double inverse_probability,

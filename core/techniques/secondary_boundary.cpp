@@ -122,10 +122,15 @@ void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
     pick = pick_from_camera(pixel, bounce + 1, rng);
     if (!append_vertex(worker_, path, throughput, rng)) return;
-    const SurfacePoint &before = path.vertex[bounce - 1], &x = path.vertex[bounce];
-    camera_densities_.towards_light *= towards(before, x, path.back());
-    if (bounce > 1) camera_densities_.towards_camera *= back(before, x, path.back().p);
+    extend_camera_densities(bounce);
   }
+}
+
+void SecondaryBoundary::extend_camera_densities(int bounce) {
+  const Path& path = worker_.path;
+  const SurfacePoint &before = path.vertex[bounce - 1], &x = path.vertex[bounce], &after = path.vertex[bounce + 1];
+  camera_densities_.towards_light *= towards(before, x, after);
+  if (bounce > 1) camera_densities_.towards_camera *= back(before, x, after.p);
 }
 
 bool SecondaryBoundary::faces(int triangle, const Vec3& w) const {
@@ -311,8 +316,9 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
     if (differential.empty()) continue;
     worker_.sink.bind(differential);
     worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
-    // The balance heuristic cancels this technique's own rate.
-    worker_.sink.add(pixel, c.value * radiance * (1 / (1 / c.camera_over_edge + 1 + rate)), tau, kValueOnly);
+    // Its share over its density is that of random edge points over theirs.
+    const double weight = BoundaryShares(c.camera_over_edge, rate).from_camera;
+    worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
     worker_.sink.note_guide(table, g.y.x());
   }
 }
@@ -378,7 +384,6 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
     const Connection& c = connections_[i];
     const LocalDifferential* differential = &flow_of(c);
     if (!may_follow && differential->empty()) continue;
-    const double ratio = c.camera_over_edge;
     for (const GatheredLight& e : lights) {
       if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
       if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
@@ -386,9 +391,10 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
       if (differential->empty()) continue;
       if (may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
       const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
+      const BoundaryShares shares(c.camera_over_edge, rate);
       const double weight = found == Found::from_light  ? 1
-                            : found == Found::from_edge ? 1 / (1 + ratio * (1 + rate))
-                                                        : 1 / (1 / ratio + 1 + rate);
+                            : found == Found::from_edge ? shares.from_edge
+                                                        : shares.from_camera;
       worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0]);
       worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i].length + e.length, kValueOnly);
     }

@@ -1,5 +1,5 @@
 // Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Four ways
-// to find such segments, combined by multiple importance sampling (balance heuristic):
+// to find such segments, combined by multiple importance sampling (balance heuristic; BoundaryShares):
 //   - from the edge, direction within the wedge of grazing directions;
 //   - from the edge, aimed at a point on an emitter;
 //   - from the camera: D is a vertex of a camera path, y a point of a random edge. Finds what a narrow field of view
@@ -18,6 +18,18 @@
 
 namespace isochron {
 
+/// Which part of a segment each technique takes that finds it.
+struct BoundaryShares {
+  double from_edge, from_camera, at_length;
+
+  /// From densities: of finding it from the camera, by a random edge point, over that from an edge (infinite: only the camera
+  /// finds it), and of finding it from the camera at a length over that by a random edge point.
+  BoundaryShares(double camera_over_edge, double length_over_random)
+      : from_edge(1 / (1 + camera_over_edge * (1 + length_over_random))),
+        from_camera(1 / (1 / camera_over_edge + 1 + length_over_random)),
+        at_length(length_over_random * from_camera) {}
+};
+
 class SecondaryBoundary {
  public:
   /// There must be edges to sample from where a sample is asked for (`has_secondary`). `narrow_gates`: use the techniques
@@ -35,6 +47,8 @@ class SecondaryBoundary {
   void sample_from_camera(int pixel, double scale, Rng& rng);
 
  private:
+  friend class BoundaryWeights;  // looks at the densities of segments that one technique finds and others could find
+
   /// The boundary segment: from D (camera side) through the edge point along the unit direction w to S (light side).
   struct Segment {
     BoundaryEdges::Sample y;
@@ -120,6 +134,9 @@ class SecondaryBoundary {
   /// Walks on from D, away from the light, and collects a connection to the camera, or to the sensor point of the pixel, at
   /// every vertex.
   void walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng);
+
+  /// Includes the worker's last vertex but one, which is number `bounce`, in `camera_densities_`.
+  void extend_camera_densities(int bounce);
 
   /// Draws an edge point for D, vertex `bounces` of a path through the pixel.
   BoundaryEdges::Pick pick_from_camera(int pixel, int bounces, Rng& rng) const;

@@ -8,6 +8,16 @@ constexpr std::size_t kCachedTriangles = 1 << 13;
 
 }  // namespace
 
+GateWeights standard_weights(const Worker& worker, const Path& path, int pixel, bool pairs) {
+  const double share = worker.ellipsoidal_share;
+  if (!(share > 0)) return {};
+  const auto weight = [&](double gain) {
+    return (1 - worker.techniques.ellipsoidal_weight(path, pixel, share, gain)) / (1 - share);
+  };
+  const double of_value = weight(1);
+  return {of_value, pairs ? weight(worker.antithetic_factor) : of_value};
+}
+
 StandardPaths::StandardPaths(Worker& worker, bool pairs)
     : worker_(worker),
       large_(worker.scene.scene.triangles.size() > kCachedTriangles),
@@ -67,16 +77,7 @@ StandardPaths::Slot::Walk StandardPaths::Slot::begin(int pixel, double scale, Rn
 }
 
 void StandardPaths::Slot::emit(const Rgb& value) {
-  GateWeights weights;
-  if (const double share = worker_.ellipsoidal_share; share > 0) {
-    // This technique's share in the balance heuristic, over the share of the samples.
-    const auto weight = [&](double gain) {
-      return (1 - worker_.techniques.ellipsoidal_weight(path_, pixel_, share, gain)) / (1 - share);
-    };
-    weights.value = weight(1);
-    weights.slope = pairs_ ? weight(worker_.antithetic_factor) : weights.value;
-  }
-  worker_.emit(path_, pixel_, value * scale_, path_.length.back(), weights);
+  worker_.emit(path_, pixel_, value * scale_, path_.length.back(), standard_weights(worker_, path_, pixel_, pairs_));
 }
 
 }  // namespace isochron

@@ -1,0 +1,281 @@
+// Multiple importance sampling, path by path: the parts of a path that all techniques take which could have found it add up to
+// one, and what a technique hands on is the path's contribution over its density, times that part. Nothing is estimated:
+// sums hold to round-off for every path, so that a density that two techniques see otherwise fails at once.
+#include <gtest/gtest.h>
+
+#include "core/techniques/ellipsoidal.h"
+#include "core/techniques/standard_paths.h"
+#include "support.h"
+#include "tests/seed.h"
+
+namespace isochron::testing {
+namespace {
+
+/// Keeps complete paths, with the pixel and the value that came with each.
+struct PathSink final : Sink {
+  struct Found {
+    Path path;
+    int pixel;
+    Rgb value;
+  };
+  std::vector<Found> found;
+  bool differential() const override { return false; }
+  void note_path(const Path& path) override { found.push_back({path, -1, {}}); }
+  void add(int pixel, const Rgb& value, double, GateWeights) override {
+    found.back().pixel = pixel;
+    found.back().value = value;
+  }
+};
+
+/// The validation scene, its panel glossy and its block as given.
+Scene box_with(const Material& block) {
+  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = 8;
+  replace_material(scene, "panel", conductor(Rgb(0.7), 0.4, true));
+  replace_material(scene, "block", block);
+  return scene;
+}
+
+/// Every pixel and gate counts, each otherwise.
+GatedImage positive_adjoint(const Scene& scene, int gates) {
+  GatedImage adjoint(scene.camera.width, scene.camera.height, gates, 1);
+  Rng rng(Stream{test_seed(5), 0, 0}, 0, 0);
+  for (double& x : adjoint.data) x = 0.01 + rng.uniform() * rng.uniform();
+  return adjoint;
+}
+
+/// What finds paths under one pair of options, and the paths that it found.
+struct Finder {
+  Scene scene;
+  PreparedScene prepared;
+  GateSet gates{GateShape::gaussian(0.6), {4.5, 5.0, 6.0}};  // they overlap
+  EstimatorOptions options{.max_bounces = 2, .pick = ArcPick::uniform};
+  GatePick pick;
+  PathSink sink;
+  Worker worker;
+
+  explicit Finder(const Material& block)
+      : scene(box_with(block)),
+        prepared(scene, nullptr),
+        pick(gates, positive_adjoint(scene, 3)),
+        worker(prepared, gates, options, pick, sink) {}
+
+  void find_by_standard_sampling(int paths) {
+    StandardPaths standard(worker, false);
+    for (int i = 0; i < paths; ++i) {
+      Rng rng(Stream{test_seed(1), 0, 0}, i, 0);
+      standard.start(i % prepared.pixels(), 1, rng);
+    }
+    standard.finish();
+  }
+  template <class F>
+  void find_by_connections(int samples, F&& sample) {
+    GatePass single_lengths;
+    single_lengths.value = true;
+    EllipsoidalConnections connections(worker, single_lengths);
+    for (int i = 0; i < samples; ++i) {
+      Rng rng(Stream{test_seed(2), 0, 0}, i, 0);
+      sample(connections, i % prepared.pixels(), rng);
+    }
+  }
+};
+
+/// Density of the path's point on its arc, per area and length, as a connection of the technique would draw it; 0: it would not.
+double pdf_on_arc(const PreparedScene& scene, const Path& path, double ArcDensities::*technique) {
+  const int last = path.size() - 1;
+  const SurfacePoint& y = path.vertex[last];
+  const bool by_emitter = technique == &ArcDensities::emitter;
+  if (!by_emitter && last < 2) return 0;
+  const SurfacePoint &from = path.vertex[by_emitter ? last - 1 : last - 2],
+                     &found = by_emitter ? y : path.vertex[last - 1];
+  const double r = length(found.p - from.p), s = by_emitter ? r : length(found.p - y.p);
+  const Ellipsoid ellipsoid(from.p, by_emitter ? from.p : y.p, r + s);
+  EllipseArcs arcs;
+  if (!ellipsoid.valid() || !scene.clip(ellipsoid, found.triangle, arcs)) return 0;
+  const double by_angle = by_emitter ? r : area_per_angle_and_length(ellipsoid, found.p, found.n);
+  return 1 / (arcs.total_span * by_angle);
+}
+
+constexpr double ArcDensities::*kArcs[] = {&ArcDensities::surface, &ArcDensities::emitter};
+
+/// What connections take of the path.
+double part_of_connections(const Finder& f, const PathSink::Found& found, const TargetLength& target) {
+  double sum = 0;
+  for (const auto technique : kArcs)
+    if (const double pdf = pdf_on_arc(f.prepared, found.path, technique); pdf > 0)
+      sum +=
+          f.worker.ellipsoidal_share * connection_weight(f.worker, found.path, found.pixel, target, 0, technique, pdf);
+  return sum;
+}
+
+TargetLength pair_target(int gate, bool jump = false) {
+  TargetLength target;
+  target.pair = true;
+  target.gate = gate;
+  target.jump[0] = jump;
+  return target;
+}
+
+class Weights : public ::testing::TestWithParam<const char*> {
+ protected:
+  Finder finder() const { return Finder(std::string(GetParam()) == "glass" ? glass(0.3, 1.5) : diffuse(Rgb(0.6))); }
+};
+
+TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
+  Finder f = finder();
+  f.find_by_standard_sampling(4000);
+  f.find_by_connections(2000, [](auto& connections, int pixel, Rng& rng) {
+    connections.sample_walk(pixel, 1, rng);
+    connections.sample_from_camera(1, rng);
+  });
+  ASSERT_GT(f.sink.found.size(), 1000u);
+  int shared = 0;
+  for (const PathSink::Found& found : f.sink.found) {
+    f.worker.antithetic_factor = 7;
+    f.worker.rates = {};
+    for (const double share : {0.3, 0.9}) {
+      f.worker.ellipsoidal_share = share;
+      const GateWeights standard = standard_weights(f.worker, found.path, found.pixel, true);
+      const double of_value = part_of_connections(f, found, {});
+      EXPECT_NEAR(of_value + (1 - share) * standard.value, 1, 1e-9);
+      for (int gate = 0; gate < 3; ++gate)
+        EXPECT_NEAR(part_of_connections(f, found, pair_target(gate)) + (1 - share) * standard.slope, 1, 1e-9);
+      shared += of_value > 0.01 && standard.value > 0.01;
+    }
+    // By themselves, and at jumps, which standard sampling does not find.
+    if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
+    f.worker.ellipsoidal_share = 1;
+    f.worker.rates = {0.3, 2, 0.1};
+    for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
+      EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
+  }
+  EXPECT_GT(shared, 500);
+}
+
+/// Of two bounces' paths, surface arcs come from the camera and serve the whole image, emitter arcs serve a pixel: what each
+/// takes is in proportion to how often it makes the path. A pair serves one gate, a single length all of them.
+TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
+  Finder f = finder();
+  f.find_by_standard_sampling(4000);
+  f.worker.ellipsoidal_share = 1;
+  f.worker.rates = {0.3, 2, 0.1};
+  int compared = 0;
+  for (const auto& [path, pixel, value] : f.sink.found) {
+    const double surface = pdf_on_arc(f.prepared, path, kArcs[0]), emitter = pdf_on_arc(f.prepared, path, kArcs[1]);
+    if (path.size() != 3 || !(surface > 0 && emitter > 0)) continue;
+    const SurfacePoint &q = path.vertex[1], &y = path.vertex[2];
+    if (!f.prepared.outside(q, y)) continue;
+    const Vec3 w = normalize(q.p - path.vertex[0].p);
+    const double walk = f.prepared.camera.image_area_per_solid_angle(w) * solid_angle_to_area(path.vertex[0].p, q) /
+                        f.prepared.pixels() * f.pick.rate(pixel);
+    const auto expect_ratio = [&](const TargetLength& target, double camera_rate, double of_image, double of_pixel) {
+      const double by_surface = connection_weight(f.worker, path, pixel, target, 0, kArcs[0], surface),
+                   by_emitter = connection_weight(f.worker, path, pixel, target, 0, kArcs[1], emitter);
+      const double expected = f.prepared.emitter_pdf(y.triangle) * surface * camera_rate * of_image /
+                              (walk * emitter * f.worker.rates.walk * of_pixel);
+      EXPECT_NEAR(by_surface / by_emitter, expected, 1e-9 * expected);
+    };
+    for (int gate = 0; gate < 3; ++gate)
+      expect_ratio(pair_target(gate), f.worker.rates.camera_pairs, f.pick.probability(GatePick::kImage, gate),
+                   f.pick.probability(pixel, gate));
+    const double length = path.length.back();
+    expect_ratio({}, f.worker.rates.camera_lengths, f.pick.length_pdf(GatePick::kImage, length),
+                 f.pick.length_pdf(pixel, length));
+    ++compared;
+  }
+  EXPECT_GT(compared, 300);
+}
+
+/// What the camera's own connections and those at x1 hand on. One arc of all triangles that hold one is picked uniformly.
+TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
+  for (const bool from_camera : {true, false}) {
+    Finder f = finder();
+    f.worker.ellipsoidal_share = 0.3;
+    f.find_by_connections(4000, [&](EllipsoidalConnections& connections, int pixel, Rng& rng) {
+      from_camera ? connections.sample_from_camera(1, rng) : connections.sample_walk(pixel, 1, rng);
+    });
+    const auto technique = from_camera ? &ArcDensities::surface : &ArcDensities::emitter;
+    int compared = 0;
+    for (const auto& [path, pixel, value] : f.sink.found) {
+      if (path.size() != 3) continue;
+      const SurfacePoint &x = path.vertex[0], &q = path.vertex[1], &y = path.vertex[2];
+      const Scattering s(x.p, q, y.p);
+      Rgb expected = bsdf_value(f.prepared, q, s) * f.prepared.emitted(y, -s.w_i) *
+                     (std::abs(s.cos_i) * solid_angle_to_area(q.p, y));
+      double density = pdf_on_arc(f.prepared, path, technique) *
+                       f.pick.length_pdf(from_camera ? GatePick::kImage : pixel, path.length.back());
+      std::vector<int> triangles;
+      if (from_camera) {
+        expected *= f.prepared.importance(pixel, -s.w_o) * solid_angle_to_area(x.p, q);
+        density *= f.prepared.emitter_pdf(y.triangle);
+        const double tau = s.distance_o + s.distance_i;
+        f.prepared.hierarchy(PreparedScene::Part::all).query_surfaces(x.p, y.p, tau, tau, triangles);
+      } else {
+        const double tau = 2 * s.distance_i;
+        f.prepared.hierarchy(PreparedScene::Part::emitting).query_surfaces(q.p, q.p, tau, tau, triangles);
+      }
+      expected *= connection_weight(f.worker, path, pixel, {}, 0, technique, pdf_on_arc(f.prepared, path, technique)) *
+                  static_cast<double>(triangles.size()) / density;
+      EXPECT_NEAR(value.r, expected.r, 1e-6 * expected.r);
+      ++compared;
+    }
+    EXPECT_GT(compared, 200) << from_camera;
+  }
+}
+
+/// Next-event estimation and rays by the BSDF hand on the same: contribution over the sum of their densities.
+TEST_P(Weights, OfNextEventsAndRaysAddUpToOne) {
+  Finder f = finder();
+  f.find_by_standard_sampling(4000);
+  int found_of[4] = {0, 0, 0, 0};
+  for (const auto& [path, pixel, value] : f.sink.found) {
+    const int last = path.size() - 1;
+    const SurfacePoint& y = path.back();
+    Rgb expected = f.prepared.emitted(y, normalize(path.vertex[last - 1].p - y.p));
+    for (int k = 1; k < last; ++k) {
+      const Scattering s(path.vertex[k - 1].p, path.vertex[k], path.vertex[k + 1].p);
+      double pdf = f.prepared.bsdf_of(path.vertex[k].triangle).pdf(s);
+      if (k == last - 1) pdf += f.prepared.emitter_pdf(y.triangle) / solid_angle_to_area(path.vertex[k].p, y);
+      expected *= bsdf_value(f.prepared, path.vertex[k], s) * (std::abs(s.cos_i) / pdf);
+    }
+    EXPECT_NEAR(value.r, expected.r, 1e-6 * expected.r);
+    ++found_of[last];
+  }
+  EXPECT_GT(found_of[2], 500);
+  EXPECT_GT(found_of[3], 500);
+}
+
+INSTANTIATE_TEST_SUITE_P(Blocks, Weights, ::testing::Values("diffuse", "glass"),
+                         [](const auto& test) { return test.param; });
+
+/// Light that is gathered for a boundary segment.
+TEST(GatheredWeights, AddUpToOne) {
+  struct Receiver final : LengthReceiver {
+    const Worker* worker = nullptr;
+    int shared = 0;
+    void take(int, int, const Rgb&) override {
+      double sum = 0, most = 0;
+      for (const auto technique : kArcs)
+        if (const double pdf = pdf_on_arc(worker->scene, worker->path, technique); pdf > 0) {
+          const double weight = gathered_weight(*worker, worker->path, technique, pdf);
+          sum += weight;
+          most = std::max(most, weight);
+        }
+      EXPECT_NEAR(sum, 1, 1e-9);
+      shared += most < 0.99;
+    }
+  } receiver;
+  Finder f(diffuse(Rgb(0.6)));
+  receiver.worker = &f.worker;
+  EllipsoidalConnections connections(f.worker, {}, &receiver);
+  for (int i = 0; i < 20000; ++i) {
+    Rng rng(Stream{test_seed(3), 0, 0}, i, 0);
+    if (f.worker.start_path(i % f.prepared.pixels(), rng) == 0) continue;
+    const double length = 3 + 3 * rng.uniform();
+    connections.gather({&length, 1}, 2, rng);
+  }
+  EXPECT_GT(receiver.shared, 100);
+}
+
+}  // namespace
+}  // namespace isochron::testing
