@@ -69,7 +69,7 @@ struct EstimatorOptions {
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene);
 
 /// The terms of the derivative (paper Eq. 13). A sample of `interior` and `path_length` is a camera path with all its
-/// connections; one of `visibility` is one search for a boundary, by one of its four techniques (see BoundaryGuide).
+/// connections; one of `visibility` is one search for a boundary, by one of its five techniques (see BoundaryGuide).
 enum class Term { interior, visibility, path_length };
 inline constexpr Term kTerms[] = {Term::interior, Term::visibility, Term::path_length};
 const char* name(Term term);

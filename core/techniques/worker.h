@@ -74,7 +74,7 @@ struct Worker {
   /// Starts `sensor_path` with what a pixel looks from: the camera, or the sensor point of a capture.
   void start_at_sensor(Path& sensor_path, int pixel) const;
   /// Starts `path` with that and a surface point x1 that it sees: of a camera through a random point of the pixel, of a capture
-  /// by the reflection of the wall or by hidden geometry sampling, combined by the balance heuristic. Returns what the pixel
+  /// by the reflection of the wall or by hidden geometry sampling, whichever finds it the more often. Returns what the pixel
   /// makes of radiance from x1, over density; 0: there is no x1. `hidden`: hidden geometry sampling's share in the latter.
   double start_path(int pixel, Rng& rng, double hidden);
   double start_path(int pixel, Rng& rng) { return start_path(pixel, rng, hidden_share_at_wall()); }

@@ -136,7 +136,7 @@ inline std::vector<Estimate> image_means(const Renderer& renderer, int gates, in
   return out;
 }
 
-/// Samples of a term for the effort of so many camera paths: one of the visibility term is one search by one of four
+/// Samples of a term for the effort of so many camera paths: one of the visibility term is one search by one of five
 /// techniques.
 inline int samples_of(Term term, int paths) {
   return term == Term::visibility ? BoundaryGuide::kTechniques * paths : paths;
