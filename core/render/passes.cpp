@@ -128,8 +128,8 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
 
 void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
   const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
-  PrimaryBoundary primary(worker, edges(), *guide_, mix.interior == 1);
-  SecondaryBoundary secondary(worker, edges(), *guide_, mix.interior == 1);
+  PrimaryBoundary primary(worker, edges(), *guide_, narrow());
+  SecondaryBoundary secondary(worker, edges(), *guide_, narrow());
   const double edges_rate = guide_->rate(BoundaryGuide::primary),
                borders_rate = guide_->rate(BoundaryGuide::pixel_border),
                from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
@@ -199,8 +199,8 @@ void Passes::learn() const {
       search();
       cost[technique] += worker.work() - before;
     };
-    PrimaryBoundary primary(worker, edges(), unguided, mix.interior == 1);
-    SecondaryBoundary secondary(worker, edges(), unguided, mix.interior == 1);
+    PrimaryBoundary primary(worker, edges(), unguided, narrow());
+    SecondaryBoundary secondary(worker, edges(), unguided, narrow());
     const double splat_scale = 1.0 / scene.camera.pixels();
     for (long long round = partition; round < rounds; round += kPartitions) {
       throw_if_stopped();

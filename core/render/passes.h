@@ -61,6 +61,12 @@ class Passes {
   bool stays_in_pixels() const { return mix.image == 0 || scene.captures(); }
   bool stays_in_pixels(Term term) const { return (term == Term::interior && mix.interior == 0) || scene.captures(); }
 
+  /// Whether the term draws lengths from the gates.
+  bool draws_lengths(Term term) const {
+    if (term == Term::path_length) return true;
+    return term == Term::interior ? mix.interior > 0 : narrow();
+  }
+
   /// To be called before a term is run: the visibility term needs its edges, and its guiding learns. What is learned depends
   /// on scene, gates, basis and options alone.
   void prepare(Term term) const;
@@ -100,6 +106,9 @@ class Passes {
   }
 
  private:
+  /// Whether the visibility term uses techniques that draw lengths.
+  bool narrow() const { return mix.interior == 1; }
+
   /// Whether the interior term takes the continuous part of dW in pairs.
   bool interior_pairs() const;
 

@@ -194,7 +194,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
   if (!impl_->has(term)) return;
   impl_->prepare(term);
   const PassTimes::Timed timed(impl_->times(), pass_kind(term));
-  const GatePick pick(impl_->gates, adjoint);
+  const GatePick pick(impl_->gates, adjoint, impl_->draws_lengths(term));
   const int partitions = impl_->partitions_for(range, basis.entries.size());  // at least as many as are touched
   std::vector<std::vector<double>> by_partition(parts ? partitions : 0, std::vector<double>(basis.columns, 0.0));
   SharedPartitions shared(partitions, impl_->partition_costs(pass_kind(term), partitions));
@@ -277,7 +277,7 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
     }
     largest.data[i] = std::sqrt(squares);
   }
-  const GatePick pick(impl.gates, largest);
+  const GatePick pick(impl.gates, largest, impl.draws_lengths(term));
   const int partitions = impl.partitions_for(range, sum.by_bounces.size() + sum.by_gate.size() + sum.by_shape.size());
   const Sum all = impl.sum_of<Sum>(pass_kind(term), partitions, [&](int partition) {
     Sum own = sum;

@@ -7,12 +7,11 @@
 
 namespace isochron {
 
-GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint) : gates_(gates) {
+GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths) : gates_(gates) {
   const int count = gates.size(), pixels = adjoint.pixels();
-  below_.assign(static_cast<std::size_t>(pixels + 1) * (count + 1), 0.0);
+  if (lengths) below_.assign(static_cast<std::size_t>(pixels + 1) * (count + 1), 0.0);
   // Makes probabilities of weights; returns their sum.
-  const auto accumulate = [&](int pixel) {
-    double* p = &below_[row(pixel)];
+  const auto accumulate = [&](double* p) {
     for (int g = 0; g < count; ++g) p[g + 1] += p[g];
     const double sum = p[count];
     if (sum > 0)
@@ -23,18 +22,22 @@ GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint) : gates_(gat
   constexpr int kChunk = 1024;  // pixels; sums do not depend on the number of threads
   std::vector<std::vector<double>> of_chunk((pixels + kChunk - 1) / kChunk, std::vector<double>(count + 1, 0.0));
   parallel(static_cast<int>(of_chunk.size()), [&](int chunk) {
+    std::vector<double> alone;
     for (int pixel = chunk * kChunk; pixel < std::min((chunk + 1) * kChunk, pixels); ++pixel) {
-      double* p = &below_[row(pixel)];
+      if (!lengths) alone.assign(count + 1, 0.0);
+      double* p = lengths ? &below_[row(pixel)] : alone.data();
       for (int g = 0; g < count; ++g) {
         for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
         of_chunk[chunk][g + 1] += p[g + 1];
       }
-      rate_[pixel] = accumulate(pixel);
+      rate_[pixel] = accumulate(p);
     }
   });
+  std::vector<double> of_image(count + 1, 0.0);
   for (const std::vector<double>& each : of_chunk)
-    for (int g = 1; g <= count; ++g) below_[row(kImage) + g] += each[g];
-  const double all = accumulate(kImage);
+    for (int g = 1; g <= count; ++g) of_image[g] += each[g];
+  const double all = accumulate(of_image.data());
+  if (lengths) std::copy(of_image.begin(), of_image.end(), below_.begin() + static_cast<std::ptrdiff_t>(row(kImage)));
   if (all > 0)
     for (double& rate : rate_) rate *= pixels / all;
 }

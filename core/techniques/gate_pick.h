@@ -18,7 +18,10 @@ class GatePick {
 
   /// Every gate alike. `gates` must outlive this.
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
-  GatePick(const GateSet& gates, const GatedImage& adjoint);
+  /// `lengths`: whether lengths are drawn. Without, rate() alone may be asked for, and no table of the size of an image is made.
+  GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths = true);
+  /// Of the tables that draw lengths, in bytes.
+  static double table_bytes(int pixels, int gates) { return sizeof(double) * (pixels + 1.0) * (gates + 1.0); }
 
   bool uniform() const { return below_.empty(); }
   /// Gate for a pixel (or kImage); `u` in (0, 1) is replaced by a fresh uniform number. -1 where no gate

@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/ranks.h"
+#include "core/techniques/gate_pick.h"
 #include "optim/problem/estimates.h"
 
 namespace isochron {
@@ -72,6 +73,11 @@ bool shares_one_image(const Problem& problem) {
   return experiment.estimator.sampling == Sampling::standard || experiment.gates.unbounded();
 }
 
+/// Whether gradients may draw lengths from the gates, each pixel with probabilities of its own.
+bool draws_lengths(const Problem& problem) {
+  return !shares_one_image(problem) || problem.gates().shape().pair_mass(PairPart::dirac) > 0;
+}
+
 std::string amount(double bytes) {
   return bytes >= 1e9 ? fmt::format("{:.3g} GB", bytes / 1e9) : fmt::format("{:.0f} MB", std::ceil(bytes / 1e6));
 }
@@ -113,7 +119,12 @@ std::vector<MemoryUse> run_memory(const Problem& problem) {
   parts.push_back({"target, residual and adjoint images", 3 * image});
   const OptimizerMethod method = problem.experiment().optimizer.method;
   if (method == OptimizerMethod::quasi_newton) parts.push_back({"images of a line search", 3 * image});
-  if (method != OptimizerMethod::levenberg_marquardt) return parts;
+  if (method != OptimizerMethod::levenberg_marquardt) {
+    const Camera& camera = problem.scene().camera;
+    if (draws_lengths(problem))
+      parts.push_back({"tables of gates", GatePick::table_bytes(camera.width * camera.height, problem.gates().size())});
+    return parts;
+  }
   parts.push_back(
       {fmt::format("two halves of the Jacobian of {:.0f} residuals by {:.0f} unknowns", image / 8, unknowns),
        2 * image * unknowns});

@@ -57,6 +57,9 @@ class Problem {
   /// Loads the scene and binds the parameters. Throws InputError. `warning` receives one line where shapes
   /// lie on each other at the initial or the target values.
   explicit Problem(Experiment experiment, const std::function<void(const std::string&)>& warning = {});
+  /// Its parameters and kept scenes refer to its scene: it stays where it is.
+  Problem(const Problem&) = delete;
+  Problem& operator=(const Problem&) = delete;
 
   const Experiment& experiment() const { return experiment_; }
   const Scene& scene() const { return scene_; }
