@@ -96,7 +96,7 @@ TEST(BoundaryWeights, AddUpToOne) {
   ASSERT_NE(guide.rate(BoundaryGuide::from_edge), guide.rate(BoundaryGuide::from_camera));
   BoundaryWeights weights(worker, edges, guide);
   int found[4] = {0, 0, 0, 0}, shared[4] = {0, 0, 0, 0}, at_lengths = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 100000; ++i) {
     Rng rng(Stream{test_seed(13), 0, 0}, i, 0);
     weights.look_from_edge(0, rng, [&](int bounces, double edge, double camera, double at_length) {
       EXPECT_NEAR(edge + camera + at_length, 1, 1e-8)
