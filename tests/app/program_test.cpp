@@ -382,7 +382,7 @@ TEST_F(Program, ShapesOnTheSameSurfaceAreNamedOnce) {
   const std::string file = folder_.file("tiny.yaml"), scene = folder_.read("scene.yaml");
   const std::string ghost = "  - {name: ghost, file: block.obj, material: white}\n";
   folder_.write("scene.yaml", scene + ghost);
-  const std::string warning = "'block' and 'ghost' (2 triangles)";
+  const std::string warning = "'ghost' on 'block' (2 triangles)";
   const auto warnings = [&](const Result& result) {
     EXPECT_EQ(result.status, 0);
     int count = 0;
