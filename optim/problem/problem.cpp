@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/paths/differentiable.h"
 #include "core/scene/behind_wall.h"
 #include "core/scene/stacked_faces.h"
 #include "core/scene/scene_loader.h"
@@ -137,10 +138,22 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
         "{}: light '{}' is where the camera is: as one of them moves alone, shadows open on one side, so that "
         "derivatives are one-sided",
         experiment_.file, name));
+  if (leaves_out_jumps())
+    warning(fmt::format(
+        "{}: samples.path_length: 0 leaves the jumps of the gates out of the derivatives by what changes the lengths of "
+        "paths, which leads a fit astray where they matter (`inspect` tells)",
+        experiment_.file));
   std::string stacked = stacked_warning(parameters_->apply(parameters_->initial()));
   if (stacked.empty() && parameters_->target_known())
     stacked = stacked_warning(parameters_->apply(parameters_->target()));
   if (!stacked.empty()) warning(experiment_.scene + ": " + stacked);
+}
+
+bool Problem::leaves_out_jumps() const {
+  if (experiment_.samples.path_length > 0 || experiment_.gradient.method != GradientMethod::analytic) return false;
+  if (!(gates_.shape().pair_mass(PairPart::dirac) > 0)) return false;
+  const TangentBasis basis = parameters_->tangent(parameters_->initial());
+  return Differentiable(parameters_->apply(parameters_->initial()), &basis).lengths;
 }
 
 std::string Problem::light_that_leaves_the_camera() const {

@@ -94,6 +94,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
                        finite ? "the loss has risen" : "loss or gradient is not finite", safeguard.state().rate));
     } else {
       next = optimizer.step(objective, now, state.theta, iteration, safeguard.state().rate);
+      if (optimizer.stuck()) safeguard.restart_window();
       state.steps_rejected += optimizer.rejected();
       state.steps_rejected_in_row = optimizer.rejected() ? state.steps_rejected_in_row + 1 : 0;
       if (state.steps_rejected_in_row == kToldRejections)

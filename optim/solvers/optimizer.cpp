@@ -85,6 +85,7 @@ class Scaled : public Optimizer {
     return result;
   }
   bool rejected() const override { return inner_->rejected(); }
+  bool stuck() const override { return inner_->stuck(); }
   bool scatters() const override { return inner_->scatters(); }
   void reset() override { inner_->reset(); }
   OptimizerState state() const override { return inner_->state(); }

@@ -29,6 +29,9 @@ class Optimizer {
                                    std::uint32_t iteration, double rate) = 0;
   /// Whether the last step() stayed where it was because no point that it tried had a lower loss.
   virtual bool rejected() const { return false; }
+  /// Whether the last step was refused although the gradient promised a fall above the loss's noise: losses that stand still
+  /// so are no sign of rest.
+  virtual bool stuck() const { return false; }
   /// Whether each iteration solves the problem of its own random numbers, so that near the optimum the parameters of
   /// iterations scatter about it, and their mean is nearer to it than the last.
   virtual bool scatters() const { return false; }

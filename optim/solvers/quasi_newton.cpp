@@ -49,10 +49,13 @@ class QuasiNewton : public Optimizer {
       if (search != Search::moved) break;
       rejected_ = false;
     }
+    stuck_ = rejected_ && promised_ > now.loss_noise;
+    if (stuck_) reset();  // what was learnt elsewhere does not hold here
     for (std::size_t i = 0; i < at.size(); ++i) at[i] = theta[i] + rate * (at[i] - theta[i]);
     return at;
   }
   bool rejected() const override { return rejected_; }
+  bool stuck() const override { return stuck_; }
   bool scatters() const override { return true; }
   void reset() override {
     diagonal_.clear();
@@ -117,6 +120,7 @@ class QuasiNewton : public Optimizer {
     for (int i = 0; i < kMostTrials; ++i) {
       const double least = i > 0 && here.loss_noise > 0 ? here.loss_noise : 0;
       Trial trial = try_length(objective, iteration, at, here, direction, length, least);
+      if (i == 0) promised_ = -trial.slope;
       if (!(-trial.slope > least)) {
         if (!best && trial.slope < 0) return Search::noise;
         break;
@@ -211,7 +215,8 @@ class QuasiNewton : public Optimizer {
   Vector diagonal_;
   double probes_ = 0;
   std::deque<Pair> pairs_;  ///< the newest last
-  bool rejected_ = false;
+  double promised_ = 0;     ///< fall of the loss by the slope of the last search's full step
+  bool rejected_ = false, stuck_ = false;
 };
 
 }  // namespace

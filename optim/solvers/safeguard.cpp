@@ -67,13 +67,17 @@ bool Safeguard::settles(const std::vector<double>& theta) {
   return decrease < std::sqrt(squared_error(state_.block_before) + squared_error(state_.block)) || decrease <= 0;
 }
 
+void Safeguard::restart_window() {
+  state_.block.clear();
+  state_.block_before.clear();
+  state_.theta_sum.clear();
+}
+
 Verdict Safeguard::reject() {
   ++state_.rejected;
   state_.rate /= 2;
   state_.recent.clear();
-  state_.block.clear();
-  state_.block_before.clear();
-  state_.theta_sum.clear();
+  restart_window();
   return ++state_.rejected_in_row >= kMostRejectedInRow ? Verdict::give_up : Verdict::reject;
 }
 

@@ -47,6 +47,9 @@ class Safeguard {
   /// Takes the row of theta into account. `finite`: whether loss and gradient are.
   Verdict observe(double loss, bool finite, const std::vector<double>& theta);
 
+  /// The rows so far say nothing of whether the loss has settled.
+  void restart_window();
+
   const SafeguardState& state() const { return state_; }
   /// Mean of the parameters over the block that settled: their noise is averaged. Bounds hold for it as for
   /// each.
