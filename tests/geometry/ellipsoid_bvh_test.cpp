@@ -145,7 +145,7 @@ TEST(EllipsoidBvh, VeryThinEllipsoidsAreNeverMissed) {
   const Triangles triangles = random.soup(300, 1, {5, 5, 5});
   const EllipsoidBvh bvh(triangles);
   Tally tally;
-  for (int k = 0; k < 1000; ++k) {
+  for (int k = 0; k < 2000; ++k) {
     const Vec3 a = random.vec(1) + Vec3{5, 5, 5}, b = random.vec(1) + Vec3{5, 5, 5};
     const double tau = length(b - a) * (1 + std::pow(10.0, random.uniform(-13, -6)));
     compare(triangles, bvh, a, b, k % 2 ? tau : 0, tau, tally);

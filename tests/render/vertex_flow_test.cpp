@@ -300,7 +300,9 @@ TEST(VertexFlows, DifferentialOfAPathIsThatOfTheFlow) {
       double ours = 0, our_length = 0;
       for (const VertexGradient& g : differential.vertices)
         if (g.vertex == dof / 3) ours += g.log_f[dof % 3], our_length += g.length[dof % 3];
-      EXPECT_NEAR(ours, expected, 5e-5 * (10 + std::abs(expected))) << "trial " << trial << ", dof " << dof;
+      // Where a cosine comes close to zero, the difference of its logarithm is off by slope^3 step^2 / 3.
+      const double cut_off = std::pow(std::abs(expected), 3) * kStep * kStep / 2;
+      EXPECT_NEAR(ours, expected, 5e-5 * (10 + std::abs(expected)) + cut_off) << "trial " << trial << ", dof " << dof;
       EXPECT_NEAR(our_length, expected_length, 1e-6) << "trial " << trial << ", dof " << dof;
     }
   }
