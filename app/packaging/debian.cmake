@@ -43,7 +43,8 @@ endif()
 # For mpirun, without which nothing of MPI is loaded, and what find_package(isochron) asks for.
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_CURRENT_SOURCE_DIR}/without_mpi.cmake)
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS libopenmpi3 openmpi-bin
-    cmake g++ libceres-dev libembree-dev libfmt-dev libhdf5-dev libopenexr-dev libspdlog-dev libtbb-dev libyaml-cpp-dev)
+    cmake g++ libceres-dev libembree-dev libfmt-dev libhdf5-dev libopenexr-dev libopenmesh-dev libspdlog-dev libtbb-dev
+    libyaml-cpp-dev)
 list(JOIN CPACK_DEBIAN_PACKAGE_DEPENDS ", " CPACK_DEBIAN_PACKAGE_DEPENDS)
 list(JOIN CPACK_DEBIAN_PACKAGE_SUGGESTS ", " CPACK_DEBIAN_PACKAGE_SUGGESTS)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_SOURCE_DIR}/postinst ${CMAKE_CURRENT_SOURCE_DIR}/prerm)
