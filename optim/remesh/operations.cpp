@@ -137,8 +137,13 @@ void Operations::flip_towards_even_valences() {
 void Operations::relax() {
   for (const Vertex v : kernel_.vertices()) {
     if (kernel_.status(v).feature()) continue;
-    const Vec3 there = kernel_.is_boundary(v) ? relaxed_on_border(v) : relaxed(v);
-    if (may_move(v, there, Vertex())) kernel_.set_point(v, to(there));
+    const auto try_at = [&](const Vec3& p) {
+      const Vec3 there = origin(v, p).position;
+      const bool may = may_move(v, there, Vertex());
+      if (may) kernel_.set_point(v, to(there));
+      return may;
+    };
+    if (!try_at(middle_of_neighbours(v))) try_at(position(v));
   }
 }
 
@@ -205,25 +210,28 @@ Vec3 Operations::normal(Vertex v) const {
   return sum;
 }
 
-Vec3 Operations::relaxed(Vertex v) const {
-  Vec3 middle;
+Vec3 Operations::middle_of_neighbours(Vertex v) const {
+  if (kernel_.is_boundary(v)) {
+    const Halfedge out = kernel_.halfedge_handle(v);
+    return (position(kernel_.to_vertex_handle(out)) +
+            position(kernel_.from_vertex_handle(kernel_.prev_halfedge_handle(out)))) /
+           2.0;
+  }
+  Vec3 sum;
   int neighbours = 0;
   for (const Vertex w : kernel_.vv_range(v)) {
-    middle += position(w);
+    sum += position(w);
     ++neighbours;
   }
-  const Vec3 p = position(v), n = normal(v);
-  Vec3 step = middle / neighbours - p;
-  if (const double squared = length_squared(n); squared > 0) step -= n * (dot(n, step) / squared);
-  const SurfacePoint found = surface_->closest(p + step, n);
-  return found.face >= 0 ? found.position : p;
+  const Vec3 p = position(v), n = normal(v), step = sum / neighbours - p;
+  const double squared = length_squared(n);
+  return squared > 0 ? p + step - n * (dot(n, step) / squared) : p;
 }
 
-Vec3 Operations::relaxed_on_border(Vertex v) const {
-  const Halfedge out = kernel_.halfedge_handle(v);
-  const Vec3 ahead = position(kernel_.to_vertex_handle(out)),
-             behind = position(kernel_.from_vertex_handle(kernel_.prev_halfedge_handle(out)));
-  return surface_->closest_on_border((ahead + behind) / 2).position;
+MeshPoint Operations::origin(Vertex v, const Vec3& p) const {
+  if (kernel_.is_boundary(v)) return surface_->closest_on_border(p);
+  const MeshPoint found = surface_->closest(p, normal(v));
+  return found.face >= 0 ? found : surface_->closest(p, {});
 }
 
 Mesh Operations::mesh() const {
@@ -238,14 +246,9 @@ Mesh Operations::mesh() const {
   return result;
 }
 
-std::vector<SurfacePoint> Operations::origins() const {
-  std::vector<SurfacePoint> result;
-  for (const Vertex v : kernel_.vertices()) {
-    const Vec3 p = position(v);
-    SurfacePoint found = kernel_.is_boundary(v) ? surface_->closest_on_border(p) : surface_->closest(p, normal(v));
-    if (found.face < 0) found = surface_->closest(p, {});
-    result.push_back(found);
-  }
+std::vector<MeshPoint> Operations::origins() const {
+  std::vector<MeshPoint> result;
+  for (const Vertex v : kernel_.vertices()) result.push_back(origin(v, position(v)));
   return result;
 }
 

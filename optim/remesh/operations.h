@@ -28,7 +28,7 @@ class Operations {
 
   Mesh mesh() const;
   /// Of each vertex of mesh(): on the surface.
-  std::vector<SurfacePoint> origins() const;
+  std::vector<MeshPoint> origins() const;
   /// Of each vertex of mesh().
   std::vector<char> held() const;
 
@@ -60,8 +60,10 @@ class Operations {
   bool may_flip(OpenMesh::EdgeHandle edge) const;
   /// Of the area-weighted normals about v.
   Vec3 normal(Vertex v) const;
-  Vec3 relaxed(Vertex v) const;
-  Vec3 relaxed_on_border(Vertex v) const;
+  /// Within the tangent plane, or of the two along the border.
+  Vec3 middle_of_neighbours(Vertex v) const;
+  /// The point closest to p on the part of the surface that v belongs to.
+  MeshPoint origin(Vertex v, const Vec3& p) const;
 
   const Surface* surface_;
   double length_;

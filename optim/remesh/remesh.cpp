@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "core/base/error.h"
@@ -111,11 +112,16 @@ Remeshed remesh(const Mesh& mesh, double edge_length) {
 std::vector<double> carry_over(const Remeshed& remeshed, const Mesh& old, const std::vector<double>& values,
                                int columns) {
   std::vector<double> result;
-  for (const SurfacePoint& origin : remeshed.origins)
+  for (const MeshPoint& origin : remeshed.origins)
     for (int column = 0; column < columns; ++column) {
-      double sum = 0;
-      for (int k = 0; k < 3; ++k) sum += origin.weights[k] * values[old.faces[origin.face][k] * columns + column];
-      result.push_back(sum);
+      double sum = 0, least = std::numeric_limits<double>::infinity(), most = -least;
+      for (int k = 0; k < 3; ++k) {
+        const double value = values[old.faces[origin.face][k] * columns + column];
+        sum += origin.weights[k] * value;
+        least = std::min(least, value);
+        most = std::max(most, value);
+      }
+      result.push_back(std::clamp(sum, least, most));
     }
   return result;
 }

@@ -17,7 +17,7 @@ double mean_edge_length(const Mesh& mesh);
 
 struct Remeshed {
   Mesh mesh;
-  std::vector<SurfacePoint> origins;  ///< of each of its vertices, on the mesh that it was made of
+  std::vector<MeshPoint> origins;  ///< of each of its vertices, on the mesh that it was made of
 };
 
 /// Edges are mostly between 0.8 and 1.33 of `edge_length` (> 0). Borders are resampled along themselves; their corners, where
@@ -28,7 +28,8 @@ Remeshed remesh(const Mesh& mesh, double edge_length);
 /// Throws what `remesh` does.
 void require_remeshable(const Mesh& mesh, double edge_length);
 
-/// Values of the old mesh's vertices, `columns` of each together, at those of the new one: linear over its triangles.
+/// Values of the old mesh's vertices, `columns` of each together, at those of the new one: linear over its triangles,
+/// never beyond the values at their corners.
 std::vector<double> carry_over(const Remeshed& remeshed, const Mesh& old, const std::vector<double>& values,
                                int columns = 1);
 

@@ -10,11 +10,11 @@ namespace {
 
 using Corners = std::array<Vec3, 3>;
 
-SurfacePoint at(const Corners& corners, const std::array<double, 3>& weights) {
+MeshPoint at(const Corners& corners, const std::array<double, 3>& weights) {
   return {-1, weights, corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]};
 }
 
-SurfacePoint closest_on_edge(const Vec3& p, const Corners& corners, int k) {
+MeshPoint closest_on_edge(const Vec3& p, const Corners& corners, int k) {
   const int next = (k + 1) % 3;
   const Vec3 along = corners[next] - corners[k];
   const double t = std::clamp(dot(p - corners[k], along) / length_squared(along), 0.0, 1.0);
@@ -25,11 +25,11 @@ SurfacePoint closest_on_edge(const Vec3& p, const Corners& corners, int k) {
 }
 
 /// The closer one to p.
-const SurfacePoint& closer(const Vec3& p, const SurfacePoint& a, const SurfacePoint& b) {
+const MeshPoint& closer(const Vec3& p, const MeshPoint& a, const MeshPoint& b) {
   return length_squared(b.position - p) < length_squared(a.position - p) ? b : a;
 }
 
-SurfacePoint closest_on_face(const Vec3& p, const Corners& corners, const Vec3& normal) {
+MeshPoint closest_on_face(const Vec3& p, const Corners& corners, const Vec3& normal) {
   std::array<double, 3> weights;
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
@@ -41,7 +41,7 @@ SurfacePoint closest_on_face(const Vec3& p, const Corners& corners, const Vec3& 
     for (double& w : weights) w /= sum;
     return at(corners, weights);
   }
-  const SurfacePoint first = closest_on_edge(p, corners, 0), second = closest_on_edge(p, corners, 1);
+  const MeshPoint first = closest_on_edge(p, corners, 0), second = closest_on_edge(p, corners, 1);
   return closer(p, closer(p, first, second), closest_on_edge(p, corners, 2));
 }
 
@@ -72,10 +72,10 @@ struct Surface::Search {
   const Surface& surface;
   Vec3 p, facing;
   bool border;
-  SurfacePoint best = {};
+  MeshPoint best = {};
   double best_squared = std::numeric_limits<double>::infinity();
 
-  bool take(const SurfacePoint& found, int face) {
+  bool take(const MeshPoint& found, int face) {
     const double squared = length_squared(found.position - p);
     if (squared > best_squared || (squared == best_squared && face >= best.face)) return false;
     best = found;
@@ -111,7 +111,7 @@ struct Surface::Search {
 
 Surface::Surface(Mesh mesh) : mesh_(std::move(mesh)), on_border_(border_edges(mesh_)), boxes_(scene_of(mesh_)) {}
 
-SurfacePoint Surface::find(Search& search) const {
+MeshPoint Surface::find(Search& search) const {
   RTCPointQuery query{};
   query.x = static_cast<float>(search.p.x);
   query.y = static_cast<float>(search.p.y);
@@ -123,12 +123,12 @@ SurfacePoint Surface::find(Search& search) const {
   return search.best;
 }
 
-SurfacePoint Surface::closest(const Vec3& p, const Vec3& facing) const {
+MeshPoint Surface::closest(const Vec3& p, const Vec3& facing) const {
   Search search{*this, p, facing, false};
   return find(search);
 }
 
-SurfacePoint Surface::closest_on_border(const Vec3& p) const {
+MeshPoint Surface::closest_on_border(const Vec3& p) const {
   Search search{*this, p, {}, true};
   return find(search);
 }

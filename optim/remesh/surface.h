@@ -9,7 +9,7 @@
 
 namespace isochron {
 
-struct SurfacePoint {
+struct MeshPoint {
   int face = -1;                           ///< -1: there is none
   std::array<double, 3> weights{0, 0, 0};  ///< of the face's corners: at least 0, sum 1
   Vec3 position;
@@ -26,13 +26,13 @@ class Surface {
 
   /// The point closest to p on faces whose normals are at most a right angle from `facing`, so that what lies behind a thin
   /// part of the surface is not meant; zero: on all.
-  SurfacePoint closest(const Vec3& p, const Vec3& facing) const;
+  MeshPoint closest(const Vec3& p, const Vec3& facing) const;
   /// The same on edges with one face.
-  SurfacePoint closest_on_border(const Vec3& p) const;
+  MeshPoint closest_on_border(const Vec3& p) const;
 
  private:
   struct Search;
-  SurfacePoint find(Search& search) const;
+  MeshPoint find(Search& search) const;
 
   Mesh mesh_;
   std::vector<std::array<bool, 3>> on_border_;  ///< of each face: whether its edge k, from corner k to k + 1, is
