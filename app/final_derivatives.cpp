@@ -10,11 +10,12 @@
 
 #include "app/interrupt.h"
 #include "core/base/ranks.h"
-#include "core/base/yaml_reader.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/memory.h"
+#include "optim/run/levels.h"
+#include "optim/run/summary.h"
 
 namespace isochron {
 namespace {
@@ -22,19 +23,6 @@ namespace {
 constexpr int kMostImages = 4;
 constexpr double kSeconds = 2;
 constexpr int kFewest = 2;  ///< samples that estimate_derivatives takes
-
-/// Values of all unknowns, as summary.yaml has them.
-std::vector<double> final_values(const std::string& summary, const Parameters& parameters) {
-  YamlMap values = open_yaml(summary).map().require("parameters").map();
-  std::vector<double> theta;
-  for (const Parameters::Block& block : parameters.blocks()) {
-    const YamlValue value = values.require(block.name);
-    const std::vector<double> numbers = block.count == 1 ? std::vector{value.number()} : value.numbers();
-    if (static_cast<int>(numbers.size()) != block.count) value.fail("is of another experiment");
-    theta.insert(theta.end(), numbers.begin(), numbers.end());
-  }
-  return theta;
-}
 
 /// Of each of the first parameters the unknown that moved most.
 std::vector<int> chosen_unknowns(const Parameters& parameters, const std::vector<double>& theta) {
@@ -70,8 +58,9 @@ double write_images(const Problem& problem, const std::vector<double>& theta, co
 
 }  // namespace
 
-void write_final_derivatives(const std::string& run) {
+void write_final_derivatives(const std::string& of_run) {
   if (rank_count() > 1) return;  // how many samples fit is up to a clock, and ranks have one each
+  const std::string run = last_level_folder(of_run);
   const std::string summary = run + "/summary.yaml", folder = run + "/report/derivatives";
   const auto text = read_file(summary);
   if (!text || text->starts_with("status: interrupted")) return;

@@ -15,6 +15,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// As `text`, in a scene file, means it.
+std::string path_of(const std::string& scene_file, const std::string& text) {
+  return (fs::path(scene_file).parent_path() / text).lexically_normal().string();
+}
+
+std::string written_anew(const YAML::Node& scene, const char* why) {
+  YAML::Emitter text;
+  text << scene;
+  return fmt::format("# Written anew, as {}.\n{}\n", why, text.c_str());
+}
+
 bool lies_below(const fs::path& relative) {
   return relative.is_relative() && !relative.empty() && *relative.begin() != "..";
 }
@@ -44,7 +55,7 @@ std::vector<FileCopy> copy_of_scene(const std::string& file) {
   bool changed = false;
   const auto copy_file_of = [&](YAML::Node owner) {
     const std::string text = owner["file"].Scalar();
-    const std::string original = (fs::path(file).parent_path() / text).lexically_normal().string();
+    const std::string original = path_of(file, text);
     const auto known =
         std::find_if(copies.begin() + 1, copies.end(), [&](const FileCopy& copy) { return copy.original == original; });
     const fs::path normal = fs::path(text).lexically_normal();
@@ -62,12 +73,24 @@ std::vector<FileCopy> copy_of_scene(const std::string& file) {
   };
   for (YAML::Node shape : scene["shapes"]) copy_file_of(shape);
   if (scene["capture"] && scene["capture"]["file"]) copy_file_of(scene["capture"]);
-  if (changed) {
-    YAML::Emitter text;
-    text << scene;
-    copies[0].contents = std::string("# Written anew, as its files have moved.\n") + text.c_str() + "\n";
-  }
+  if (changed) copies[0].contents = written_anew(scene, "its files have moved");
   return copies;
+}
+
+std::string scene_with_mesh(const std::string& file, const std::string& shape, const std::string& mesh,
+                            const std::string& folder) {
+  YAML::Node scene = YAML::Load(copy_of_file(file, "").contents);
+  const auto relative = [&](const std::string& path) {
+    return fs::path(path).lexically_proximate(fs::path(folder)).string();
+  };
+  for (YAML::Node each : scene["shapes"]) {
+    const bool replaced = each["name"].Scalar() == shape;
+    each["file"] = relative(replaced ? mesh : path_of(file, each["file"].Scalar()));
+    if (replaced) each.remove("transform");
+  }
+  if (YAML::Node capture = scene["capture"]; capture && capture["file"])
+    capture["file"] = relative(path_of(file, capture["file"].Scalar()));
+  return written_anew(scene, "a mesh is another one");
 }
 
 }  // namespace isochron

@@ -24,4 +24,9 @@ std::string free_name(const std::string& name, const std::vector<FileCopy>& take
 /// accepts has no other errors.
 std::vector<FileCopy> copy_of_scene(const std::string& file);
 
+/// Text of a scene file for another `folder`: as `file` says, but that the shape of that name is the mesh in `mesh`, without a
+/// transform; paths are relative to the folder.
+std::string scene_with_mesh(const std::string& file, const std::string& shape, const std::string& mesh,
+                            const std::string& folder);
+
 }  // namespace isochron

@@ -146,12 +146,28 @@ void describe(Keys& keys, LossSpec& loss) {
               .unit = "RMS of a typical pixel of the target (the median over those that hold anything)"});
 }
 
+/// Levels carry the shape's offsets over into a new mesh, which leaves no place for what refers to the old one.
+void check_remesh(const ParameterSpec& remeshed, const std::vector<ParameterSpec>& all) {
+  if (remeshed.selection.kind != Selection::Kind::all)
+    remeshed.fail("selection", "is of vertices that remeshing replaces", "leave it out");
+  for (const ParameterSpec& other : all) {
+    if (&other == &remeshed) continue;
+    if (other.remesh.levels > 0) other.fail("remesh", "another parameter has it already", "one of them");
+    const bool turns = other.type == ParameterType::rotation || other.type == ParameterType::vertices ||
+                       other.selection.kind != Selection::Kind::all;
+    if (other.shape == remeshed.shape && turns)
+      other.fail("shape", fmt::format("'{}' is remeshed by '{}'", other.shape, remeshed.name),
+                 "translations of the whole shape beside it");
+  }
+}
+
 void check_parameters(const Experiment& experiment) {
   std::set<std::string> names;
   for (const ParameterSpec& spec : experiment.parameters) {
     if (!names.insert(spec.name).second) spec.fail("name", fmt::format("'{}' stands here twice", spec.name));
     if (spec.diffusion > 0 && experiment.optimizer.method != OptimizerMethod::adam)
       spec.fail("smoothing", "diffusion works with the method adam alone", "slopes for the other methods");
+    if (spec.remesh.levels > 0) check_remesh(spec, experiment.parameters);
   }
 }
 

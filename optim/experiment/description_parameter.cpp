@@ -104,6 +104,8 @@ Field per(ParameterSpec& spec) {
   return field::checked(field::choice(spec.per), choose);
 }
 
+constexpr int kMostLevels = 12;  // of which each has four times the triangles of the one before
+
 void check_name(const YamlValue& value) {
   for (const char* reserved : {"render", "target", "initial", "final"})
     if (value.text() == reserved) value.fail(fmt::format("'{}' is the name of another output", reserved));
@@ -171,6 +173,18 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0});
+  const auto remesh = [&](Keys& inner) {
+    inner.value("levels", field::integer(spec.remesh.levels, 1, kMostLevels), "optimisations one after the other",
+                {.required = true});
+    inner.value("edge_length", field::positive(spec.remesh.edge_length),
+                "of the first level's triangles; those of each further level have half of it",
+                {.unit = "scene units", .unset = spec.remesh.edge_length == 0, .otherwise = "the mesh as it is"});
+  };
+  keys.map(
+      "remesh", remesh,
+      "a run in levels: the surface that one has found is cut into finer triangles for the next. One parameter may "
+      "have it",
+      {.only = of({vertices}), .unset = spec.remesh.levels == 0});
   keys.value(
       "prior_width", field::non_negative(spec.prior_width),
       "standard deviation of a normal prior about `initial`, for `loss: {kind: poisson}`. Offsets of single sensor "

@@ -36,6 +36,12 @@ struct Selection {
   Vec3 min, max;             ///< world space of the scene file, borders included
 };
 
+/// A run in levels: on a mesh, then on the surface that was found in triangles of half the size, and so on.
+struct RemeshSpec {
+  int levels = 0;          ///< 0: the mesh stays as it is
+  double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
+};
+
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene
 /// file; those of materials, emission and the like replace what the scene file says.
 struct ParameterSpec {
@@ -60,6 +66,7 @@ struct ParameterSpec {
   /// Of types vertices and texture, see smoothing.h; 0: none.
   double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
   double slopes = 0;     ///< weight of the penalty on uneven values, in units of the target's mean square
+  RemeshSpec remesh;     ///< of type vertices
   /// Of type time_offset: standard deviation of a normal prior about the initial values; 0: none.
   double prior_width = 0;
 

@@ -28,6 +28,7 @@
 #include "optim/run/frames.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/inputs.h"
+#include "optim/run/levels.h"
 #include "optim/run/log.h"
 #include "optim/run/report.h"
 #include "optim/run/run_folder.h"
@@ -48,13 +49,6 @@ long long peak_memory() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return 1024LL * usage.ru_maxrss;
-}
-
-/// Whether the folder's run has come to its end before.
-bool has_ended(const std::string& summary) {
-  const auto text = read_file(summary);
-  return text && text->starts_with("status: ") &&
-         !text->starts_with(fmt::format("status: {}\n", name(RunStatus::interrupted)));
 }
 
 /// What a resumption says that made no step.
@@ -240,7 +234,15 @@ class Run {
 
 /// Goes on in a locked folder that holds a run.
 RunStatus go_on(const RunOptions& options, const std::function<void(const std::string&)>& warning_of_scene) {
-  const Problem problem(load_experiment(options.folder + "/experiment.yaml"), warning_of_scene);
+  const Experiment experiment = load_experiment(options.folder + "/experiment.yaml");
+  if (remeshed_parameter(experiment)) {
+    return run_levels(experiment, options, [](const RunOptions& level) {
+      std::optional<FolderLock> lock;
+      on_first_rank([&] { lock.emplace(level.folder, level.warning); });
+      return go_on(level, {});
+    });
+  }
+  const Problem problem(experiment, warning_of_scene);
   problem.require_parameters();
   require_two_samples(problem);
   require_jacobian_fits(problem);
@@ -256,6 +258,7 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_two_samples(problem);
     require_jacobian_fits(problem);
     require_memory(problem, run_memory(problem));
+    require_levels(problem);
     // Here, so that a message names the user's file and not the run's copy of it.
     if (!experiment.target.images.empty()) problem.read_target(experiment.target.images);
   }

@@ -24,6 +24,9 @@ struct Progress {
   double seconds_left = 0;
 };
 
+struct LevelResult;
+struct LevelSurface;
+
 struct RunOptions {
   std::string folder;
   bool force = false;                             ///< overwrite a run that the folder holds (else it is moved aside)
@@ -32,6 +35,9 @@ struct RunOptions {
   /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends
   /// the run; Interrupted as `stop` does.
   std::function<void(const LogRow&, const std::vector<double>& theta, const Evaluation& now, bool closing)> row;
+  /// Of a run in levels (see levels.h), after each but the last, on all ranks: whether there is to be another. May change the
+  /// surface that it begins with. Depends on nothing but its arguments, as a resumed run asks again.
+  std::function<bool(const LevelResult&, LevelSurface&)> next_level;
   std::function<void(const std::string&)> warning;  ///< one line
   std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
 };

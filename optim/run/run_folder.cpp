@@ -22,7 +22,7 @@ void clear_run(const std::string& folder) {
                            "target.exr", "initial.exr", "final.exr", "final.h5", "target.png", "initial.png",
                            "final.png", "residual.png", "rmse.png", "capture.png", "report.html"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
-  for (const char* part : {"inputs", "geometry", "frames", "report"})
+  for (const char* part : {"inputs", "geometry", "frames", "report", "levels"})
     std::filesystem::remove_all(std::filesystem::path(folder) / part);
 }
 

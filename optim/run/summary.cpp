@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "core/base/yaml_reader.h"
 #include "optim/experiment/files.h"
 #include "optim/run/bounds.h"
 #include "optim/run/fit.h"
@@ -88,6 +89,24 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
       fmt::format_to(out, "  {}: [{}]\n", block.name, fmt::join(begin, begin + block.count, ", "));
   }
   return text;
+}
+
+bool has_ended(const std::string& file) {
+  const auto text = read_file(file);
+  return text && text->starts_with("status: ") &&
+         !text->starts_with(fmt::format("status: {}\n", name(RunStatus::interrupted)));
+}
+
+std::vector<double> final_values(const std::string& file, const Parameters& parameters) {
+  YamlMap values = open_yaml(file).map().require("parameters").map();
+  std::vector<double> theta;
+  for (const Parameters::Block& block : parameters.blocks()) {
+    const YamlValue value = values.require(block.name);
+    const std::vector<double> numbers = block.count == 1 ? std::vector{value.number()} : value.numbers();
+    if (static_cast<int>(numbers.size()) != block.count) value.fail("is of another experiment");
+    theta.insert(theta.end(), numbers.begin(), numbers.end());
+  }
+  return theta;
 }
 
 }  // namespace isochron

@@ -28,4 +28,10 @@ std::string summary_yaml(const LoopResult& result, const Checkpoint& state, cons
                          const Parameters& parameters, const RunCost& cost = {}, const ParameterErrors& errors = {},
                          const std::optional<GoodnessOfFit>& fit = {});
 
+/// Whether the run of a summary.yaml has come to its end: there is one, and the run was not interrupted.
+bool has_ended(const std::string& file);
+
+/// Values of all unknowns, as summary.yaml has them. Throws InputError where it is of other parameters.
+std::vector<double> final_values(const std::string& file, const Parameters& parameters);
+
 }  // namespace isochron

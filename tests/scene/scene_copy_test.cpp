@@ -69,5 +69,22 @@ TEST(SceneCopy, MeshesElsewhereAreBroughtTogether) {
   expect_same_scene(file, to.path("scene.yaml"));
 }
 
+TEST(SceneCopy, AMeshMayBeAnotherOne) {
+  TemporaryFolder from, to;
+  from.write("a.obj", triangle(1));
+  from.write("meshes/b.obj", triangle(2));
+  const std::string file = from.write(
+      "scene.yaml", kHead +
+                        "  - {name: a, file: a.obj, material: white, emission: 1, transform: {translate: [1, 2, 3]}}\n"
+                        "  - {name: b, file: meshes/b.obj, material: white, transform: {scale: 0.1}}\n");
+  const std::string mesh = to.write("new/c.obj", triangle(4));
+  const std::string text = scene_with_mesh(file, "a", mesh, to.path("new"));
+  const Scene old = load_scene(file), scene = load_scene(to.write("new/scene.yaml", text));
+  EXPECT_EQ(scene.camera.fov, old.camera.fov);
+  ASSERT_EQ(scene.positions.size(), 6u);
+  EXPECT_EQ(scene.positions[1], (Vec3{4, 0, 0})) << "the new mesh is where it is";
+  for (int v = 3; v < 6; ++v) EXPECT_EQ(scene.positions[v], old.positions[v]);
+}
+
 }  // namespace
 }  // namespace isochron

@@ -251,7 +251,21 @@ def ending(run):
     if run.ended and isinstance(share, float):
         words.append(f"Noise makes {100 * share:.0f} % of the loss's variance over the last rows.")
     badge = element("span", run.state, class_=f"badge {run.state}")
-    return join([element("p", badge, " ", " ".join(words), class_="ending"), fit(run), bounds(run), notes(run)])
+    return join([element("p", badge, " ", " ".join(words), class_="ending"), levels(run), fit(run), bounds(run), notes(run)])
+
+
+def levels(run):
+    """What the levels of a run came to, of which the page shows the last."""
+    if not run.levels:
+        return ""
+    keys = ("edge_length", "vertices", "iterations", "loss", "seconds", "status")
+
+    def shown(value):
+        return number(value) if isinstance(value, float) else "–" if value is None else str(value).replace("_", " ")
+
+    rows = [[str(i + 1), *(shown(level.get(key)) for key in keys)] for i, level in enumerate(run.levels)]
+    return table(["level", *(key.replace("_", " ") for key in keys)], rows, "Levels, of which the page shows the last",
+                 "numbers")
 
 
 FIT = {"explained": "The fit explains the data", "unexplained": "The fit does not explain the data",

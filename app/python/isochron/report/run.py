@@ -47,6 +47,12 @@ class Parameter:
         return " ".join(word for word in (self.kind.replace("_", " "), f"of {of}" if of else "") if word)
 
 
+def last_level(directory):
+    """Of a run in levels, the folder of the last that there is, which is a run by itself; else the folder."""
+    levels = [path.parent for path in (directory / "levels").glob("*/experiment.yaml") if path.parent.name.isdigit()]
+    return max(levels, key=lambda path: int(path.name), default=directory)
+
+
 def as_numbers(values):
     """An array of floats, or None. YAML takes 1e-05 for text."""
     if values is None:
@@ -69,6 +75,9 @@ class Run:
             raise NoRun(f"{directory}: no such folder")
         if not (self.directory / "experiment.yaml").exists():
             raise NoRun(f"{directory}: holds no run (there is no experiment.yaml)")
+        levels = (self.read(read_yaml, "summary.yaml") or {}).get("levels")
+        self.levels = [level for level in levels if isinstance(level, dict)] if isinstance(levels, list) else []
+        self.directory = last_level(self.directory)
         self.experiment = self.read(read_yaml, "experiment.yaml") or {}
         self.name = str(self.experiment.get("name", self.directory.resolve().name))
         self.text = self.read(lambda path: path.read_text(encoding="utf-8"), "experiment.yaml") or ""

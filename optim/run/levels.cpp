@@ -1,0 +1,261 @@
+#include "optim/run/levels.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "core/base/error.h"
+#include "core/base/ranks.h"
+#include "core/base/yaml_reader.h"
+#include "core/scene/mesh_writer.h"
+#include "core/scene/scene_copy.h"
+#include "core/scene/scene_loader.h"
+#include "optim/experiment/files.h"
+#include "optim/remesh/remesh.h"
+#include "optim/run/level_log.h"
+#include "optim/run/summary.h"
+
+namespace isochron {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What summary.yaml has of a level.
+struct Level {
+  double edge_length = 0;  ///< mean over its mesh
+  int vertices = 0;
+  long long iterations = 0;
+  double loss = 0, seconds = 0;
+  std::string status;
+};
+
+/// Of the first level: what the experiment says, or else what the mesh has.
+double first_edge_length(const ParameterSpec& remeshed, const Mesh& loaded) {
+  return remeshed.remesh.edge_length > 0 ? remeshed.remesh.edge_length : mean_edge_length(loaded);
+}
+
+void write_surface(const std::string& file, const Mesh& mesh) {
+  const Scene scene = scene_of(mesh);
+  write_file_atomically(file, to_ply(scene, scene.shapes[0]));
+}
+
+/// A number, or null where it is none.
+double number_or_nan(const YamlValue& value) {
+  return value.is_number() ? value.number() : std::nan("");
+}
+
+class Levels {
+ public:
+  Levels(const Experiment& experiment, const RunOptions& options,
+         const std::function<RunStatus(const RunOptions&)>& run_level)
+      : experiment_(experiment),
+        remeshed_(*remeshed_parameter(experiment)),
+        options_(options),
+        run_level_(run_level),
+        folder_(fs::weakly_canonical(fs::absolute(options.folder)).string()) {}
+
+  RunStatus execute() {
+    try {
+      write_target();
+      const Mesh loaded = mesh_of(load_scene(experiment_.scene), remeshed_.shape);
+      const double first = first_edge_length(remeshed_, loaded);
+      for (int level = 1;; ++level) {
+        const bool ready = file_exists(folder(level) + "/experiment.yaml");
+        if (!ready && !prepare(level, std::ldexp(first, 1 - level))) {
+          on_first_rank([&] { write_summary(false); });
+          break;
+        }
+        status_ = run(level);
+        const bool more =
+            status_ != RunStatus::interrupted && status_ != RunStatus::diverged && level < remeshed_.remesh.levels;
+        on_first_rank([&] { publish(level, more); });
+        if (!more) break;
+      }
+    } catch (const Interrupted&) {
+      status_ = RunStatus::interrupted;
+    }
+    if (options_.report && status_ != RunStatus::interrupted) options_.report(report_ + table());
+    return status_;
+  }
+
+ private:
+  std::string folder(int level) const { return fmt::format("{}/levels/{}", folder_, level); }
+  std::string file(const char* name) const { return folder_ + "/" + name; }
+
+  void write_target() const {
+    if (file_exists(file("target.exr"))) return;
+    const Problem problem(experiment_);
+    const auto poll = [this] {
+      if (options_.stop && options_.stop()) throw Interrupted{};
+    };
+    write_exr(file("target.exr"), problem.make_target(poll), exr_notes(experiment_.gates));
+  }
+
+  /// Makes the level's folder. False where there is to be no such level.
+  bool prepare(int level, double edge_length) {
+    Experiment next = experiment_;
+    if (!next.target.measured()) next.target.images = file("target.exr");
+    std::optional<LevelSurface> surface;
+    if (level == 1 && remeshed_.remesh.edge_length == 0) {
+      for (ParameterSpec& spec : next.parameters) spec.remesh = {};
+    } else {
+      const bool first = level == 1;
+      const Problem former(first ? experiment_ : load_experiment(folder(level - 1) + "/experiment.yaml"));
+      const std::vector<double> theta = first ? former.parameters().initial()
+                                              : final_values(folder(level - 1) + "/summary.yaml", former.parameters());
+      surface = found_surface(former, theta, remeshed_);
+      if (!first && options_.next_level && !options_.next_level({level - 1, former, theta, edge_length}, *surface))
+        return false;
+      surface = remeshed_surface(*surface, edge_length);
+      next.parameters = next_parameters(former, theta, remeshed_, *surface);
+      next.scene = folder(level) + "/scene/scene.yaml";
+    }
+    on_first_rank([&] { write_level(level, next, surface); });
+    return true;
+  }
+
+  void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {
+    make_output_folder(folder(level));
+    if (surface) {
+      const std::string place = folder(level) + "/scene", mesh = place + "/surface.ply";
+      make_output_folder(place);
+      write_surface(mesh, surface->mesh);
+      write_file_atomically(next.scene, scene_with_mesh(experiment_.scene, remeshed_.shape, mesh, place));
+    }
+    write_file_atomically(folder(level) + "/experiment.yaml", resolved_yaml(next, folder(level)));
+  }
+
+  /// Runs the level unless that is done.
+  RunStatus run(int level) {
+    if (level < remeshed_.remesh.levels && has_ended(folder(level) + "/summary.yaml")) return ended_as(level);
+    RunOptions options = options_;
+    options.folder = folder(level);
+    options.report = [this](const std::string& text) { report_ = text; };
+    return run_level_(options);
+  }
+
+  RunStatus ended_as(int level) const {
+    const std::string status = open_yaml(folder(level) + "/summary.yaml").map().require("status").text();
+    return status == name(RunStatus::diverged)    ? RunStatus::diverged
+           : status == name(RunStatus::converged) ? RunStatus::converged
+                                                  : RunStatus::iterations_reached;
+  }
+
+  /// Brings what the level has to DIR, the summary last. `more`: it may not be the last.
+  void publish(int level, bool more) {
+    levels_.push_back(found_level(level));
+    const std::string from = folder(level);
+    if (status_ != RunStatus::interrupted) {
+      if (level == 1) copy(from, {"initial.exr"}, {"initial_", "target_"});
+      copy(from, {"final.exr", "final.h5"}, {"final_"});
+      write_file_atomically(file("log.csv"), joined_logs(logs()));
+    }
+    write_summary(more);
+  }
+
+  /// Of the last level that has ended, as the other files are. As long as there may be more, the run counts as interrupted.
+  void write_summary(bool more) const {
+    const bool under_way = levels_.back().status == name(RunStatus::interrupted);
+    const int level = std::max(1, static_cast<int>(levels_.size()) - (under_way ? 1 : 0));
+    std::string text = *read_file(folder(level) + "/summary.yaml");
+    if (more || under_way)
+      text = fmt::format("status: {}{}", name(RunStatus::interrupted), text.substr(text.find('\n')));
+    write_file_atomically(file("summary.yaml"), text + levels_yaml());
+  }
+
+  /// Files of that name, and meshes whose names begin so.
+  void copy(const std::string& from, const std::vector<std::string>& files,
+            const std::vector<std::string>& meshes) const {
+    const auto copy_file = [&](const std::string& each) {
+      if (const auto contents = read_file(from + "/" + each)) write_file_atomically(folder_ + "/" + each, *contents);
+    };
+    for (const std::string& each : files) copy_file(each);
+    if (!fs::exists(from + "/geometry")) return;
+    fs::create_directories(folder_ + "/geometry");
+    for (const auto& entry : fs::directory_iterator(from + "/geometry")) {
+      const std::string mesh = entry.path().filename().string();
+      for (const std::string& beginning : meshes)
+        if (mesh.starts_with(beginning)) copy_file("geometry/" + mesh);
+    }
+  }
+
+  std::vector<std::string> logs() const {
+    std::vector<std::string> texts;
+    for (std::size_t i = 1; i <= levels_.size(); ++i)
+      texts.push_back(*read_file(folder(static_cast<int>(i)) + "/log.csv"));
+    return texts;
+  }
+
+  Level found_level(int level) const {
+    const Experiment experiment = load_experiment(folder(level) + "/experiment.yaml");
+    const Mesh mesh = mesh_of(load_scene(experiment.scene), remeshed_.shape);
+    YamlMap summary = open_yaml(folder(level) + "/summary.yaml").map();
+    return {mean_edge_length(mesh),
+            static_cast<int>(mesh.positions.size()),
+            summary.require("iterations").integer(0, kMostIterations),
+            number_or_nan(summary.require("loss_final")),
+            summary.require("seconds").number(),
+            summary.require("status").text()};
+  }
+
+  std::string levels_yaml() const {
+    std::string text = "levels:\n";
+    for (const Level& level : levels_)
+      text += fmt::format("  - {{edge_length: {}, vertices: {}, iterations: {}, loss: {}, seconds: {}, status: {}}}\n",
+                          level.edge_length, level.vertices, level.iterations,
+                          std::isnan(level.loss) ? "null" : exact(level.loss), level.seconds, level.status);
+    return text;
+  }
+
+  /// For the screen.
+  std::string table() const {
+    std::string text = fmt::format("  {:>5}  {:>11}  {:>8}  {:>10}  {:>10}  {:>8}\n", "level", "edge length",
+                                   "vertices", "iterations", "loss", "seconds");
+    int number = 0;
+    for (const Level& level : levels_)
+      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}\n", ++number, level.edge_length,
+                          level.vertices, level.iterations, level.loss, level.seconds);
+    return text;
+  }
+
+  const Experiment& experiment_;
+  const ParameterSpec& remeshed_;
+  const RunOptions& options_;
+  const std::function<RunStatus(const RunOptions&)>& run_level_;
+  const std::string folder_;  ///< absolute
+  std::vector<Level> levels_;
+  RunStatus status_ = RunStatus::iterations_reached;
+  std::string report_;
+};
+
+}  // namespace
+
+void require_levels(const Problem& problem) {
+  const ParameterSpec* remeshed = remeshed_parameter(problem.experiment());
+  if (!remeshed) return;
+  const Mesh loaded = mesh_of(problem.scene(), remeshed->shape);
+  try {
+    require_remeshable(loaded, std::ldexp(first_edge_length(*remeshed, loaded), 1 - remeshed->remesh.levels));
+  } catch (const InputError& error) {
+    remeshed->fail("remesh", fmt::format("the mesh of '{}' {}", remeshed->shape, error.what()));
+  }
+}
+
+std::string last_level_folder(const std::string& folder) {
+  std::string last = folder;
+  for (int level = 1;; ++level) {
+    const std::string next = fmt::format("{}/levels/{}", folder, level);
+    if (!file_exists(next + "/experiment.yaml")) return last;
+    last = next;
+  }
+}
+
+RunStatus run_levels(const Experiment& experiment, const RunOptions& options,
+                     const std::function<RunStatus(const RunOptions&)>& run_level) {
+  return Levels(experiment, options, run_level).execute();
+}
+
+}  // namespace isochron

@@ -1,0 +1,147 @@
+#include "optim/run/next_level.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "optim/remesh/remesh.h"
+
+namespace isochron {
+namespace {
+
+using SurfaceField = LevelSurface::Field;
+
+bool moves(const ParameterSpec& spec) {
+  using enum ParameterType;
+  return spec.type == translation || spec.type == rotation || spec.type == vertices ||
+         spec.type == camera_translation || spec.type == camera_rotation;
+}
+
+std::vector<double> part(const std::vector<double>& values, const Parameters::Block& block) {
+  return {values.begin() + block.begin, values.begin() + block.begin + block.count};
+}
+
+/// The values of one of the surface's fields; null where it has no such field.
+const std::vector<double>* find(const LevelSurface& surface, int parameter, const std::string& quantity) {
+  for (const SurfaceField& field : surface.fields)
+    if (field.parameter == parameter && field.quantity == quantity) return &field.values;
+  return nullptr;
+}
+
+/// Without the vertices that no face has.
+void drop_unused(LevelSurface& surface) {
+  std::vector<int> number(surface.mesh.positions.size(), -1);
+  for (const auto& face : surface.mesh.faces)
+    for (const int v : face) number[v] = 0;
+  int count = 0;
+  for (int& n : number)
+    if (n == 0) n = count++;
+  const auto keep = [&](auto& values, int columns) {
+    for (std::size_t v = 0; v < number.size(); ++v)
+      if (number[v] >= 0)
+        for (int k = 0; k < columns; ++k) values[number[v] * columns + k] = values[v * columns + k];
+    values.resize(static_cast<std::size_t>(count) * columns);
+  };
+  keep(surface.mesh.positions, 1);
+  for (SurfaceField& field : surface.fields) keep(field.values, field.columns);
+  for (auto& face : surface.mesh.faces)
+    for (int& v : face) v = number[v];
+}
+
+}  // namespace
+
+const ParameterSpec* remeshed_parameter(const Experiment& experiment) {
+  for (const ParameterSpec& spec : experiment.parameters)
+    if (spec.remesh.levels > 0) return &spec;
+  return nullptr;
+}
+
+Mesh mesh_of(const Scene& scene, const std::string& name) {
+  const Shape& shape = scene.shapes[scene.find_shape(name)];
+  const auto first = scene.positions.begin() + shape.first_vertex;
+  Mesh mesh{{first, first + shape.vertex_count}, {}};
+  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
+    auto face = scene.triangles[t].vertex;
+    for (int& v : face) v -= shape.first_vertex;
+    mesh.faces.push_back(face);
+  }
+  return mesh;
+}
+
+LevelSurface found_surface(const Problem& problem, const std::vector<double>& theta, const ParameterSpec& remeshed) {
+  const Parameters& parameters = problem.parameters();
+  const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
+  LevelSurface surface;
+  std::vector<double> offsets_alone = theta;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const Parameters::Block& block = parameters.blocks()[i];
+    if (moves(specs[i]) && specs[i].name != remeshed.name)
+      std::fill_n(offsets_alone.begin() + block.begin, block.count, 0.0);
+  }
+  surface.mesh = mesh_of(parameters.apply(offsets_alone), remeshed.shape);
+  const int vertices = static_cast<int>(surface.mesh.positions.size());
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const Parameters::Block& block = parameters.blocks()[i];
+    const auto add = [&](const char* quantity, const std::vector<double>& values) {
+      surface.fields.push_back({static_cast<int>(i), quantity, block.count / vertices, values});
+    };
+    if (specs[i].name == remeshed.name) {
+      const std::vector<double> found = part(theta, block);
+      const auto shifted = [&](std::vector<double> bounds) {
+        for (std::size_t k = 0; k < bounds.size(); ++k) bounds[k] -= found[k];
+        return bounds;
+      };
+      if (!specs[i].lower.empty()) add("lower", shifted(part(parameters.lower(), block)));
+      if (!specs[i].upper.empty()) add("upper", shifted(part(parameters.upper(), block)));
+    } else if (specs[i].type == ParameterType::texture && specs[i].shape == remeshed.shape) {
+      add("initial", part(theta, block));
+      if (specs[i].lower.size() > 1) add("lower", part(parameters.lower(), block));
+      if (specs[i].upper.size() > 1) add("upper", part(parameters.upper(), block));
+    }
+  }
+  return surface;
+}
+
+LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {
+  LevelSurface old = surface;
+  drop_unused(old);
+  Remeshed result = remesh(old.mesh, edge_length);
+  LevelSurface next{result.mesh, old.fields};
+  for (SurfaceField& field : next.fields) field.values = carry_over(result, old.mesh, field.values, field.columns);
+  return next;
+}
+
+std::vector<ParameterSpec> next_parameters(const Problem& problem, const std::vector<double>& theta,
+                                           const ParameterSpec& remeshed, const LevelSurface& surface) {
+  const Parameters& parameters = problem.parameters();
+  std::vector<ParameterSpec> specs = problem.experiment().parameters;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    ParameterSpec& spec = specs[i];
+    const Parameters::Block& block = parameters.blocks()[i];
+    const auto of_surface = [&](const char* quantity, std::vector<double>& values) {
+      const std::vector<double>* found = find(surface, static_cast<int>(i), quantity);
+      if (found) values = *found;
+      return found != nullptr;
+    };
+    spec.scale = block.scale;
+    of_surface("lower", spec.lower);
+    of_surface("upper", spec.upper);
+    if (spec.name == remeshed.name) {
+      spec.remesh = {};
+      spec.initial = {0};
+      spec.target.clear();
+    } else if (of_surface("initial", spec.initial)) {
+      if (spec.target.size() > 1) spec.target.clear();
+      // Sums of rounded products may leave bounds by a last bit.
+      for (std::size_t k = 0; k < spec.initial.size(); ++k) {
+        const auto bound = [&](const std::vector<double>& values) { return values[values.size() > 1 ? k : 0]; };
+        if (!spec.lower.empty()) spec.initial[k] = std::max(spec.initial[k], bound(spec.lower));
+        if (!spec.upper.empty()) spec.initial[k] = std::min(spec.initial[k], bound(spec.upper));
+      }
+    } else if (spec.prior_width == 0) {
+      spec.initial = part(theta, block);
+    }
+  }
+  return specs;
+}
+
+}  // namespace isochron

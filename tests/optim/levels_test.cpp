@@ -1,0 +1,239 @@
+// Runs in levels: what is carried over, whether finer levels pay, and what callers may do between them.
+#include "optim/run/levels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/base/constants.h"
+#include "core/base/error.h"
+#include "core/base/yaml_reader.h"
+#include "core/scene/scene_loader.h"
+#include "optim/remesh/remesh.h"
+#include "tests/optim/temporary_folder.h"
+#include "tests/optim/tiny_scene.h"
+
+namespace isochron {
+namespace {
+
+double hill(double x, double y) {
+  return 0.12 * std::cos(kPi * x) * std::cos(0.5 * kPi * y);
+}
+
+/// A sheet over [-1, 1]^2 of so many cells each way, at a height.
+std::string sheet(int cells, double (*height)(double, double)) {
+  std::string text;
+  for (int y = 0; y <= cells; ++y)
+    for (int x = 0; x <= cells; ++x) {
+      const double u = 2.0 * x / cells - 1, v = 2.0 * y / cells - 1;
+      text += "v " + std::to_string(u) + " " + std::to_string(v) + " " + std::to_string(height(u, v)) + "\n";
+    }
+  const auto at = [&](int x, int y) { return std::to_string(y * (cells + 1) + x + 1) + " "; };
+  for (int y = 0; y < cells; ++y)
+    for (int x = 0; x < cells; ++x)
+      text += "f " + at(x, y) + at(x + 1, y) + at(x + 1, y + 1) + "\nf " + at(x, y) + at(x + 1, y + 1) + at(x, y + 1) +
+              "\n";
+  return text;
+}
+
+double flat(double, double) {
+  return 0;
+}
+
+class LevelsTest : public testing::Test {
+ protected:
+  LevelsTest() {
+    folder_.write("flat.obj", sheet(4, flat));
+    folder_.write("hill.obj", sheet(40, hill));
+    for (const std::string name : {"flat", "hill"})
+      folder_.write(name + ".yaml",
+                    "camera: {position: [0, 0, 3], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [16, 16]}\n"
+                    "materials: {paint: {type: diffuse, albedo: 0.5}}\n"
+                    "shapes: [{name: hill, file: " +
+                        name +
+                        ".obj, material: paint}]\n"
+                        "lights: [{name: lamp, type: point, position: [0, 0, 3.1], intensity: 10}]\n");
+  }
+
+  std::string experiment(const std::string& scene, const std::string& remesh, const std::string& target,
+                         const std::string& more = "") {
+    return folder_.write(
+        "experiment.yaml",
+        "name: hill\nscene: " + scene +
+            ".yaml\nmax_bounces: 1\n"
+            "gates: {kind: gaussian, centers: {start: 5.6, stop: 7, count: 8}, sigma: 0.15}\n"
+            "parameters:\n  - {name: z, type: vertices, shape: hill, direction: [0, 0, 1], initial: 0, " +
+            remesh + "}\n" + more +
+            "samples: {primal: 32, interior: 32, visibility: 4, path_length: 0}\n"
+            "optimizer: {method: quasi_newton, iterations: 4, inner_iterations: 4}\n"
+            "target: " +
+            target + "\n");
+  }
+
+  /// Images of the hill itself.
+  void write_target() {
+    const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
+    write_exr(folder_.file("hill.exr"), problem.make_target(kGoOn), {});
+  }
+
+  RunOptions options() {
+    RunOptions options;
+    options.folder = folder_.file("out");
+    options.force = true;
+    return options;
+  }
+
+  Mesh found(const std::string& of) { return read_mesh(folder_.file(of + "/geometry/final_hill.ply")); }
+
+  /// Root mean square distance of points of the hill from a mesh.
+  double distance(const Mesh& mesh) {
+    const Surface surface(mesh);
+    double sum = 0;
+    int points = 0;
+    for (double x = -0.9; x <= 0.9; x += 0.05)
+      for (double y = -0.9; y <= 0.9; y += 0.05, ++points) {
+        const Vec3 p{x, y, hill(x, y)};
+        sum += length_squared(surface.closest(p, {}).position - p);
+      }
+    return std::sqrt(sum / points);
+  }
+
+  std::string refusal(const std::string& file) {
+    try {
+      start_run(load_experiment(file), options());
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  TemporaryFolder folder_;
+};
+
+/// Between vertices half a unit apart, linear heights miss the hill by up to (pi / 2)^2 of its height over 8; a quarter of that
+/// is left at half the distance. How far the first level comes is bounded by what it cannot represent.
+TEST_F(LevelsTest, AFinerLevelComesNearerToTheTruth) {
+  write_target();
+  std::string report;
+  RunOptions run = options();
+  run.report = [&](const std::string& text) { report = text; };
+  start_run(load_experiment(experiment("flat", "remesh: {levels: 2}", "{images: hill.exr}")), run);
+  const Mesh first = found("out/levels/1"), second = found("out/levels/2");
+  EXPECT_EQ(first.positions.size(), 25u);
+  EXPECT_GT(second.positions.size(), 60u);
+  EXPECT_NEAR(mean_edge_length(second), mean_edge_length(first) / 2, 0.05);
+  EXPECT_LT(distance(first), 0.2 * distance(read_mesh(folder_.file("flat.obj"))));
+  EXPECT_LT(distance(second), 0.6 * distance(first));
+  EXPECT_EQ(found("out").positions, second.positions);
+  EXPECT_EQ(folder_.read("out/final.exr"), folder_.read("out/levels/2/final.exr"));
+  EXPECT_EQ(folder_.read("out/initial.exr"), folder_.read("out/levels/1/initial.exr"));
+  EXPECT_NE(report.find("edge length"), std::string::npos);
+
+  YamlMap summary = open_yaml(folder_.file("out/summary.yaml")).map();
+  const std::vector<YamlValue> levels = summary.require("levels").list();
+  ASSERT_EQ(levels.size(), 2u);
+  double losses[2];
+  for (int i = 0; i < 2; ++i) {
+    YamlMap level = levels[i].map();
+    EXPECT_EQ(level.require("vertices").integer(0, 1000),
+              static_cast<long long>((i ? second : first).positions.size()));
+    losses[i] = level.require("loss").number();
+    level.require("status").text();
+  }
+  EXPECT_LT(losses[1], losses[0]);
+}
+
+TEST_F(LevelsTest, TheFirstLevelMayBeRemeshed) {
+  write_target();
+  start_run(load_experiment(experiment("flat", "remesh: {levels: 1, edge_length: 0.3}", "{images: hill.exr}")),
+            options());
+  EXPECT_NEAR(mean_edge_length(found("out")), 0.3, 0.03);
+}
+
+/// Everything begins where it was found: the same surface, albedos, gain and shift; the image is that of before.
+TEST_F(LevelsTest, EverythingIsCarriedOver) {
+  std::string albedos;
+  const Mesh mesh = read_mesh(folder_.file("flat.obj"));
+  const auto albedo = [](const Vec3& p) { return 0.5 + 0.2 * p.x - 0.1 * p.y; };
+  for (const Vec3& p : mesh.positions) albedos += std::to_string(albedo(p)) + " ";
+  folder_.write("albedos.txt", albedos);
+  const std::string file =
+      experiment("flat", "remesh: {levels: 2}, target: 0, lower: -0.3, upper: 0.5", "{samples: 16}",
+                 "  - {name: paint, type: albedo, per: vertex, shape: hill, initial: albedos.txt, target: 0.5}\n"
+                 "  - {name: shift, type: translation, shape: hill, direction: [1, 0, 0], initial: 0.1, target: 0}\n"
+                 "  - {name: gain, type: gain, initial: 2, target: 1}\n");
+  const Problem problem(load_experiment(file));
+  const ParameterSpec& remeshed = *remeshed_parameter(problem.experiment());
+  std::vector<double> theta = problem.parameters().initial();
+  const auto height = [](const Vec3& p) { return 0.1 * p.x + 0.02 * p.y; };
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) theta[v] = height(mesh.positions[v]);
+  theta.back() = 3;
+  const LevelSurface surface = remeshed_surface(found_surface(problem, theta, remeshed), 0.25);
+  const std::vector<ParameterSpec> next = next_parameters(problem, theta, remeshed, surface);
+  const std::size_t vertices = surface.mesh.positions.size();
+  EXPECT_GT(vertices, 60u);
+  EXPECT_EQ(next[0].initial, std::vector<double>{0});
+  EXPECT_TRUE(next[0].target.empty());
+  EXPECT_EQ(next[0].remesh.levels, 0);
+  ASSERT_EQ(next[0].lower.size(), vertices);
+  ASSERT_EQ(next[1].initial.size(), vertices);
+  EXPECT_EQ(next[1].target, std::vector<double>{0.5});
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const Vec3& p = surface.mesh.positions[v];
+    EXPECT_NEAR(p.z, height(p), 1e-6);  // files hold six decimals
+    EXPECT_NEAR(next[0].lower[v], -0.3 - p.z, 1e-6);
+    EXPECT_NEAR(next[0].upper[v], 0.5 - p.z, 1e-6);
+    EXPECT_NEAR(next[1].initial[v], albedo(p), 1e-5);
+  }
+  EXPECT_EQ(next[2].initial, std::vector<double>{0.1});
+  EXPECT_EQ(next[3].initial, std::vector<double>{3});
+  EXPECT_EQ(next[3].scale, 2);
+}
+
+TEST_F(LevelsTest, ACallerMayEndLevelsAndChangeTheSurface) {
+  write_target();
+  const Experiment experiment = load_experiment(this->experiment("flat", "remesh: {levels: 3}", "{images: hill.exr}"));
+  RunOptions run = options();
+  std::vector<int> asked;
+  run.next_level = [&](const LevelResult& result, LevelSurface& surface) {
+    asked.push_back(result.level);
+    EXPECT_EQ(result.theta.size(), surface.mesh.positions.size());
+    std::erase_if(surface.mesh.faces, [&](const std::array<int, 3>& f) {
+      return std::min({surface.mesh.positions[f[0]].x, surface.mesh.positions[f[1]].x,
+                       surface.mesh.positions[f[2]].x}) > 0.4;
+    });
+    return result.level < 2;
+  };
+  EXPECT_EQ(start_run(experiment, run), RunStatus::iterations_reached);
+  EXPECT_EQ(asked, (std::vector{1, 2}));
+  EXPECT_FALSE(folder_.has("out/levels/3/experiment.yaml"));
+  for (const Vec3& p : found("out").positions) EXPECT_LT(p.x, 0.51);
+  EXPECT_TRUE(folder_.read("out/summary.yaml").starts_with("status: iterations_reached"));
+  EXPECT_EQ(resume_run(run), RunStatus::iterations_reached);  // asks again
+  EXPECT_EQ(asked, (std::vector{1, 2, 2}));
+}
+
+TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
+  const auto of = [&](const std::string& remesh, const std::string& more = "") {
+    return refusal(experiment("flat", remesh + ", target: 0", "{samples: 4}", more));
+  };
+  const auto says = [](const std::string& text, const std::string& what) {
+    EXPECT_NE(text.find(what), std::string::npos) << text;
+    EXPECT_NE(text.find("experiment.yaml:"), std::string::npos) << text;
+  };
+  says(of("remesh: {levels: 0}"), "remesh.levels");
+  says(of("remesh: {edge_length: 0.1}"), "levels");
+  says(of("remesh: {levels: 2, size: 3}"), "remesh.size");
+  says(of("remesh: {levels: 2}, selection: [0, 1]"), "selection: is of vertices that remeshing replaces");
+  says(of("remesh: {levels: 12, edge_length: 0.01}"), "triangles");
+  says(
+      of("remesh: {levels: 2}", "  - {name: r, type: rotation, shape: hill, axis: [0, 0, 1], initial: 0, target: 0}\n"),
+      "'hill' is remeshed by 'z'");
+  says(of("remesh: {levels: 2}", "  - {name: gain, type: gain, initial: 1, target: 1, remesh: {levels: 2}}\n"),
+       "belongs to vertices");
+  folder_.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
+  says(of("remesh: {levels: 2}"), "the mesh of 'hill' is no manifold");
+}
+
+}  // namespace
+}  // namespace isochron
