@@ -1,0 +1,53 @@
+// Coarse to fine: where in the space before a wall sums of filtered counts are significant.
+#pragma once
+#include <array>
+#include <vector>
+
+#include "optim/reconstruct/voxel_sums.h"
+
+namespace isochron {
+
+/// A part of space in the wall's frame, and how it is cut into the finest voxels: number n of an axis has its middle at (n + 1/2)
+/// steps. A voxel of level k is 2^k of them wide.
+struct SearchRegion {
+  Vec3 low, high, step;
+
+  double voxels(int level) const;
+};
+
+/// The box that holds all places from which light comes back within the bins.
+SearchRegion reached_region(const Histograms& histograms, const TimeFilter& filter);
+
+using VoxelPlace = std::array<int, 3>;  ///< numbers of a voxel or a block: across, up, depth
+
+struct SummedBlock {
+  VoxelPlace place{};  ///< in blocks
+  VoxelBlock::Values sum, variance, response;
+
+  /// Standard deviations.
+  double significance(int i) const;
+  VoxelPlace voxel(int i) const;
+};
+
+/// Albedos by sums. Light of surfaces elsewhere makes sums of a size that varies little over the space, so that sum / response would
+/// be largest where no surface could be seen. The best estimate beside it is sum * response / (response^2 + weak^2).
+struct AlbedoScale {
+  double weak = 0;   ///< the response at the largest sum, times the surface_threshold of sums over that sum
+  double least = 0;  ///< surface_threshold
+
+  double of(double sum, double response) const {
+    return response > 0 ? sum * response / (response * response + weak * weak) : 0;
+  }
+};
+
+struct SearchResult {
+  std::vector<SummedBlock> blocks;  ///< of the finest voxels, by place
+  AlbedoScale albedo;
+};
+
+/// `least`: standard deviations from which on a finest voxel is significant. A coarser filter lets through more background, for which
+/// a level has to be left by a factor of sqrt(2) earlier; also to be looked at are half of a level's least albedo.
+SearchResult search(const Histograms& histograms, const DetectorResponse& response, double sigma,
+                    const SearchRegion& region, double least);
+
+}  // namespace isochron
