@@ -101,13 +101,14 @@ AlbedoScale albedo_scale(const std::vector<SummedBlock>& blocks, double least) {
 }
 
 /// Blocks of the next finer level that hold the voxels of significant ones, and those next to these.
-std::vector<VoxelPlace> finer_blocks(const std::vector<SummedBlock>& coarse, double least, const AlbedoScale& albedo) {
+std::vector<VoxelPlace> finer_blocks(const std::vector<SummedBlock>& coarse, double least, const AlbedoScale& albedo,
+                                     double least_albedo) {
   const auto block_of = [](int voxel) { return static_cast<int>(std::floor(static_cast<double>(voxel) / kSide)); };
   std::vector<VoxelPlace> blocks;
   for (const SummedBlock& block : coarse) {
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
       if (std::abs(block.significance(i)) < least) continue;
-      if (std::abs(albedo.of(block.sum[i], block.response[i])) < 0.5 * albedo.least) continue;
+      if (std::abs(albedo.of(block.sum[i], block.response[i])) < least_albedo) continue;
       const VoxelPlace voxel = block.voxel(i);
       VoxelPlace first, last;
       for (int axis = 0; axis < 3; ++axis) {
@@ -174,7 +175,10 @@ SearchResult search(const Histograms& histograms, const DetectorResponse& respon
     const double least_here = least * std::exp2(-0.5 * level->number);
     result.blocks = sums(*level, region, places);
     result.albedo = albedo_scale(result.blocks, least_here);
-    if (level->number > 0) places = finer_blocks(result.blocks, least_here, result.albedo);
+    // A surface as wide as a finest voxel fills a quarter of what a voxel of the next level sees of a plane, and so on.
+    const double filled = std::exp2(-2.0 * level->number);
+    if (level->number > 0)
+      places = finer_blocks(result.blocks, least_here, result.albedo, filled * result.albedo.least);
   }
   return result;
 }

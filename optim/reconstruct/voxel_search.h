@@ -45,8 +45,8 @@ struct SearchResult {
   AlbedoScale albedo;
 };
 
-/// `least`: standard deviations from which on a finest voxel is significant. A coarser filter lets through more background, for which
-/// a level has to be left by a factor of sqrt(2) earlier; also to be looked at are half of a level's least albedo.
+/// `least`: standard deviations from which on a finest voxel is significant. A filter that is twice as wide lets through twice the
+/// background, so that sqrt(2) fewer have to do there; and a quarter of the least albedo, as much less of it is filled.
 SearchResult search(const Histograms& histograms, const DetectorResponse& response, double sigma,
                     const SearchRegion& region, double least);
 
