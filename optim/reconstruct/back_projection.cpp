@@ -59,7 +59,9 @@ void fill_in(const SearchResult& found, const Vec3& step, BackProjection& result
   bool any = false;
   for (const SummedBlock& block : found.blocks) {
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
-      if (block.significance(i) < result.least_significance || value(block, i) < result.least_albedo) continue;
+      if (block.significance(i, found.limits.chance) < result.least_significance ||
+          value(block, i) < result.least_albedo)
+        continue;
       const VoxelPlace voxel = block.voxel(i);
       if (!any) low = high = voxel;
       any = true;
@@ -86,7 +88,7 @@ void fill_in(const SearchResult& found, const Vec3& step, BackProjection& result
       if (!inside) continue;
       const std::size_t at = result.index(voxel[2] - low[2], voxel[1] - low[1], voxel[0] - low[0]);
       result.albedo[at] = static_cast<float>(value(block, i));
-      result.significance[at] = static_cast<float>(block.significance(i));
+      result.significance[at] = static_cast<float>(block.significance(i, found.limits.chance));
     }
   }
 }

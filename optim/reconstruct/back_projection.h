@@ -21,7 +21,8 @@ struct BackProjection {
   /// [depth][up][across]. The sum of filtered counts over what a small diffuse patch of albedo 1 would send back, times a factor
   /// that is the same everywhere: proportional to an albedo. Zero where the search, coarse to fine, has not come to.
   std::vector<float> albedo;
-  /// The sum in standard deviations by the counts' own Poisson variance; zero as above.
+  /// The sum in standard deviations by the counts' own Poisson variance; zero as above, and where light that comes in time for some
+  /// points by chance explains it.
   std::vector<float> significance;
 
   /// A voxel is a surface's where its significance and its albedo reach these. The first keeps the false alarms of noise at what was

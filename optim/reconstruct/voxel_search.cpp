@@ -75,16 +75,26 @@ std::vector<SummedBlock> sums(const Level& level, const SearchRegion& region, co
     sum_over_histograms(level.histograms, filtered, level.filter, *block);
     result[b].sum = block->sum;
     result[b].variance = block->variance;
+    result[b].squares = block->squares;
     result[b].response = block->response;
   });
   return result;
 }
 
-AlbedoScale albedo_scale(const std::vector<SummedBlock>& blocks, double least) {
+SearchLimits search_limits(const std::vector<SummedBlock>& blocks, double noise) {
+  long count = 0;
+  for (const SummedBlock& block : blocks) {
+    for (int i = 0; i < VoxelBlock::kVoxels; ++i) count += std::abs(block.significance(i, 0)) >= noise;
+  }
+  return {noise, count > 2 ? normal_quantile_above(1.0 / static_cast<double>(count)) : 0};
+}
+
+AlbedoScale albedo_scale(const std::vector<SummedBlock>& blocks, const SearchLimits& limits) {
   std::vector<std::pair<float, float>> significant;  // sum and response
   for (const SummedBlock& block : blocks) {
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
-      if (std::abs(block.significance(i)) >= least) significant.emplace_back(block.sum[i], block.response[i]);
+      if (std::abs(block.significance(i, limits.chance)) >= limits.noise)
+        significant.emplace_back(block.sum[i], block.response[i]);
     }
   }
   AlbedoScale scale;
@@ -101,13 +111,13 @@ AlbedoScale albedo_scale(const std::vector<SummedBlock>& blocks, double least) {
 }
 
 /// Blocks of the next finer level that hold the voxels of significant ones, and those next to these.
-std::vector<VoxelPlace> finer_blocks(const std::vector<SummedBlock>& coarse, double least, const AlbedoScale& albedo,
-                                     double least_albedo) {
+std::vector<VoxelPlace> finer_blocks(const std::vector<SummedBlock>& coarse, const SearchLimits& limits,
+                                     const AlbedoScale& albedo, double least_albedo) {
   const auto block_of = [](int voxel) { return static_cast<int>(std::floor(static_cast<double>(voxel) / kSide)); };
   std::vector<VoxelPlace> blocks;
   for (const SummedBlock& block : coarse) {
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
-      if (std::abs(block.significance(i)) < least) continue;
+      if (std::abs(block.significance(i, limits.chance)) < limits.noise) continue;
       if (std::abs(albedo.of(block.sum[i], block.response[i])) < least_albedo) continue;
       const VoxelPlace voxel = block.voxel(i);
       VoxelPlace first, last;
@@ -158,8 +168,9 @@ SearchRegion reached_region(const Histograms& histograms, const TimeFilter& filt
   return region;
 }
 
-double SummedBlock::significance(int i) const {
-  return variance[i] > 0 ? sum[i] / std::sqrt(variance[i]) : 0;
+double SummedBlock::significance(int i, double chance) const {
+  if (!(variance[i] > 0) || std::abs(sum[i]) < chance * std::sqrt(squares[i])) return 0;
+  return sum[i] / std::sqrt(variance[i]);
 }
 
 VoxelPlace SummedBlock::voxel(int i) const {
@@ -172,13 +183,13 @@ SearchResult search(const Histograms& histograms, const DetectorResponse& respon
   SearchResult result;
   std::vector<VoxelPlace> places = all_blocks(region, all.back().number);
   for (auto level = all.rbegin(); level != all.rend(); ++level) {
-    const double least_here = least * std::exp2(-0.5 * level->number);
     result.blocks = sums(*level, region, places);
-    result.albedo = albedo_scale(result.blocks, least_here);
+    result.limits = search_limits(result.blocks, least * std::exp2(-0.5 * level->number));
+    result.albedo = albedo_scale(result.blocks, result.limits);
     // A surface as wide as a finest voxel fills a quarter of what a voxel of the next level sees of a plane, and so on.
     const double filled = std::exp2(-2.0 * level->number);
     if (level->number > 0)
-      places = finer_blocks(result.blocks, least_here, result.albedo, filled * result.albedo.least);
+      places = finer_blocks(result.blocks, result.limits, result.albedo, filled * result.albedo.least);
   }
   return result;
 }

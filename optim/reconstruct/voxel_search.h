@@ -20,12 +20,20 @@ SearchRegion reached_region(const Histograms& histograms, const TimeFilter& filt
 
 using VoxelPlace = std::array<int, 3>;  ///< numbers of a voxel or a block: across, up, depth
 
+/// From how many standard deviations on a sum is none of noise, nor of chance.
+struct SearchLimits {
+  double noise = 0;  ///< by the counts' own Poisson variance
+  /// By the sum of the squares of what is summed. Light of surfaces elsewhere comes in time for some points by chance: few with much
+  /// light make large sums.
+  double chance = 0;
+};
+
 struct SummedBlock {
   VoxelPlace place{};  ///< in blocks
-  VoxelBlock::Values sum, variance, response;
+  VoxelBlock::Values sum, variance, squares, response;
 
-  /// Standard deviations.
-  double significance(int i) const;
+  /// Standard deviations by the counts' own variance; zero below the limit of chance, in either direction.
+  double significance(int i, double chance) const;
   VoxelPlace voxel(int i) const;
 };
 
@@ -42,10 +50,12 @@ struct AlbedoScale {
 
 struct SearchResult {
   std::vector<SummedBlock> blocks;  ///< of the finest voxels, by place
+  SearchLimits limits;
   AlbedoScale albedo;
 };
 
-/// `least`: standard deviations from which on a finest voxel is significant. A filter that is twice as wide lets through twice the
+/// `least`: standard deviations from which on a finest voxel is none of noise. The limit of chance is that which one of those that
+/// are not would reach, were they all independent. A filter that is twice as wide lets through twice the
 /// background, so that sqrt(2) fewer have to do there; and a quarter of the least albedo, as much less of it is filled.
 SearchResult search(const Histograms& histograms, const DetectorResponse& response, double sigma,
                     const SearchRegion& region, double least);

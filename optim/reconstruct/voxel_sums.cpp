@@ -28,6 +28,7 @@ void sum_over_histograms(const Histograms& histograms, const FilteredHistograms&
                          VoxelBlock& block) {
   block.sum.fill(0);
   block.variance.fill(0);
+  block.squares.fill(0);
   block.response.fill(0);
   Leg back, there;
   std::array<int, VoxelBlock::kVoxels> entry;
@@ -52,7 +53,9 @@ void sum_over_histograms(const Histograms& histograms, const FilteredHistograms&
     const FilteredHistograms::Entry* entries = filtered.row(row);
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
       const FilteredHistograms::Entry& e = entries[entry[i]];
-      block.sum[i] += e.value + along[i] * e.value_step;
+      const float value = e.value + along[i] * e.value_step;
+      block.sum[i] += value;
+      block.squares[i] += value * value;
       block.variance[i] += e.variance + along[i] * e.variance_step;
     }
   }

@@ -14,6 +14,7 @@ struct VoxelBlock {
   Values across, up, depth;  ///< where
   Values sum;                ///< of filtered counts
   Values variance;           ///< of that, by the counts' own
+  Values squares;            ///< of the filtered counts, summed: the variance, were the signs of all a matter of chance
   /// What a small diffuse patch that faces nowhere in particular would send back: the sum of cosine / r^2 at the wall, on the way to
   /// it times on the way back, over all histograms whose bins it reaches.
   Values response;
