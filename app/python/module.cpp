@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "app/python/back_projection.h"
 #include "app/python/session.h"
 #include "app/python/work.h"
 #include "core/base/error.h"
@@ -39,6 +40,8 @@ PYBIND11_MODULE(_core, module) {
   module.def("use_threads", use_threads, "count"_a);
   module.def("used_threads", used_threads);
   module.def("resume", resume_session, "folder"_a, "row"_a);
+  module.def("back_project", back_project_arrays, "counts"_a, "points"_a, "normals"_a, "laser"_a, "delta_t"_a,
+             "t_start"_a, "origins"_a, "response"_a, "used"_a, "false_alarms"_a);
   py::class_<Session>(module, "Session")
       .def(py::init<const std::string&, const std::vector<std::string>&>(), "file"_a, "overrides"_a)
       .def("name", &Session::name)

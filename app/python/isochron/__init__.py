@@ -1,7 +1,8 @@
 """isochron: inverse rendering for time-of-flight cameras.
 
 Experiment renders, differentiates and optimises; read_run, read_image, read_exr and read_capture read what was written, and
-work where the compiled part of the package is missing, too. isochron.torch makes images that PyTorch differentiates.
+work where the compiled part of the package is missing, too. back_project finds hidden surfaces in captures. isochron.torch makes
+images that PyTorch differentiates.
 """
 
 from __future__ import annotations
@@ -17,10 +18,12 @@ from isochron.parallel import set_threads, threads
 from isochron.runs import Run, read_image, read_run
 
 if TYPE_CHECKING:
+    from isochron.back_projection import BackProjection, back_project
     from isochron.captures import Capture, read_capture, write_capture
 
-__all__ = ["Capture", "Coordinates", "Evaluation", "Experiment", "Gradient", "Image", "InputError", "Iteration", "Parameter", "Run",
-           "read_capture", "read_exr", "read_image", "read_run", "resume", "set_threads", "threads", "write_capture", "write_exr"]
+__all__ = ["BackProjection", "Capture", "Coordinates", "Evaluation", "Experiment", "Gradient", "Image", "InputError", "Iteration",
+           "Parameter", "Run", "back_project", "read_capture", "read_exr", "read_image", "read_run", "resume", "set_threads", "threads",
+           "write_capture", "write_exr"]
 
 
 def __getattr__(name: str) -> Any:
@@ -29,6 +32,10 @@ def __getattr__(name: str) -> Any:
         from isochron import captures
 
         return getattr(captures, name)
+    if name in ("BackProjection", "back_project"):
+        from isochron import back_projection
+
+        return getattr(back_projection, name)
     raise AttributeError(f"module 'isochron' has no attribute '{name}'")
 
 
