@@ -1,0 +1,79 @@
+#!/usr/bin/python3
+"""How far a surface is from the hidden rabbit (scenes/rabbit), as who stands at the wall sees both, as JSON.
+
+usage: rabbit_errors.py SURFACE     a mesh (PLY, OBJ), or a capture by rabbit_capture.py, which is back-projected
+
+    median_mm, within_80_mm    of the differences in depth, where both are seen
+    bias_mm                    median of found - true
+    silhouette                 intersection over union of what is seen
+    extra, missed              seen of one alone, over what is seen of the rabbit
+    seconds                    of the back-projection
+"""
+
+import json
+import pathlib
+import sys
+import time
+
+import numpy as np
+
+import use_package
+from isochron.mesh_files import read_mesh
+
+SCENE = pathlib.Path(__file__).resolve().parents[1] / "scenes/rabbit"
+STEP = 0.002  # metres
+HALF = 0.3
+
+
+def depths(vertices, triangles):
+    """Distance from the wall on a grid of lines at right angles to it; NaN where nothing is met."""
+    along = np.arange(-HALF, HALF, STEP)
+    seen = np.full((len(along), len(along)), np.nan)
+    for a, b, c in vertices[triangles]:
+        low, high = (np.searchsorted(along, f((a, b, c), axis=0)[:2]) for f in (np.min, np.max))
+        area = np.cross(b[:2] - a[:2], c[:2] - a[:2])
+        if (low == high).any() or area == 0:
+            continue
+        x, y = np.meshgrid(along[low[0]:high[0]] - a[0], along[low[1]:high[1]] - a[1])
+        v = (x * (c[1] - a[1]) - y * (c[0] - a[0])) / area
+        w = (y * (b[0] - a[0]) - x * (b[1] - a[1])) / area
+        depth = np.where((v >= 0) & (w >= 0) & (v + w <= 1), a[2] + v * (b[2] - a[2]) + w * (c[2] - a[2]), np.nan)
+        part = seen[low[1]:high[1], low[0]:high[0]]
+        part[:] = np.fmin(part, depth)
+    return seen
+
+
+def errors(vertices, triangles):
+    found, true = depths(np.asarray(vertices), np.asarray(triangles)), depths(*read_mesh(SCENE / "rabbit.obj"))
+    in_found, in_true = np.isfinite(found), np.isfinite(true)
+    both = in_found & in_true
+    off = 1000 * (found - true)[both]
+    return {"median_mm": np.median(np.abs(off)), "within_80_mm": np.quantile(np.abs(off), 0.8), "bias_mm": np.median(off),
+            "silhouette": both.sum() / (in_found | in_true).sum(), "extra": (in_found & ~in_true).sum() / in_true.sum(),
+            "missed": (in_true & ~in_found).sum() / in_true.sum()}
+
+
+def surface(path):
+    """Vertices, triangles and the seconds that it took to find them."""
+    if path.suffix != ".h5":
+        return *read_mesh(path), {}
+    sys.path.insert(0, str(SCENE.parents[1] / "build/python"))
+    sys.modules.pop("isochron", None)
+    import isochron
+
+    start = time.monotonic()
+    found = isochron.back_project(path, SCENE / "response.csv")
+    return found.vertices, found.triangles, {"seconds": time.monotonic() - start}
+
+
+def main(arguments):
+    if len(arguments) != 1 or arguments[0].startswith("-"):
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    vertices, triangles, spent = surface(pathlib.Path(arguments[0]))
+    print(json.dumps({k: float(f"{v:.3g}") for k, v in {**errors(vertices, triangles), **spent}.items()}))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
