@@ -79,9 +79,10 @@ void ProgressDisplay::end() {
 
 void ProgressDisplay::show(const Progress& p) {
   const std::string error = std::isnan(p.param_rmse) ? "" : fmt::format("  parameter error {:.4g}", p.param_rmse);
+  const std::string level = p.levels > 0 ? fmt::format("level {}/{}  ", p.level, p.levels) : "";
   const std::lock_guard lock(mutex_);
-  run_ = fmt::format("iteration {}/{}  loss {:.4g}{}  {:.3g} s each  {} left", p.iteration, p.iterations, p.loss, error,
-                     p.seconds_per_iteration, duration(p.seconds_left));
+  run_ = fmt::format("{}iteration {}/{}  loss {:.4g}{}  {:.3g} s each  {} left", level, p.iteration, p.iterations,
+                     p.loss, error, p.seconds_per_iteration, duration(p.seconds_left));
 }
 
 std::string ProgressDisplay::line(bool bar) const {

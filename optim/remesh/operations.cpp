@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <queue>
 #include <utility>
 
 #include "core/base/error.h"
@@ -84,15 +85,20 @@ void Operations::hold(std::function<bool(const Vec3&)> held) {
 }
 
 void Operations::split_long() {
-  // New edges come last, so that this goes on to them.
-  for (unsigned i = 0; i < kernel_.n_edges(); ++i) {
-    const OpenMesh::EdgeHandle edge(static_cast<int>(i));
-    while (edge_length(edge) > kLongest * length_) {
-      const Halfedge h = kernel_.halfedge_handle(edge, 0);
-      const Vec3 a = position(kernel_.from_vertex_handle(h)), b = position(kernel_.to_vertex_handle(h));
-      const Vertex middle = kernel_.split(edge, to((a + b) / 2));
-      kernel_.status(middle).set_locked(held_((a + b) / 2));
-    }
+  // The longest first: it is the longest of both its triangles, so that their angles are at least halves of what they were.
+  std::priority_queue<std::pair<double, int>> longest;
+  const auto add = [&](OpenMesh::EdgeHandle edge) {
+    if (const double length = edge_length(edge); length > kLongest * length_) longest.emplace(length, edge.idx());
+  };
+  for (const OpenMesh::EdgeHandle edge : kernel_.edges()) add(edge);
+  while (!longest.empty()) {
+    const OpenMesh::EdgeHandle edge(longest.top().second);
+    longest.pop();
+    const Halfedge h = kernel_.halfedge_handle(edge, 0);
+    const Vec3 p = (position(kernel_.from_vertex_handle(h)) + position(kernel_.to_vertex_handle(h))) / 2.0;
+    const Vertex middle = kernel_.split(edge, to(p));
+    kernel_.status(middle).set_locked(held_(p));
+    for (const OpenMesh::EdgeHandle part : kernel_.ve_range(middle)) add(part);
   }
 }
 
@@ -187,15 +193,23 @@ bool Operations::may_collapse(Halfedge h) {
   if (kernel_.status(removed).feature() || !kernel_.is_collapse_ok(h)) return false;
   if (kernel_.is_boundary(removed) && !kernel_.is_boundary(kernel_.edge_handle(h))) return false;
   const Vec3 there = position(kept);
+  for (const Halfedge side : {h, kernel_.opposite_halfedge_handle(h)})
+    if (!kernel_.is_boundary(side) && !may_lose_an_edge(kernel_.to_vertex_handle(kernel_.next_halfedge_handle(side))))
+      return false;
   for (const Vertex w : kernel_.vv_range(removed))
     if (length(position(w) - there) > kLongest * length_) return false;
   return may_move(removed, there, kept);
+}
+
+bool Operations::may_lose_an_edge(Vertex v) const {
+  return kernel_.valence(v) > (kernel_.is_boundary(v) ? 2u : 3u);
 }
 
 bool Operations::may_flip(OpenMesh::EdgeHandle edge) const {
   const Halfedge h = kernel_.halfedge_handle(edge, 0), back = kernel_.opposite_halfedge_handle(h);
   const OpenMesh::FaceHandle left = kernel_.face_handle(h), right = kernel_.face_handle(back);
   if (touches_held(left) || touches_held(right)) return false;
+  if (!may_lose_an_edge(kernel_.from_vertex_handle(h)) || !may_lose_an_edge(kernel_.to_vertex_handle(h))) return false;
   const Vec3 a = position(kernel_.from_vertex_handle(h)), b = position(kernel_.to_vertex_handle(h)),
              c = position(kernel_.to_vertex_handle(kernel_.next_halfedge_handle(h))),
              d = position(kernel_.to_vertex_handle(kernel_.next_halfedge_handle(back)));

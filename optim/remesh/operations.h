@@ -57,6 +57,8 @@ class Operations {
   /// Whether all faces about v may have it at `to`, but for those that also have `gone`.
   bool may_move(Vertex v, const Vec3& to, Vertex gone) const;
   bool may_collapse(Halfedge h);
+  /// Whether what is left about v is no fold: three triangles, at a border one.
+  bool may_lose_an_edge(Vertex v) const;
   bool may_flip(OpenMesh::EdgeHandle edge) const;
   /// Of the area-weighted normals about v.
   Vec3 normal(Vertex v) const;

@@ -14,7 +14,7 @@
 namespace isochron {
 namespace {
 
-/// Sheets, balls and tori, finer and coarser by up to 4, have 98 to 100 % of their edges between 0.6 and 1.5 of the wanted
+/// Sheets, balls and tori, finer and coarser by up to 4, have 97 to 100 % of their edges between 0.6 and 1.5 of the wanted
 /// length after five; five more change that by less than 1 % and take twice the time.
 constexpr int kRounds = 5;
 /// A round that makes the surface pass through itself is made again so often, and then left out.

@@ -134,6 +134,11 @@ class Levels {
     RunOptions options = options_;
     options.folder = folder(level);
     options.report = [this](const std::string& text) { report_ = text; };
+    options.progress = [this, level](Progress progress) {
+      progress.level = level;
+      progress.levels = remeshed_.remesh.levels;
+      if (options_.progress) options_.progress(progress);
+    };
     return run_level_(options);
   }
 

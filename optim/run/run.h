@@ -21,7 +21,8 @@ struct Progress {
   double loss = 0;
   double param_rmse = 0;             ///< NaN where unknown
   double seconds_per_iteration = 0;  ///< average of this call
-  double seconds_left = 0;
+  double seconds_left = 0;           ///< of the level, where there are some
+  int level = 0, levels = 0;         ///< 0: the run is not one in levels
 };
 
 struct LevelResult;

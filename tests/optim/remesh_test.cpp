@@ -177,6 +177,18 @@ TEST(Remesh, BallStaysOne) {
   }
 }
 
+/// A few large triangles, with creases, become many small ones, and a ball of less than an edge a few large ones.
+TEST(Remesh, FarFromTheWantedLength) {
+  const Mesh tetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}}};
+  const Remeshed fine = remesh(tetrahedron, 0.05);
+  expect_regular(tetrahedron, fine, 0.05);
+  // Each of the six creases, 7.2 long together, loses a strip on either side that is about as wide as an edge is long.
+  EXPECT_LT(area(tetrahedron) - area(fine.mesh), 2 * 7.2 * 0.05);
+  const Remeshed coarse = remesh(ball(3, 1), 100);
+  EXPECT_EQ(coarse.mesh.faces.size(), 4u);
+  EXPECT_GT(volume(coarse.mesh), 0);
+}
+
 /// Chords of length h lie h^2 / 8r inside of a circle of radius r: area, volume and distance change by the square of h.
 TEST(Remesh, ErrorsAreOfSecondOrder) {
   const Mesh old = torus(240, 100);
