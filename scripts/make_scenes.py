@@ -7,7 +7,7 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corner, corridor, cube, glass_bunny, height_field, hidden_s, letter, rabbit, sofa, tree
+from scenes import branches, bunny, corner, corridor, cube, glass_bunny, height_field, hidden_s, letter, rabbit, relief, sofa, tree
 
 SCENES = {
     "branches": branches.write,
@@ -20,6 +20,7 @@ SCENES = {
     "hidden_s": hidden_s.write,
     "letter": letter.write,
     "rabbit": rabbit.write,
+    "relief": relief.write,
     "sofa": sofa.write,
     "tree": tree.write,
 }

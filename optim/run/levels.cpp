@@ -15,6 +15,7 @@
 #include "core/scene/scene_loader.h"
 #include "optim/experiment/files.h"
 #include "optim/remesh/remesh.h"
+#include "optim/run/geometry_files.h"
 #include "optim/run/level_log.h"
 #include "optim/run/summary.h"
 
@@ -91,6 +92,8 @@ class Levels {
     const auto poll = [this] {
       if (options_.stop && options_.stop()) throw Interrupted{};
     };
+    const Parameters& parameters = problem.parameters();
+    GeometryFiles(folder_, experiment_.output, parameters).write("target", parameters.target());
     write_exr(file("target.exr"), problem.make_target(poll), exr_notes(experiment_.gates));
   }
 
@@ -154,8 +157,8 @@ class Levels {
     levels_.push_back(found_level(level));
     const std::string from = folder(level);
     if (status_ != RunStatus::interrupted) {
-      if (level == 1) copy(from, {"initial.exr"}, {"initial_", "target_"});
-      copy(from, {"final.exr", "final.h5"}, {"final_"});
+      if (level == 1) copy(from, {"initial.exr"}, "initial_");
+      copy(from, {"final.exr", "final.h5"}, "final_");
       write_file_atomically(file("log.csv"), joined_logs(logs()));
     }
     write_summary(more);
@@ -171,20 +174,17 @@ class Levels {
     write_file_atomically(file("summary.yaml"), text + levels_yaml());
   }
 
-  /// Files of that name, and meshes whose names begin so.
-  void copy(const std::string& from, const std::vector<std::string>& files,
-            const std::vector<std::string>& meshes) const {
+  /// Files of those names, and meshes whose names begin so.
+  void copy(const std::string& from, const std::vector<std::string>& files, const std::string& moment) const {
     const auto copy_file = [&](const std::string& each) {
       if (const auto contents = read_file(from + "/" + each)) write_file_atomically(folder_ + "/" + each, *contents);
     };
     for (const std::string& each : files) copy_file(each);
     if (!fs::exists(from + "/geometry")) return;
     fs::create_directories(folder_ + "/geometry");
-    for (const auto& entry : fs::directory_iterator(from + "/geometry")) {
-      const std::string mesh = entry.path().filename().string();
-      for (const std::string& beginning : meshes)
-        if (mesh.starts_with(beginning)) copy_file("geometry/" + mesh);
-    }
+    for (const auto& entry : fs::directory_iterator(from + "/geometry"))
+      if (const std::string mesh = entry.path().filename().string(); mesh.starts_with(moment))
+        copy_file("geometry/" + mesh);
   }
 
   std::vector<std::string> logs() const {

@@ -2,9 +2,10 @@
 // its surface in triangles of half the size (next_level.h).
 //
 //   DIR/experiment.yaml, inputs/, target.exr    of all levels; the target is rendered from the mesh as loaded
+//   DIR/geometry/target_SHAPE                   that mesh at the target values, where they are known
 //   DIR/levels/K/                               an ordinary run: experiment.yaml, checkpoint, log.csv, final.exr, ...
 //   DIR/levels/K/scene/                         its scene, and surface.ply, where its mesh is another than the loaded one
-//   DIR/initial.exr, geometry/initial_SHAPE     of the first level; also geometry/target_SHAPE
+//   DIR/initial.exr, geometry/initial_SHAPE     of the first level
 //   DIR/final.exr, final.h5, geometry/final_SHAPE  of the last level that has ended
 //   DIR/log.csv                                 of all levels that have ended, iterations and seconds counted through
 //   DIR/summary.yaml                            of that level, and `levels`, a line for each, also of one under way

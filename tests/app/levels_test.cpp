@@ -26,8 +26,8 @@ class LevelsProgram : public Program {
       EXPECT_EQ(folder_.read(a + level + "/experiment.yaml"), folder_.read(b + level + "/experiment.yaml"));
     }
     for (const char* file :
-         {"/target.exr", "/initial.exr", "/final.exr", "/geometry/initial_block.ply", "/geometry/final_block.ply",
-          "/levels/3/scene/surface.ply", "/levels/3/scene/scene.yaml"}) {
+         {"/target.exr", "/geometry/target_block.ply", "/initial.exr", "/final.exr", "/geometry/initial_block.ply",
+          "/geometry/final_block.ply", "/levels/3/scene/surface.ply", "/levels/3/scene/scene.yaml"}) {
       EXPECT_TRUE(folder_.has(a + file)) << file;
       EXPECT_TRUE(folder_.read(a + file) == folder_.read(b + file)) << file;
     }

@@ -148,6 +148,7 @@ TEST_F(LevelsTest, TheFirstLevelMayBeRemeshed) {
   start_run(load_experiment(experiment("flat", "remesh: {levels: 1, edge_length: 0.3}", "{images: hill.exr}")),
             options());
   EXPECT_NEAR(mean_edge_length(found("out")), 0.3, 0.03);
+  EXPECT_FALSE(folder_.has("out/geometry/target_hill.ply")) << "nobody knows it";
 }
 
 /// Everything begins where it was found: the same surface, albedos, gain and shift; the image is that of before.
