@@ -50,12 +50,6 @@ bool finite(const double* values, int count) {
 
 }  // namespace
 
-Vec3 Histograms::middle() const {
-  Vec3 sum;
-  for (const Row& row : rows) sum += row.sensor / static_cast<double>(rows.size());
-  return sum;
-}
-
 double Histograms::half_side() const {
   const Rectangle rectangle(rows);
   return 0.5 * std::max(rectangle.side(0), rectangle.side(1));

@@ -22,8 +22,7 @@ struct Histograms {
   std::vector<float> counts;  ///< [row][bin]
 
   const float* of(std::size_t row) const { return &counts[row * bins]; }
-  /// Mean of the rows' sensor points, and half of the longer side of the rectangle that holds them.
-  Vec3 middle() const;
+  /// Half of the longer side of the rectangle that holds the sensor points.
   double half_side() const;
   /// Distance of neighbouring sensor points, were they evenly spread over their rectangle.
   double spacing() const;

@@ -55,8 +55,8 @@ struct SearchResult {
 };
 
 /// `least`: standard deviations from which on a finest voxel is none of noise. The limit of chance is that which one of those that
-/// are not would reach, were they all independent. A filter that is twice as wide lets through twice the
-/// background, so that sqrt(2) fewer have to do there; and a quarter of the least albedo, as much less of it is filled.
+/// are not would reach, were they all independent. A filter that is twice as wide lets through twice the background, so that sqrt(2)
+/// times less has to do on the next coarser level, and a quarter of the least albedo, as a small surface fills as much less of a voxel.
 SearchResult search(const Histograms& histograms, const DetectorResponse& response, double sigma,
                     const SearchRegion& region, double least);
 
