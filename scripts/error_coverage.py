@@ -1,12 +1,14 @@
 #!/usr/bin/python3
-"""How often the errors that runs state cover the truth.
+"""How often the errors that runs state cover the truth, and whether the probabilities of their fits are uniform.
 
     scripts/error_coverage.py measure CSV [DRAWS]   40 draws: a quarter of an hour of processor time
-    scripts/error_coverage.py table CSV             a table in Markdown
+    scripts/error_coverage.py table CSV             two tables in Markdown: quantities, and p-values of the fits
 
 Small captures of a board around the corner, from photon counts: `letter` has a relief and smoothing, as experiments/letter.yaml,
-`plate` is flat and tilted, `spot` the same lit at a single spot. Each draw has other counts and other random numbers of the fit.
-A row is a quantity of a draw: found and true value, stated standard error, and error over stated error.
+`plate` is flat and tilted, `spot` the same lit at a single spot. Each draw of each case has counts of its own, as dark bins that
+cases share would make one sample of their backgrounds, and other random numbers of the fit. Counts are Poisson numbers about one
+rendering of many samples: noise of the expected counts is no error of the fit, but makes its deviance larger.
+A row is a quantity of a draw: found and true value, stated standard error, error over stated error, and the fit's p-value.
 """
 
 import pathlib
@@ -15,19 +17,24 @@ import tempfile
 
 import numpy as np
 import yaml
+from scipy.stats import kstest
 
 from reproduction.measure import program
 from reproduction.tables import read_rows, run_action, write_rows
 from scenes import letter, mesh
+import use_package
+from isochron import exr
 
 CASES = ("letter", "plate", "spot")
 SIDE = 5  # vertices
 EDGE = 0.5
 DISTANCE = 0.5
 NORMAL = 1.959964  # of the middle 95 % of a standard normal
-COLUMNS = ("case", "draw", "quantity", "found", "truth", "standard_error", "z")
+COLUMNS = ("case", "draw", "quantity", "found", "truth", "standard_error", "z", "p_value")
 GATES = {"kind": "bins", "unit": "ps", "scene_unit_m": 1, "start": 2880, "width": 24, "count": 72, "response": "response.csv"}
 SAMPLES = 512
+TRUE_SAMPLES = 65536  # variance over mean, summed over the 10368 readings of plate: 2, where the deviance scatters by 150
+FIT_SAMPLES = 1024  # that the p-value rests on
 PENALTY = {"relief": 0.006, "paint": 7.0e-7}
 
 
@@ -79,13 +86,20 @@ def write(directory, case):
     (directory / "scene.yaml").write_text(yaml.safe_dump(scene(laser)), encoding="ascii")
     unknowns = list(parameters(case, shape[0], albedos))
     experiment = {"name": case, "scene": "scene.yaml", "max_bounces": 1, "gates": GATES, "parameters": unknowns,
-                  "target": {"samples": 4096, "noise": {"counts": True}},
+                  "target": {"images": "counts.exr"},
                   "samples": {"primal": SAMPLES, "interior": SAMPLES, "visibility": 0, "path_length": 0},
                   "loss": {"kind": "poisson"},
                   "optimizer": {"method": "levenberg_marquardt", "iterations": 12},
-                  "output": {"geometry": "none", "frames": 0, "histogram_samples": 1}}
+                  "output": {"geometry": "none", "frames": 0, "histogram_samples": FIT_SAMPLES}}
     (directory / "experiment.yaml").write_text(yaml.safe_dump(experiment), encoding="ascii")
     return {p["name"]: p["target"] for p in unknowns}
+
+
+def render_expected(directory):
+    """Expected counts of the case that the directory holds, channel by channel."""
+    program("render", directory / "experiment.yaml", "-o", directory / "expected", "--at", "target", "--samples", TRUE_SAMPLES,
+            "--set", "target={samples: 1}")  # there are no counts yet
+    return exr.read(directory / "expected/render.exr")
 
 
 def quantities(summary, truth):
@@ -104,19 +118,34 @@ def quantities(summary, truth):
             yield f"{name} at the middle", entry["values"][middle], float(true[middle]), entry["standard_errors"][middle]
 
 
-def measure(file, draws=40, cases=CASES, first=1):
+def fit(directory, expected, case, draw, first_seed):
+    """The summary of a run on counts of its own."""
+    generator = np.random.default_rng([first_seed, CASES.index(case), draw])
+    exr.write(directory / "counts.exr", {name: generator.poisson(mean) for name, mean in expected.items()})
+    program("run", directory / "experiment.yaml", "-o", directory / "run", "--force", "--seed", first_seed + draw)
+    return yaml.safe_load((directory / "run/summary.yaml").read_text(encoding="utf-8"))
+
+
+def measure(file, draws=40, cases=CASES, first_seed=0):
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
-        directory = pathlib.Path(temporary)
-        for draw in range(first, first + int(draws)):
-            for case in cases:
-                truth = write(directory, case)
-                program("run", directory / "experiment.yaml", "-o", directory / "run", "--force", "--seed", draw, "--set",
-                        f"target.seed={100 + draw}")
-                summary = yaml.safe_load((directory / "run/summary.yaml").read_text(encoding="utf-8"))
-                for name, found, true, error in quantities(summary, truth):
-                    rows.append((case, draw, name, *(f"{v:.6g}" for v in (found, true, error, (found - true) / error))))
+        folders = {case: pathlib.Path(temporary) / case for case in cases}
+        for folder in folders.values():
+            folder.mkdir()
+        truths = {case: write(folder, case) for case, folder in folders.items()}
+        expected = {case: render_expected(folder) for case, folder in folders.items()}
+        for draw in range(1, 1 + int(draws)):
+            for case, folder in folders.items():
+                summary = fit(folder, expected[case], case, draw, first_seed)
+                for name, found, true, error in quantities(summary, truths[case]):
+                    numbers = (found, true, error, (found - true) / error, summary["fit"]["p_value"])
+                    rows.append((case, draw, name, *(f"{v:.6g}" for v in numbers)))
                 write_rows(file, COLUMNS, rows)
+
+
+def p_values(rows, case):
+    """One of each draw."""
+    return [float(p) for p in {r["draw"]: r["p_value"] for r in rows if r["case"] == case}.values()]
 
 
 def table(file):
@@ -128,6 +157,12 @@ def table(file):
         error = np.median([float(r["standard_error"]) for r in own])
         print(f"| {case} | {name} | {len(own)} | {error:.2g} | {np.sqrt(np.mean(z**2)):.2f} | "
               f"{100 * np.mean(np.abs(z) < NORMAL):.0f} % |")
+    print("\n| capture | draws | mean p | below 0.05 | distance from uniform | probability |\n|---|---|---|---|---|---|")
+    for case in dict.fromkeys(r["case"] for r in rows):
+        p = p_values(rows, case)
+        test = kstest(p, "uniform")
+        print(f"| {case} | {len(p)} | {np.mean(p):.2f} | {100 * np.mean(np.less(p, 0.05)):.0f} % | {test.statistic:.2f} | "
+              f"{test.pvalue:.2f} |")
 
 
 if __name__ == "__main__":
