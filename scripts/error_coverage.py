@@ -5,7 +5,7 @@
     scripts/error_coverage.py table CSV             two tables in Markdown: quantities, and p-values of the fits
 
 Small captures of a board around the corner, from photon counts: `letter` has a relief and smoothing, as experiments/letter.yaml,
-`plate` is flat and tilted, `spot` the same lit at a single spot. Each draw of each case has counts of its own, as dark bins that
+`plate` is flat and tilted, `spot` the same lit at a single spot; `flat` is of one albedo and keeps its tilt. Each draw of each case has counts of its own, as dark bins that
 cases share would make one sample of their backgrounds, and other random numbers of the fit. Counts are Poisson numbers about one
 rendering of many samples: noise of the expected counts is no error of the fit, but makes its deviance larger.
 A row is a quantity of a draw: found and true value, stated standard error, error over stated error, and the fit's p-value.
@@ -25,7 +25,7 @@ from scenes import letter, mesh
 import use_package
 from isochron import exr
 
-CASES = ("letter", "plate", "spot")
+CASES = ("letter", "plate", "spot", "flat")
 SIDE = 5  # vertices
 EDGE = 0.5
 DISTANCE = 0.5
@@ -64,10 +64,15 @@ def parameters(case, vertices, albedos):
         relief = letter.relief(vertices[:, 0], vertices[:, 1])
         yield {"name": "relief", "type": "vertices", "shape": "board", "direction": [0, 0, 1],
                "smoothing": {"slopes": PENALTY["relief"]}, "initial": 0, "target": relief.tolist()}
-    yield rotation("tilt_x", [1, 0, 0], 5)
-    yield rotation("tilt_y", [0, 1, 0], -4)
+    if case != "flat":
+        yield rotation("tilt_x", [1, 0, 0], 5)
+        yield rotation("tilt_y", [0, 1, 0], -4)
     yield {"name": "z", "type": "translation", "shape": "board", "direction": [0, 0, 1], "initial": 0.008, "target": 0.01}
-    paint = {"name": "paint", "type": "albedo", "shape": "board", "per": "vertex", "initial": 0.3, "target": albedos.tolist()}
+    paint = {"name": "paint", "type": "albedo", "initial": 0.3}
+    if case == "flat":
+        paint |= {"material": "paint", "target": 0.5}
+    else:
+        paint |= {"shape": "board", "per": "vertex", "target": albedos.tolist()}
     if case == "letter":
         paint["smoothing"] = {"slopes": PENALTY["paint"]}
     yield paint
@@ -106,14 +111,15 @@ def quantities(summary, truth):
     """(name, found, true, stated standard error) of what the data determine."""
     combinations = summary.get("combinations", {})
     for name in ("z", "tilt_x", "tilt_y", "dark"):
-        if name not in summary["undetermined"]:
+        if name in truth and name not in summary["undetermined"]:
             yield name, summary["parameters"][name], truth[name], summary["standard_errors"][name]
     for name, entry in combinations.items():
         one, sign, other = name.split()
-        values = np.asarray(truth[other])
+        values = np.atleast_1d(truth[other])
         true = truth[one] * values if sign == "*" else truth[one] + values if sign == "+" else truth[one] - values
+        name = f" {sign} ".join(sorted((one, other))) if sign == "*" else name
         yield name, entry["mean"], float(np.mean(true)), entry["mean_standard_error"]
-        if sign == "*":
+        if sign == "*" and len(values) > 1:
             middle = len(values) // 2
             yield f"{name} at the middle", entry["values"][middle], float(true[middle]), entry["standard_errors"][middle]
 

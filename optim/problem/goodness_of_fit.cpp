@@ -46,6 +46,7 @@ class Judge {
     const double left = std::max(1.0, test.degrees_of_freedom) / n;
     const double counted = std::max(0.0, all.counted) * left;
     test.spread = std::sqrt(counted + all.variance);
+    test.image_share = all.variance > 0 ? all.variance / (counted + all.variance) : 0;
     const double skewness = test.spread > 0 ? left * all.third / std::pow(test.spread, 3) : 0;
     test.p_value = gamma_tail(all.excess - all.projected + taken_, 0, test.spread, skewness);
     return test;

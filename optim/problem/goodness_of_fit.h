@@ -10,7 +10,9 @@
 // proportion to light^2 / m. Unknowns at a bound take nothing.
 // Noise of the image. The mean is rendered, in two independent halves. Their difference removes the bias from T: the nonlinear part
 // h(m) becomes 2 h(m) - f h(m1) - (1 - f) h(m2), f being the first half's share of the samples, without bias to second order, and
-// N - m of one half is multiplied by L of the other. To the variance both T's slopes times the halves' difference add.
+// N - m of one half is multiplied by L of the other. To the variance both T's slopes times the halves' difference add. Where rare
+// samples make most of a reading, halves are far apart and second order is not enough: what noise adds is then too small. So
+// p-values hold where the noise makes a small part of the spread (image_share); more samples are rendered until it does.
 // Probability. T is taken for a gamma variable of its first three moments (Wilson and Hilferty's cube root), which chi^2 is.
 #pragma once
 #include <vector>
@@ -35,6 +37,7 @@ struct DevianceTest {
   double degrees_of_freedom = 0;  ///< readings less free unknowns
   double spread = 0;              ///< standard deviation of deviance - floor, both noises included
   double p_value = 1;             ///< of a deviance as large as this or larger
+  double image_share = 0;         ///< fraction of spread^2 that the image's noise makes
 };
 
 /// Whether the readings that count are whole numbers, as Poisson numbers are: scaled or corrected ones are no counts.

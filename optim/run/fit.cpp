@@ -4,10 +4,35 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "optim/run/bounds.h"
 
 namespace isochron {
+namespace {
+
+SplitImage render_expected(const Problem& problem, const std::vector<double>& theta, int samples, int number) {
+  return problem.render_halves_in_parts(theta, problem.estimator(), problem.stream(Pass::histograms, number), samples,
+                                        "rendering the expected counts", [] {});
+}
+
+/// The mean of two images of as many samples each, half by half.
+SplitImage mean_of(SplitImage a, const SplitImage& b) {
+  const double first = (a.first + b.first) / 2;
+  for (std::size_t i = 0; i < a.image.data.size(); ++i) {
+    const auto half = [&](const SplitImage& s, double of_difference) {
+      return s.image.data[i] + of_difference * s.difference.data[i];
+    };
+    const double one = (a.first * half(a, 1 - a.first) + b.first * half(b, 1 - b.first)) / (2 * first);
+    const double other = ((1 - a.first) * half(a, -a.first) + (1 - b.first) * half(b, -b.first)) / (2 * (1 - first));
+    a.image.data[i] = (a.image.data[i] + b.image.data[i]) / 2;
+    a.difference.data[i] = one - other;
+  }
+  a.first = first;
+  return a;
+}
+
+}  // namespace
 
 bool has_fit(const Problem& problem, const GatedImage& target) {
   return problem.reading_loss(target).kind == LossKind::poisson && are_whole_numbers(target, problem.readings());
@@ -42,6 +67,19 @@ GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta
       model.background_unknown.push_back(block.count == 1 ? 0 : background_of(pixel));
   }
   return judge_fit(model, target, problem.reading_loss(target));
+}
+
+GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                 SplitImage& image) {
+  constexpr int kMostDoublings = 4;
+  const int samples = fit_samples(problem);
+  image = render_expected(problem, theta, samples, 0);
+  GoodnessOfFit fit = judge_fit(problem, theta, image, target);
+  for (int i = 0; i < kMostDoublings && problem.scene().capture && fit.fit.image_share > kMostImageShare; ++i) {
+    image = mean_of(std::move(image), render_expected(problem, theta, samples << i, i + 1));
+    fit = judge_fit(problem, theta, image, target);
+  }
+  return fit;
 }
 
 bool left_its_data(const GoodnessOfFit& fit, const Checkpoint& state, const LogRow& last) {

@@ -22,6 +22,15 @@ int fit_samples(const Problem& problem);
 GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
                         const GatedImage& target);
 
+/// Most of the deviance's variance that noise of the expected counts may make (DevianceTest::image_share): whatever its law, the
+/// spread is then known to some per cent.
+inline constexpr double kMostImageShare = 0.05;
+
+/// The same for expected counts that are rendered into `image`, with fit_samples(). Captures get more, twice as many each time, where
+/// noise makes too much of the variance, 16 times as many at most.
+GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
+                                 SplitImage& image);
+
 /// Whether a run has left its data behind: they hold light of which the fit has nothing (GoodnessOfFit::lost), or the fit
 /// neither explains them nor is as good as its start, by three standard errors of the loss.
 bool left_its_data(const GoodnessOfFit& fit, const Checkpoint& state, const LogRow& last);

@@ -198,10 +198,13 @@ class Run {
     const Experiment& experiment = problem_.experiment();
     const bool counts = has_fit(problem_, target_), histograms = has_histograms(experiment, problem_.scene());
     if ((!counts && !histograms) || !problem_.can_render(state_.theta)) return;
-    const SplitImage expected = problem_.render_halves_in_parts(
-        state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
-        counts ? fit_samples(problem_) : experiment.output.histogram_samples, "rendering the expected counts", [] {});
-    if (counts) fit_ = judge_fit(problem_, state_.theta, expected, target_);
+    SplitImage expected;
+    if (counts)
+      fit_ = judge_rendered_fit(problem_, state_.theta, target_, expected);
+    else
+      expected.image =
+          problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
+                                   experiment.output.histogram_samples, "rendering the expected counts", [] {});
     if (histograms) write_histograms(path("final.h5"), experiment, problem_.scene(), expected.image);
   }
 

@@ -138,6 +138,26 @@ TEST(GoodnessOfFit, ProbabilitiesOfRightModelsAreUniform) {
   }
 }
 
+// Readings of one mean m, whose deviance varies by 2 where counts are many. Halves that are d sqrt(m) apart put d (N - m) / sqrt(m)
+// into each, which varies by d^2; what is linear in the image the background takes.
+TEST(GoodnessOfFit, SaysHowMuchOfTheSpreadIsTheImages) {
+  constexpr double kMean = 1e5;
+  GatedImage counts(kPixels, 1, kGates, 1), halves[] = {counts, counts};
+  counts.data.assign(counts.data.size(), kMean);
+  const auto share = [&](double d) {
+    for (std::size_t i = 0; i < counts.data.size(); ++i) {
+      const double apart = (i % 2 ? d : -d) * std::sqrt(kMean);
+      halves[0].data[i] = kMean + apart / 2;
+      halves[1].data[i] = kMean - apart / 2;
+    }
+    const SplitImage image = join_halves(halves[0], 1, halves[1], 1);
+    const CountModel model{&image, std::vector<double>(kPixels, kMean), std::vector<int>(kPixels, 0), {1}, 0};
+    return test_deviance(model, counts, loss_of_counts()).image_share;
+  };
+  EXPECT_EQ(share(0), 0);
+  for (const double d : {0.1, 1.0, 3.0}) EXPECT_NEAR(share(d), d * d / (2 + d * d), 1e-2 * share(d)) << d;
+}
+
 TEST(GoodnessOfFit, TellsWhatIsLeft) {
   Fit fit;
   fit.wrong = 3;
