@@ -41,11 +41,12 @@ struct OptimizerSpec {
   int inner_iterations = 5;         ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
 
   /// Converged once the loss has settled over so many iterations (safeguard.h); 0: never. Unless given: 5 where an iteration
-  /// solves the problem of its own random numbers, so that of ten without a visible fall none found more than noise. Never for
-  /// adam, whose losses may lie on a plateau for as long as they like before they fall.
+  /// solves the problem of its own random numbers, so that of ten without a visible fall none found more than noise. Steps of
+  /// adam are small: 50, of which the mean gradient must be noise, too, as losses can lie on a plateau.
   int window() const {
-    constexpr int kSolvingWindow = 5;
-    return stop_window != kStopOfMethod ? stop_window : method == OptimizerMethod::adam ? 0 : kSolvingWindow;
+    constexpr int kSolvingWindow = 5, kSteppingWindow = 50;
+    if (stop_window != kStopOfMethod) return stop_window;
+    return method == OptimizerMethod::adam ? kSteppingWindow : kSolvingWindow;
   }
 };
 
@@ -67,7 +68,7 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   };
   keys.map("stop", stop,
            "converged once the loss falls by less than its standard error; the result is the mean over the last window",
-           {.unset = optimizer.stop_window == kStopOfMethod, .otherwise = "`{window: 5}`; adam: never"});
+           {.unset = optimizer.stop_window == kStopOfMethod, .otherwise = "`{window: 5}`; adam: `{window: 50}`"});
   RateDecay& decay = optimizer.decay;
   const auto halving = [&](Keys& inner) {
     inner.value("half_life", field::positive(decay.half_life), "iterations after which steps are half as long",

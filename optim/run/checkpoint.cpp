@@ -42,7 +42,9 @@ std::vector<std::pair<const char*, std::vector<double>*>> lists_of(SafeguardStat
           {"best_theta", &state.best_theta},
           {"block", &state.block},
           {"block_before", &state.block_before},
-          {"theta_sum", &state.theta_sum}};
+          {"theta_sum", &state.theta_sum},
+          {"gradient_sum", &state.gradient_sum},
+          {"gradient_squares", &state.gradient_squares}};
 }
 
 std::vector<std::pair<const char*, std::vector<double>*>> lists_of(DescentState& state) {

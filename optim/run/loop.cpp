@@ -22,6 +22,14 @@ bool agree(const Evaluation& now, double rmse) {
   return rmse > 0 && now.mean_squared_error + 2 * now.mean_squared_error_noise <= rmse * rmse;
 }
 
+/// The gradient without what leads beyond bounds.
+std::vector<double> within_bounds(const Objective& objective, const std::vector<double>& theta,
+                                  std::vector<double> gradient) {
+  for (std::size_t i = 0; i < gradient.size(); ++i)
+    if (gradient[i] > 0 ? theta[i] <= objective.lower()[i] : theta[i] >= objective.upper()[i]) gradient[i] = 0;
+  return gradient;
+}
+
 bool exploded(const Evaluation& now, const Checkpoint& state) {
   return now.loss - 3 * now.loss_noise >
          kDivergedLossRatio * (std::max(0.0, state.loss_initial) + 3 * state.loss_noise_initial);
@@ -56,7 +64,8 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
     const bool finite = std::isfinite(now.loss) && all_finite(now.gradient);
     const bool agrees = agree(now, options.converged_rmse);
     Safeguard safeguard(stop_window, state.safeguard);
-    const Verdict verdict = safeguard.observe(now.loss, finite, state.theta);
+    const Verdict verdict =
+        safeguard.observe(now.loss, finite, state.theta, within_bounds(objective, state.theta, now.gradient));
     const bool last = state.iteration >= options.iterations;
     const bool diverged = verdict == Verdict::give_up || (last && (!finite || exploded(now, state)));
     if (agrees || diverged || verdict == Verdict::settled || last) {

@@ -15,6 +15,11 @@
 // mean of a block is below that of the block before by less than the standard error of the difference.
 // Without any trend left a check says so with probability 0.84; a decrease of 3 standard errors is taken for
 // none with probability 0.02.
+//
+// Plateaus. Losses can stand still for long while gradients still lead somewhere. From windows of 20 rows on the mean
+// gradient of the block must be noise, too: the sum over unknowns of squared means in units of their standard errors is no
+// more than 3 standard deviations above what unknowns with independent normal noise would have. Unknowns that share
+// noise make it larger, which only delays the end. A bound counts as rest for the unknown that it holds.
 #pragma once
 #include <limits>
 #include <vector>
@@ -27,9 +32,10 @@ struct SafeguardState {
   int rejected = 0, rejected_in_row = 0;
   std::vector<double> recent;  ///< the last losses since the last rejection, the newest last
   double best_level = std::numeric_limits<double>::infinity();
-  std::vector<double> best_theta;           ///< where best_level was reached
-  std::vector<double> block, block_before;  ///< losses
-  std::vector<double> theta_sum;            ///< over the rows of `block`
+  std::vector<double> best_theta;                      ///< where best_level was reached
+  std::vector<double> block, block_before;             ///< losses
+  std::vector<double> theta_sum;                       ///< over the rows of `block`
+  std::vector<double> gradient_sum, gradient_squares;  ///< over the same rows; for windows of 20 rows or more
 };
 
 enum class Verdict {
@@ -44,8 +50,9 @@ class Safeguard {
   /// `window`: rows of a block, 0: never settled.
   explicit Safeguard(int window, SafeguardState state = {}) : window_(window), state_(std::move(state)) {}
 
-  /// Takes the row of theta into account. `finite`: whether loss and gradient are.
-  Verdict observe(double loss, bool finite, const std::vector<double>& theta);
+  /// Takes the row of theta into account. `finite`: whether loss and gradient are. `gradient`: 0 where it leads beyond a
+  /// bound; empty: not to be judged.
+  Verdict observe(double loss, bool finite, const std::vector<double>& theta, const std::vector<double>& gradient = {});
 
   /// The rows so far say nothing of whether the loss has settled.
   void restart_window();
@@ -57,7 +64,9 @@ class Safeguard {
 
  private:
   bool rises() const;
-  bool settles(const std::vector<double>& theta);
+  bool settles(const std::vector<double>& theta, const std::vector<double>& gradient);
+  bool gradient_is_noise() const;
+  void clear_sums();
   Verdict reject();
 
   int window_;

@@ -120,6 +120,30 @@ TEST(Safeguard, SettlesWhereTheTrendIsLostInNoise) {
   EXPECT_LT(early / static_cast<double>(kRuns), 0.07);
 }
 
+// Where the gradients of ten unknowns are noise, 0.83 of the runs settle, with a standard deviation of 0.019; one gradient of 7
+// standard errors of the block's mean hides among the noise of the others in 0.004 of them. False alarms: 3e-4.
+TEST(Safeguard, APlateauWithGradientsIsNoRest) {
+  int settled = 0, on_plateau = 0;
+  constexpr int kRuns = 400, kRows = 50;
+  for (std::uint64_t seed = 1; seed <= kRuns; ++seed) {
+    Safeguard rest(kRows), plateau(kRows);
+    bool rests = false, stays = false;
+    for (std::uint32_t i = 0; i < 2 * kRows; ++i) {
+      Rng rng({seed, i, 0}, 0, 1);
+      std::vector<double> gradient(10);
+      for (double& g : gradient) g = ExponentialFit::normal(rng);
+      const double loss = ExponentialFit::normal(rng);
+      rests |= rest.observe(loss, true, {0}, gradient) == Verdict::settled;
+      gradient[3] += 7 / std::sqrt(1.0 * kRows);
+      stays |= plateau.observe(loss, true, {0}, gradient) == Verdict::settled;
+    }
+    settled += rests;
+    on_plateau += stays;
+  }
+  EXPECT_NEAR(settled / static_cast<double>(kRuns), 0.83, 0.07);
+  EXPECT_LT(on_plateau / static_cast<double>(kRuns), 0.03);
+}
+
 TEST(Loop, StopsAtTheNoiseAndAverages) {
   NoisyQuadratic objective;
   double last_errors = 0, average_errors = 0;
