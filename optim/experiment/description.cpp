@@ -92,7 +92,7 @@ void describe(Keys& keys, SampleSpec& s) {
   keys.value("visibility", field::integer(s.visibility, 0, kMostSamples),
              "derivative: moving silhouettes and shadow edges; a sample looks for one of them; 0: left out");
   keys.value("path_length", field::integer(s.path_length, 0, kMostSamples),
-             "derivative: jumps of the gates; 0: left out");
+             "derivative: jumps of the gates; 0: left out, but where they matter `run` takes as many as of `interior`");
 }
 
 Field hidden_share(std::optional<double>& share) {

@@ -23,6 +23,12 @@ struct Evaluation {
   std::vector<double> curvature, curvature_bound;
 };
 
+/// An entry (a, b), and (b, a), of a second derivative; a != b.
+struct Coupling {
+  int a, b;
+  double curvature;
+};
+
 /// A loss whose estimates depend on theta and `iteration` alone: equal iterations share their random numbers,
 /// so that differences between points of one iteration are far less noisy than the loss.
 class Objective {
@@ -42,6 +48,9 @@ class Objective {
   /// J makes it too large, on average; otherwise it has no bias. Costs about as much as a gradient.
   virtual std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
                                               const Evaluation& now, int probe) const = 0;
+  /// What is known of the loss's second derivative beside its diagonal: the entries of a quadratic penalty. A pair of unknowns may
+  /// come several times, and its entries add up.
+  virtual std::vector<Coupling> couplings() const { return {}; }
 };
 
 }  // namespace isochron

@@ -163,14 +163,15 @@ class Problem {
   GatedImage finite_difference(const std::vector<double>& theta, int component, const Stream& stream,
                                SampleRange range) const;
 
+  /// Whether paths can change their length, gates jump, and no samples are there for that.
+  bool leaves_out_jumps() const;
+
  private:
   /// Renders `samples` in parts: use(image, samples, index of the part of so many).
   template <class F>
   void render_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
                     int samples, const std::string& stage, const Poll& poll, F&& use) const;
 
-  /// Whether paths can change their length, gates jump, and no samples are there for that.
-  bool leaves_out_jumps() const;
   /// The name of a light at the camera that parameters move away from it; empty where there is none.
   std::string light_that_leaves_the_camera() const;
 

@@ -76,4 +76,8 @@ std::vector<double> RenderedObjective::probe_curvature(const std::vector<double>
   return diagonal;
 }
 
+std::vector<Coupling> RenderedObjective::couplings() const {
+  return problem_.penalty().couplings(problem_.penalty_scale(target_));
+}
+
 }  // namespace isochron

@@ -30,6 +30,7 @@ class RenderedObjective : public Objective {
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
   std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
                                       int probe) const override;
+  std::vector<Coupling> couplings() const override;
 
  private:
   SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;

@@ -113,6 +113,13 @@ void QuadraticPenalty::add_diagonal(PenaltyScale scale, std::vector<double>& dia
   for (const Prior& p : priors_) diagonal[p.i] += 2 * scale.priors * p.weight;
 }
 
+std::vector<Coupling> QuadraticPenalty::couplings(PenaltyScale scale) const {
+  std::vector<Coupling> result;
+  if (scale.slopes == 0) return result;
+  for (const Pair& p : pairs_) result.push_back({p.a, p.b, -2 * scale.slopes * p.weight});
+  return result;
+}
+
 void QuadraticPenalty::add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const {
   const auto n = static_cast<std::size_t>(unknowns);
   for (const Pair& p : pairs_) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
+#include "optim/problem/objective.h"
 #include "optim/problem/parameters.h"
 
 namespace isochron {
@@ -53,6 +54,8 @@ class QuadraticPenalty {
   void add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const;
   /// The diagonal of that.
   void add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const;
+  /// And its entries beside the diagonal.
+  std::vector<Coupling> couplings(PenaltyScale scale) const;
 
  private:
   struct Pair {

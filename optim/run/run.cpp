@@ -255,6 +255,7 @@ RunStatus go_on(const RunOptions& options, const std::function<void(const std::s
 }  // namespace
 
 RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
+  Experiment copied = experiment;
   {
     const Problem problem(experiment, options.warning);
     problem.require_parameters();
@@ -264,12 +265,17 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_levels(problem);
     // Here, so that a message names the user's file and not the run's copy of it.
     if (!experiment.target.images.empty()) problem.read_target(experiment.target.images);
+    if (problem.leaves_out_jumps()) {
+      copied.samples.path_length = experiment.samples.interior;
+      if (options.warning)
+        options.warning(fmt::format("{}: samples.path_length: taken as {}, as of interior", experiment.file,
+                                    experiment.samples.interior));
+    }
   }
   std::optional<FolderLock> lock;
   on_first_rank([&] {
     const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
     lock.emplace(prepare_run_folder(options.folder, options.force, options.warning));
-    Experiment copied = experiment;
     write_inputs(options.folder, inputs, copied);
     write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
   });

@@ -37,6 +37,11 @@ class ScaledObjective : public Objective {
     for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] *= scales_[i] * scales_[i];
     return diagonal;
   }
+  std::vector<Coupling> couplings() const override {
+    std::vector<Coupling> result = objective_.couplings();
+    for (Coupling& c : result) c.curvature *= scales_[c.a] * scales_[c.b];
+    return result;
+  }
 
   std::vector<double> to_u(std::vector<double> theta) const {
     for (std::size_t i = 0; i < theta.size(); ++i) theta[i] /= scales_[i];

@@ -1,5 +1,6 @@
-// Projected L-BFGS whose metric is the diagonal of the Gauss-Newton matrix. That diagonal knows the units of all unknowns, so
-// that metres, degrees, albedos and counts need no rates; pairs of steps and changes of the gradient add how the unknowns
+// Projected L-BFGS whose metric is the diagonal of the Gauss-Newton matrix and the whole matrix of a penalty, so that steps move
+// patches where smoothing ties neighbours. That diagonal knows the units of all unknowns, so that metres, degrees, albedos and
+// counts need no rates; pairs of steps and changes of the gradient add how the unknowns
 // act together. Products with the Jacobian, as conjugate gradients on the Gauss-Newton matrix would take, cost as much as
 // gradients of the loss itself, which know more than a linearisation; optim/README.md has a comparison.
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <deque>
 #include <optional>
 
+#include "optim/solvers/metric.h"
 #include "optim/solvers/optimizer.h"
 
 namespace isochron {
@@ -37,6 +39,7 @@ class QuasiNewton : public Optimizer {
   Vector step(const Objective& objective, const Evaluation& now, const Vector& theta, std::uint32_t iteration,
               double rate) override {
     update_diagonal(objective, now, theta, iteration);
+    couplings_ = objective.couplings();
     rejected_ = true;
     Vector at = theta;
     Evaluation here = now;
@@ -178,16 +181,9 @@ class QuasiNewton : public Optimizer {
     for (std::size_t i = 0; i < at.size(); ++i)
       if (diagonal_[i] > 0 && !(at[i] <= low[i] && gradient[i] >= 0) && !(at[i] >= high[i] && gradient[i] <= 0))
         free.push_back(i);
-    const auto dot = [&](const Vector& a, const Vector& b, auto&& metric) {
-      double sum = 0;
-      for (const std::size_t i : free) sum += a[i] * b[i] * metric(diagonal_[i]);
-      return sum;
-    };
-    const auto plain = [](double) { return 1.0; };
-    const auto inverse = [](double d) { return 1 / d; };
-    const auto itself = [](double d) { return d; };
+    const Metric metric(diagonal_, couplings_, std::move(free));
     Vector direction(at.size(), 0.0);
-    for (const std::size_t i : free) direction[i] = -gradient[i];
+    for (const std::size_t i : metric.free()) direction[i] = -gradient[i];
     struct Used {
       const Pair* pair;
       double curvature, factor;
@@ -197,16 +193,18 @@ class QuasiNewton : public Optimizer {
     for (auto pair = pairs_.rbegin(); pair != pairs_.rend(); ++pair) {
       // Among the free unknowns a pair can have lost its positive curvature.
       constexpr double kLeastCosine = 1e-5;
-      const double curvature = dot(pair->step, pair->change, plain), change = dot(pair->change, pair->change, inverse);
-      if (!(curvature > kLeastCosine * std::sqrt(change * dot(pair->step, pair->step, itself)))) continue;
+      const double curvature = metric.dot(pair->step, pair->change);
+      const double change = metric.dot(pair->change, metric.solve(pair->change));
+      if (!(curvature > kLeastCosine * std::sqrt(change * metric.dot(pair->step, metric.times(pair->step))))) continue;
       if (used.empty()) scale = curvature / change;
-      used.push_back({&*pair, curvature, dot(pair->step, direction, plain) / curvature});
-      for (const std::size_t i : free) direction[i] -= used.back().factor * pair->change[i];
+      used.push_back({&*pair, curvature, metric.dot(pair->step, direction) / curvature});
+      for (const std::size_t i : metric.free()) direction[i] -= used.back().factor * pair->change[i];
     }
-    for (const std::size_t i : free) direction[i] *= scale / diagonal_[i];
+    direction = metric.solve(direction);
+    for (const std::size_t i : metric.free()) direction[i] *= scale;
     for (auto each = used.rbegin(); each != used.rend(); ++each) {
-      const double factor = each->factor - dot(each->pair->change, direction, plain) / each->curvature;
-      for (const std::size_t i : free) direction[i] += factor * each->pair->step[i];
+      const double factor = each->factor - metric.dot(each->pair->change, direction) / each->curvature;
+      for (const std::size_t i : metric.free()) direction[i] += factor * each->pair->step[i];
     }
     return direction;
   }
@@ -214,8 +212,9 @@ class QuasiNewton : public Optimizer {
   int inner_iterations_;
   Vector diagonal_;
   double probes_ = 0;
-  std::deque<Pair> pairs_;  ///< the newest last
-  double promised_ = 0;     ///< fall of the loss by the slope of the last search's full step
+  std::deque<Pair> pairs_;           ///< the newest last
+  std::vector<Coupling> couplings_;  ///< of this iteration's objective
+  double promised_ = 0;              ///< fall of the loss by the slope of the last search's full step
   bool rejected_ = false, stuck_ = false;
 };
 

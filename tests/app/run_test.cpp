@@ -155,17 +155,17 @@ TEST_F(Program, ARunThatLosesTheLightOfItsCountsDiverges) {
                 "  normal: [0, 0, 1]\n  laser: confocal\n"
                 "materials: {paint: {type: diffuse, albedo: 0.5, two_sided: true}}\n"
                 "shapes: [{name: plane, file: plane.obj, material: paint, transform: {translate: [0, 0, 0.5]}}]\n");
-  const std::string file = folder_.write(
-      "counts.yaml",
-      "name: counts\nscene: wall.yaml\nmax_bounces: 1\n"
-      "gates: {kind: bins, unit: ps, scene_unit_m: 1, start: 1600, width: 32, count: 120}\n"
-      "parameters:\n"
-      "  - {name: z, type: translation, shape: plane, direction: [0, 0, 1], initial: 0.2, target: 0}\n"
-      "  - {name: gain, type: gain, initial: 50, target: 60}\n"
-      "  - {name: dark, type: background, initial: 1, target: 0.5}\n"
-      "target: {samples: 256, noise: {counts: true}}\nloss: {kind: poisson}\n"
-      "samples: {primal: 64, interior: 64, visibility: 0, path_length: 0}\n"
-      "optimizer: {method: quasi_newton, iterations: 4}\noutput: {histogram_samples: 256}\n");
+  const std::string file =
+      folder_.write("counts.yaml",
+                    "name: counts\nscene: wall.yaml\nmax_bounces: 1\n"
+                    "gates: {kind: bins, unit: ps, scene_unit_m: 1, start: 1600, width: 32, count: 120}\n"
+                    "parameters:\n"
+                    "  - {name: z, type: translation, shape: plane, direction: [0, 0, 1], initial: 0.2, target: 0}\n"
+                    "  - {name: gain, type: gain, initial: 50, target: 60}\n"
+                    "  - {name: dark, type: background, initial: 1, target: 0.5}\n"
+                    "target: {samples: 256, noise: {counts: true}}\nloss: {kind: poisson}\n"
+                    "samples: {primal: 64, interior: 64, visibility: 0, path_length: 0}\n"
+                    "optimizer: {method: quasi_newton, iterations: 4}\noutput: {histogram_samples: 256}\n");
   const auto go = [&](const char* out, const char* z) {
     return run({"run", file, "-o", folder_.file(out), "--no-plots", "--at", z}).status;
   };
@@ -191,6 +191,16 @@ TEST_F(Program, CoordinatesThatCannotBeRenderedAreRefused) {
     EXPECT_NE(result.errors.find("too far away"), std::string::npos) << result.errors;
     EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1);
   }
+}
+
+TEST_F(Program, ARunDoesNotLeaveOutTheJumpsOfItsGates) {
+  const std::vector<std::string> boxcars = {"--set", "gates={kind: boxcar, width: 0.1, centers: [4.0]}",
+                                            "--set", "samples={primal: 8, interior: 8, visibility: 8, path_length: 0}",
+                                            "--set", "optimizer.iterations=1"};
+  const Result result = run(run_command("out", boxcars));
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_NE(result.errors.find("samples.path_length: taken as 8, as of interior"), std::string::npos) << result.errors;
+  EXPECT_NE(folder_.read("out/experiment.yaml").find("path_length: 8"), std::string::npos);
 }
 
 TEST_F(Program, AnExplodedLossIsADivergence) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
 #include "optim/problem/loss.h"
 #include "optim/problem/photon_noise.h"
@@ -213,6 +214,73 @@ TEST(QuasiNewton, WhatNothingDependsOnStays) {
   const std::vector<double> next = optimizer->step(fit, fit.evaluate(theta, 0), theta, 0, 1);
   EXPECT_EQ(next[0], 2);
   EXPECT_NEAR(next[1], 0.7, 0.05);
+}
+
+/// A chain of which every 20th link is measured, and neighbours are tied by a penalty of a known matrix.
+class TiedChain : public Objective {
+ public:
+  explicit TiedChain(bool tells) : tells_(tells) {}
+  const std::vector<double>& lower() const override { return lower_; }
+  const std::vector<double>& upper() const override { return upper_; }
+  double loss(const std::vector<double>& x, std::uint32_t) const override {
+    double sum = 0;
+    for (int i = 0; i < kLinks; ++i) sum += data(i) / 2 * std::pow(x[i] - std::sin(0.1 * i), 2);
+    for (int i = 1; i < kLinks; ++i) sum += kTie / 2 * std::pow(x[i] - x[i - 1], 2);
+    return sum;
+  }
+  Evaluation evaluate(const std::vector<double>& x, std::uint32_t iteration) const override {
+    Evaluation at;
+    at.loss = loss(x, iteration);
+    at.gradient.resize(kLinks);
+    for (int i = 0; i < kLinks; ++i) at.gradient[i] = data(i) * (x[i] - std::sin(0.1 * i));
+    for (int i = 1; i < kLinks; ++i) {
+      at.gradient[i] += kTie * (x[i] - x[i - 1]);
+      at.gradient[i - 1] -= kTie * (x[i] - x[i - 1]);
+    }
+    return at;
+  }
+  Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
+  std::vector<double> probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
+                                      int) const override {
+    std::vector<double> diagonal(kLinks);
+    for (int i = 0; i < kLinks; ++i) diagonal[i] = data(i) + kTie * ((i > 0) + (i + 1 < kLinks));
+    return diagonal;
+  }
+  std::vector<Coupling> couplings() const override {
+    std::vector<Coupling> ties;
+    for (int i = 1; i < kLinks && tells_; ++i) ties.push_back({i - 1, i, -kTie});
+    return ties;
+  }
+  /// One iteration of three searches, each unknown in a unit of its own; the slope that is left, of that at the start.
+  double slope_left(const std::vector<double>& scales) const {
+    const auto optimizer =
+        make_optimizer({.method = OptimizerMethod::quasi_newton, .inner_iterations = 3}, Preconditioner(), scales);
+    const std::vector<double> start(kLinks, 0.0);
+    const Evaluation at = evaluate(start, 0);
+    return norm(evaluate(optimizer->step(*this, at, start, 0, 1), 0).gradient) / norm(at.gradient);
+  }
+
+  static constexpr int kLinks = 300;
+
+ private:
+  static double data(int i) { return i % 20 == 0; }
+  static double norm(const std::vector<double>& v) {
+    return std::sqrt(std::inner_product(v.begin(), v.end(), v.begin(), 0.0));
+  }
+  static constexpr double kTie = 100;
+  bool tells_;
+  std::vector<double> lower_ = std::vector<double>(kLinks, -std::numeric_limits<double>::infinity());
+  std::vector<double> upper_ = std::vector<double>(kLinks, 2.0);
+};
+
+/// With the penalty's whole matrix the first step is Newton's; with its diagonal alone a patch moves as slowly as its vertices.
+TEST(QuasiNewton, MovesPatchesThatAPenaltyTies) {
+  const std::vector<double> one(TiedChain::kLinks, 1.0);
+  std::vector<double> units;
+  for (int i = 0; i < TiedChain::kLinks; ++i) units.push_back(std::pow(10.0, i % 5 - 2));
+  EXPECT_LT(TiedChain(true).slope_left(one), 1e-6);
+  EXPECT_LT(TiedChain(true).slope_left(units), 1e-6);
+  EXPECT_GT(TiedChain(false).slope_left(one), 0.1);
 }
 
 }  // namespace

@@ -1,0 +1,68 @@
+#include "optim/solvers/metric.h"
+
+#include <stdexcept>
+
+namespace isochron {
+namespace {
+
+/// Keeps a patch that no reading sees, of which differences alone are known, from being singular.
+constexpr double kMore = 1 + 0x1p-30;
+
+}  // namespace
+
+Metric::Metric(const std::vector<double>& diagonal, const std::vector<Coupling>& couplings,
+               std::vector<std::size_t> free)
+    : diagonal_(diagonal), free_(std::move(free)) {
+  if (couplings.empty()) return;
+  std::vector<int> place(diagonal.size(), -1);
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t k = 0; k < free_.size(); ++k) {
+    place[free_[k]] = static_cast<int>(k);
+    entries.emplace_back(static_cast<int>(k), static_cast<int>(k), kMore * diagonal[free_[k]]);
+  }
+  for (const Coupling& c : couplings) {
+    const int a = place[c.a], b = place[c.b];
+    if (a < 0 || b < 0) continue;
+    entries.emplace_back(a, b, c.curvature);
+    entries.emplace_back(b, a, c.curvature);
+  }
+  const auto n = static_cast<Eigen::Index>(free_.size());
+  matrix_.resize(n, n);
+  matrix_.setFromTriplets(entries.begin(), entries.end());
+  factors_ = std::make_unique<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>(matrix_);
+  if (factors_->info() != Eigen::Success) throw std::logic_error("metric: the matrix is not definite");
+}
+
+double Metric::dot(const std::vector<double>& a, const std::vector<double>& b) const {
+  double sum = 0;
+  for (const std::size_t i : free_) sum += a[i] * b[i];
+  return sum;
+}
+
+std::vector<double> Metric::times(const std::vector<double>& v) const {
+  std::vector<double> result(v.size(), 0.0);
+  if (!factors_) {
+    for (const std::size_t i : free_) result[i] = diagonal_[i] * v[i];
+    return result;
+  }
+  Eigen::VectorXd values(matrix_.rows());
+  for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
+  const Eigen::VectorXd product = matrix_ * values;
+  for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = product[static_cast<Eigen::Index>(k)];
+  return result;
+}
+
+std::vector<double> Metric::solve(const std::vector<double>& v) const {
+  std::vector<double> result(v.size(), 0.0);
+  if (!factors_) {
+    for (const std::size_t i : free_) result[i] = v[i] / diagonal_[i];
+    return result;
+  }
+  Eigen::VectorXd values(matrix_.rows());
+  for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
+  const Eigen::VectorXd solution = factors_->solve(values);
+  for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = solution[static_cast<Eigen::Index>(k)];
+  return result;
+}
+
+}  // namespace isochron

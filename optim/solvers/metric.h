@@ -1,0 +1,30 @@
+// The metric of quasi_newton: what a gradient is divided by.
+#pragma once
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+#include <memory>
+#include <vector>
+
+#include "optim/problem/objective.h"
+
+namespace isochron {
+
+/// A diagonal, and what is known beside it, of those unknowns that may move; vectors are of all unknowns, and what they have
+/// elsewhere counts as 0.
+class Metric {
+ public:
+  /// diagonal > 0 at the `free` unknowns, and at least what the couplings need for a semidefinite matrix. Both must outlive this.
+  Metric(const std::vector<double>& diagonal, const std::vector<Coupling>& couplings, std::vector<std::size_t> free);
+  const std::vector<std::size_t>& free() const { return free_; }
+  double dot(const std::vector<double>& a, const std::vector<double>& b) const;
+  std::vector<double> times(const std::vector<double>& v) const;
+  std::vector<double> solve(const std::vector<double>& v) const;
+
+ private:
+  const std::vector<double>& diagonal_;
+  std::vector<std::size_t> free_;
+  Eigen::SparseMatrix<double> matrix_;  ///< of the free unknowns; empty without couplings
+  std::unique_ptr<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>> factors_;
+};
+
+}  // namespace isochron
