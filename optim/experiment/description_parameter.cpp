@@ -170,9 +170,14 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "adam alone: gradients diffuse over the mesh, over about the root of this many edges; 0: not");
     inner.value("slopes", field::non_negative(spec.slopes), "weight of a penalty on uneven offsets or albedos; 0: none",
                 {.unit = "mean square of the target"});
+    inner.value(
+        "bending", field::non_negative(spec.bending),
+        "of vertices, for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
+        "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
+        {.only = of({vertices})});
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
-           {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0});
+           {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0 && spec.bending == 0});
   const auto remesh = [&](Keys& inner) {
     inner.value("levels", field::integer(spec.remesh.levels, 1, kMostLevels), "optimisations one after the other",
                 {.required = true});

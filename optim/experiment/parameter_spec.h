@@ -67,6 +67,8 @@ struct ParameterSpec {
   double diffusion = 0;  ///< lambda of the gradient's preconditioner, adam only
   double slopes = 0;     ///< weight of the penalty on uneven values, in units of the target's mean square
   RemeshSpec remesh;     ///< of type vertices
+  /// Of type vertices, see bending.h; 0: none.
+  double bending = 0;  ///< weight of a prior on curved surfaces
   /// Of type time_offset: standard deviation of a normal prior about the initial values; 0: none.
   double prior_width = 0;
 

@@ -9,8 +9,8 @@
 #include "core/base/error.h"
 #include "core/paths/differentiable.h"
 #include "core/scene/behind_wall.h"
-#include "core/scene/stacked_faces.h"
 #include "core/scene/scene_loader.h"
+#include "core/scene/stacked_faces.h"
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
 #include "optim/problem/loss.h"
@@ -115,9 +115,12 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     const Parameters::Block& block = parameters_->blocks()[i];
     if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
     if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
+    if ((spec.prior_width > 0 || spec.bending > 0) && experiment_.loss.kind != LossKind::poisson)
+      spec.fail(spec.bending > 0 ? "smoothing" : "prior_width", "the loss is no likelihood", "loss: {kind: poisson}");
+    if (spec.bending > 0)
+      penalty_.add_forms(bending_forms(*parameters_, parameters_->vertex_field(block), parameters_->initial()),
+                         spec.bending);
     if (spec.prior_width > 0) {
-      if (experiment_.loss.kind != LossKind::poisson)
-        spec.fail("prior_width", "the loss is no likelihood", "loss: {kind: poisson}");
       penalty_.add_prior(block, parameters_->initial(), spec.prior_width);
     }
   }
@@ -139,10 +142,11 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
         "derivatives are one-sided",
         experiment_.file, name));
   if (leaves_out_jumps())
-    warning(fmt::format(
-        "{}: samples.path_length: 0 leaves the jumps of the gates out of the derivatives by what changes the lengths of "
-        "paths, which would lead a fit astray",
-        experiment_.file));
+    warning(
+        fmt::format("{}: samples.path_length: 0 leaves the jumps of the gates out of the derivatives by what changes "
+                    "the lengths of "
+                    "paths, which would lead a fit astray",
+                    experiment_.file));
   std::string stacked = stacked_warning(parameters_->apply(parameters_->initial()));
   if (stacked.empty() && parameters_->target_known())
     stacked = stacked_warning(parameters_->apply(parameters_->target()));

@@ -81,56 +81,61 @@ void QuadraticPenalty::add_slopes(const Scene& scene, const Parameters::VertexFi
   for (const auto& [a, b] : edges) {
     const Vec3 along = scene.positions[field.vertices[a]] - scene.positions[field.vertices[b]];
     const double w = weight * field.unit * field.unit / (dot(along, along) * static_cast<double>(edges.size()));
-    for (int axis = 0; axis < field.stride; ++axis)
-      pairs_.push_back({field.begin + field.stride * a + axis, field.begin + field.stride * b + axis, w});
+    for (int axis = 0; axis < field.stride; ++axis) {
+      const int begin = field.begin + axis;
+      squares_.push_back({{{{begin + field.stride * a, 1.0}, {begin + field.stride * b, -1.0}}}, w, false});
+    }
   }
 }
 
+void QuadraticPenalty::add_forms(const std::vector<LinearForm>& forms, double weight) {
+  for (const LinearForm& form : forms) squares_.push_back({form, weight, true});
+}
+
 void QuadraticPenalty::add_prior(const Parameters::Block& block, const std::vector<double>& means, double width) {
-  for (int i = block.begin; i < block.begin + block.count; ++i) priors_.push_back({i, means[i], 0.5 / (width * width)});
+  for (int i = block.begin; i < block.begin + block.count; ++i)
+    squares_.push_back({{{{i, 1.0}}, -means[i]}, 0.5 / (width * width), true});
 }
 
 double QuadraticPenalty::value(const std::vector<double>& theta, PenaltyScale scale) const {
   double slopes = 0, priors = 0;
-  for (const Pair& p : pairs_) slopes += p.weight * (theta[p.a] - theta[p.b]) * (theta[p.a] - theta[p.b]);
-  for (const Prior& p : priors_) priors += p.weight * (theta[p.i] - p.mean) * (theta[p.i] - p.mean);
+  for (const Square& s : squares_) {
+    const double form = s.form.at(theta);
+    (s.prior ? priors : slopes) += s.weight * form * form;
+  }
   return scale.slopes * slopes + scale.priors * priors;
 }
 
 void QuadraticPenalty::add_gradient(const std::vector<double>& theta, PenaltyScale scale,
                                     std::vector<double>& gradient) const {
-  for (const Pair& p : pairs_) {
-    const double slope = 2 * scale.slopes * p.weight * (theta[p.a] - theta[p.b]);
-    gradient[p.a] += slope;
-    gradient[p.b] -= slope;
+  for (const Square& s : squares_) {
+    const double slope = 2 * s.scaled(scale) * s.form.at(theta);
+    for (const auto& [i, factor] : s.form.entries) gradient[i] += slope * factor;
   }
-  for (const Prior& p : priors_) gradient[p.i] += 2 * scale.priors * p.weight * (theta[p.i] - p.mean);
 }
 
 void QuadraticPenalty::add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const {
-  for (const Pair& p : pairs_)
-    for (const int i : {p.a, p.b}) diagonal[i] += 2 * scale.slopes * p.weight;
-  for (const Prior& p : priors_) diagonal[p.i] += 2 * scale.priors * p.weight;
+  for (const Square& s : squares_)
+    for (const auto& [i, factor] : s.form.entries) diagonal[i] += 2 * s.scaled(scale) * factor * factor;
 }
 
 std::vector<Coupling> QuadraticPenalty::couplings(PenaltyScale scale) const {
   std::vector<Coupling> result;
-  if (scale.slopes == 0) return result;
-  for (const Pair& p : pairs_) result.push_back({p.a, p.b, -2 * scale.slopes * p.weight});
+  for (const Square& s : squares_) {
+    const auto& entries = s.form.entries;
+    for (std::size_t a = 0; s.scaled(scale) > 0 && a < entries.size(); ++a)
+      for (std::size_t b = 0; b < a; ++b)
+        result.push_back(
+            {entries[a].first, entries[b].first, 2 * s.scaled(scale) * entries[a].second * entries[b].second});
+  }
   return result;
 }
 
 void QuadraticPenalty::add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const {
   const auto n = static_cast<std::size_t>(unknowns);
-  for (const Pair& p : pairs_) {
-    const auto a = static_cast<std::size_t>(p.a), b = static_cast<std::size_t>(p.b);
-    const double w = 2 * scale.slopes * p.weight;
-    curvature[a * n + a] += w;
-    curvature[b * n + b] += w;
-    curvature[a * n + b] -= w;
-    curvature[b * n + a] -= w;
-  }
-  for (const Prior& p : priors_) curvature[p.i * n + p.i] += 2 * scale.priors * p.weight;
+  for (const Square& s : squares_)
+    for (const auto& [a, of_a] : s.form.entries)
+      for (const auto& [b, of_b] : s.form.entries) curvature[a * n + b] += 2 * s.scaled(scale) * of_a * of_b;
 }
 
 }  // namespace isochron

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/scene/scene.h"
+#include "optim/problem/bending.h"
 #include "optim/problem/objective.h"
 #include "optim/problem/parameters.h"
 
@@ -37,17 +38,18 @@ struct PenaltyScale {
   double slopes = 0, priors = 0;
 };
 
-/// Sum over pairs of weight (theta_a - theta_b)^2, and over unknowns with a prior of (theta_i - mean)^2 / (2 width^2), which
-/// is a normal prior's negative logarithm.
+/// Sums of squares of linear forms of the unknowns: of slopes, and negative logarithms of priors.
 class QuadraticPenalty {
  public:
   /// Adds `weight` times the mean, over the mesh's edges between selected vertices, of (change of offset /
   /// length)^2, with the lengths of the loaded mesh: the squared slope of the offsets, dimensionless. Albedos likewise, per
   /// squared scene unit.
   void add_slopes(const Scene& scene, const Parameters::VertexField& field, double weight);
-  /// Of each unknown of the block, about its value in `means`; width > 0, in the unknowns' unit.
+  /// A prior: `weight` times the sum of the squared forms.
+  void add_forms(const std::vector<LinearForm>& forms, double weight);
+  /// A normal prior of each unknown of the block, about its value in `means`; width > 0, in the unknowns' unit.
   void add_prior(const Parameters::Block& block, const std::vector<double>& means, double width);
-  bool empty() const { return pairs_.empty() && priors_.empty(); }
+  bool empty() const { return squares_.empty(); }
   double value(const std::vector<double>& theta, PenaltyScale scale) const;
   void add_gradient(const std::vector<double>& theta, PenaltyScale scale, std::vector<double>& gradient) const;
   /// Adds the second derivative, n x n row after row.
@@ -58,16 +60,13 @@ class QuadraticPenalty {
   std::vector<Coupling> couplings(PenaltyScale scale) const;
 
  private:
-  struct Pair {
-    int a, b;
+  struct Square {
+    LinearForm form;
     double weight;
+    bool prior;  ///< or of slopes
+    double scaled(PenaltyScale scale) const { return weight * (prior ? scale.priors : scale.slopes); }
   };
-  struct Prior {
-    int i;
-    double mean, weight;
-  };
-  std::vector<Pair> pairs_;
-  std::vector<Prior> priors_;
+  std::vector<Square> squares_;
 };
 
 }  // namespace isochron

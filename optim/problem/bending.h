@@ -1,0 +1,28 @@
+// How much a surface bends, as a quadratic function of the unknowns that move its vertices.
+#pragma once
+#include <vector>
+
+#include "core/scene/scene.h"
+#include "optim/problem/parameters.h"
+
+namespace isochron {
+
+/// Sum of coefficient times unknown, plus the constant.
+struct LinearForm {
+  std::vector<std::pair<int, double>> entries;
+  double constant = 0;
+  double at(const std::vector<double>& unknowns) const {
+    double sum = constant;
+    for (const auto& [i, coefficient] : entries) sum += coefficient * unknowns[i];
+    return sum;
+  }
+};
+
+/// Of each vertex of the field that has triangles all around: 2 H sqrt(A), H being the mean curvature, by cotangents of the
+/// angles, and A a third of the area of its triangles. The sum of their squares is the integral of (2 H)^2 over the surface,
+/// which has no unit: 16 pi for any sphere, 0 for any plane, however uneven its mesh. Angles, areas and normals are those at
+/// theta, where the forms are exact.
+std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
+                                      const std::vector<double>& theta);
+
+}  // namespace isochron

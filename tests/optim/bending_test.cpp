@@ -1,0 +1,134 @@
+// The integral of squared curvature against closed forms.
+#include "optim/problem/bending.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "core/scene/mesh.h"
+#include "optim/problem/smoothing.h"
+#include "tests/seed.h"
+
+namespace isochron {
+namespace {
+
+/// A scene of one shape, and a parameter that moves each of its vertices.
+Parameters surface(const Mesh& mesh, VertexDirection direction) {
+  Scene scene;
+  scene.materials = {Material("diffuse", "white")};
+  Shape shape;
+  shape.name = "surface";
+  add_shape(scene, std::move(shape), mesh, build_edges(mesh));
+  ParameterSpec spec;
+  spec.name = "dent";
+  spec.type = ParameterType::vertices;
+  spec.shape = "surface";
+  spec.direction_kind = direction;
+  spec.direction = {0, 0, 2};
+  spec.initial = {0};
+  return Parameters(scene, {spec});
+}
+
+double energy(const std::vector<LinearForm>& forms, const std::vector<double>& theta) {
+  double sum = 0;
+  for (const LinearForm& form : forms) sum += form.at(theta) * form.at(theta);
+  return sum;
+}
+
+std::vector<LinearForm> forms_of(const Parameters& parameters) {
+  return bending_forms(parameters, parameters.vertex_field(parameters.blocks()[0]), parameters.initial());
+}
+
+/// Rings of latitude, closed at both poles.
+Mesh sphere(double radius, int rings) {
+  Mesh mesh;
+  const int around = 2 * rings;
+  mesh.positions.push_back({0, 0, radius});
+  for (int i = 1; i < rings; ++i)
+    for (int j = 0; j < around; ++j) {
+      const double theta = std::numbers::pi * i / rings, phi = std::numbers::pi * (2 * j + i % 2) / around;
+      mesh.positions.push_back(Vec3{std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi), std::cos(theta)} *
+                               radius);
+    }
+  const int south = static_cast<int>(mesh.positions.size());
+  mesh.positions.push_back({0, 0, -radius});
+  const auto at = [&](int i, int j) { return 1 + (i - 1) * around + (j + around) % around; };
+  for (int j = 0; j < around; ++j) {
+    mesh.faces.push_back({0, at(1, j), at(1, j + 1)});
+    mesh.faces.push_back({south, at(rings - 1, j + 1), at(rings - 1, j)});
+    for (int i = 1; i + 1 < rings; ++i) {
+      const int shift = i % 2;
+      mesh.faces.push_back({at(i, j), at(i + 1, j + shift), at(i, j + 1)});
+      mesh.faces.push_back({at(i, j), at(i + 1, j + shift - 1), at(i + 1, j + shift)});
+    }
+  }
+  return mesh;
+}
+
+/// The unit square in uneven triangles.
+Mesh sheet(int side) {
+  Mesh mesh;
+  std::mt19937 rng(test_seed(5));
+  std::uniform_real_distribution<double> off(-0.3, 0.3);
+  for (int y = 0; y <= side; ++y)
+    for (int x = 0; x <= side; ++x) {
+      const bool inside = x > 0 && y > 0 && x < side && y < side;
+      mesh.positions.push_back({(x + inside * off(rng)) / side, (y + inside * off(rng)) / side, 0});
+    }
+  const auto at = [&](int x, int y) { return y * (side + 1) + x; };
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x) {
+      mesh.faces.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+      mesh.faces.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
+    }
+  return mesh;
+}
+
+TEST(Bending, OfASphereOfAnySizeIs16Pi) {
+  for (const double radius : {0.02, 3.0}) {
+    const Parameters parameters = surface(sphere(radius, 40), VertexDirection::normal);
+    EXPECT_NEAR(energy(forms_of(parameters), parameters.initial()) / (16 * std::numbers::pi), 1, 0.01);
+  }
+}
+
+TEST(Bending, OfAPlaneIsNoneHoweverUnevenItsMesh) {
+  for (const auto direction : {VertexDirection::fixed, VertexDirection::free}) {
+    const Parameters parameters = surface(sheet(12), direction);
+    const std::vector<LinearForm> forms = forms_of(parameters);
+    EXPECT_EQ(forms.size(), 11u * 11u);  // not of the border
+    EXPECT_LT(energy(forms, parameters.initial()), 1e-20);
+  }
+}
+
+/// z = a sin(k x): the curvature is a k^2 sin(k x), its square's integral over whole waves a^2 k^4 / 2. The direction is 2 long.
+TEST(Bending, OfAWaveOnAPlane) {
+  constexpr int kSide = 64;
+  const Mesh mesh = sheet(kSide);
+  const Parameters parameters = surface(mesh, VertexDirection::fixed);
+  const double a = 0.003, k = 2 * std::numbers::pi;
+  std::vector<double> theta = parameters.initial();
+  const Parameters::VertexField field = parameters.vertex_field(parameters.blocks()[0]);
+  for (std::size_t i = 0; i < theta.size(); ++i)
+    theta[i] = a / 2 * std::sin(k * parameters.scene().positions[field.vertices[i]].x);
+  const double inside = 1 - 2.0 / kSide;  // of the width; at the other border the wave has no curvature
+  EXPECT_NEAR(energy(forms_of(parameters), theta) / (inside * a * a * std::pow(k, 4) / 2), 1, 0.1);
+}
+
+/// The forms are those of the surface where it begins, offsets included.
+TEST(Bending, IsThatOfTheSurfaceAsItBegins) {
+  const Mesh mesh = sheet(10);
+  const Parameters flat = surface(mesh, VertexDirection::fixed);
+  std::vector<double> bump = flat.initial();
+  for (std::size_t i = 0; i < bump.size(); ++i) bump[i] = 0.01 * std::sin(7.0 * static_cast<double>(i));
+  const Parameters::VertexField field = flat.vertex_field(flat.blocks()[0]);
+  Mesh bent = mesh;
+  const Scene moved = flat.apply(bump);
+  for (std::size_t i = 0; i < bent.positions.size(); ++i) bent.positions[i] = moved.positions[i];
+  const Parameters loaded = surface(bent, VertexDirection::fixed);
+  EXPECT_NEAR(energy(bending_forms(flat, field, bump), bump), energy(forms_of(loaded), loaded.initial()), 1e-9);
+}
+
+}  // namespace
+}  // namespace isochron
