@@ -70,7 +70,7 @@ SampleRange half_of(int samples, int half) {
   return {half * count, (half + 1) * count};
 }
 
-std::vector<double> probe_diagonal(const Problem& problem, const std::vector<double>& theta,
+std::vector<double> probe_readings(const Problem& problem, const std::vector<double>& theta,
                                    const std::vector<double>& weights, std::uint32_t iteration, int probe,
                                    const Poll& poll) {
   GatedImage signs = problem.blank();
@@ -78,7 +78,13 @@ std::vector<double> probe_diagonal(const Problem& problem, const std::vector<dou
     Rng rng(problem.stream(Pass::probe, iteration), i, static_cast<std::uint32_t>(probe));
     signs.data[i] = std::copysign(std::sqrt(weights[i]), rng.uniform() - 0.5);
   }
-  std::vector<double> diagonal = problem.transpose_apply(theta, signs, iteration, poll);
+  return problem.transpose_apply(theta, signs, iteration, poll);
+}
+
+std::vector<double> probe_diagonal(const Problem& problem, const std::vector<double>& theta,
+                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
+                                   const Poll& poll) {
+  std::vector<double> diagonal = probe_readings(problem, theta, weights, iteration, probe, poll);
   for (double& d : diagonal) d *= d;
   return diagonal;
 }

@@ -23,6 +23,12 @@ JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>
 /// Half `half` (0 or 1) of so many samples, as above.
 SampleRange half_of(int samples, int half);
 
+/// J' W^(1/2) z with a random sign z for each reading, others for each `probe`: a gradient as the noise of readings makes it, with
+/// the covariance J'WJ.
+std::vector<double> probe_readings(const Problem& problem, const std::vector<double>& theta,
+                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
+                                   const Poll& poll);
+
 /// An estimate of the diagonal of J'WJ: see Objective::probe_curvature(), without a penalty's part.
 std::vector<double> probe_diagonal(const Problem& problem, const std::vector<double>& theta,
                                    const std::vector<double>& weights, std::uint32_t iteration, int probe,

@@ -2,7 +2,9 @@
 
 #include <utility>
 
+#include "optim/problem/conjugate_gradients.h"
 #include "optim/problem/jacobian.h"
+#include "optim/problem/metric.h"
 #include "optim/problem/vector_math.h"
 
 namespace isochron {
@@ -94,6 +96,26 @@ std::vector<double> RenderedCurvature::penalty_product(PenaltyScale scale, const
   problem_.penalty().add_gradient(nothing, scale, constant);
   for (std::size_t i = 0; i < product.size(); ++i) product[i] -= constant[i];
   return product;
+}
+
+std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
+  const PenaltyScale scale{smoothing_.slopes, priors_.priors};
+  std::vector<std::vector<double>> gradients;
+  for (int k = 0; k < count; ++k) {
+    const int probe = kProbes + k;
+    gradients.push_back(probe_readings(problem_, theta_, weights_, kProductsIteration, probe, poll_));
+    problem_.penalty().add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration),
+                                 static_cast<std::uint32_t>(probe), gradients.back());
+  }
+  const std::vector<double> at_first = diagonal(), &low = problem_.parameters().lower(),
+                            &high = problem_.parameters().upper();
+  std::vector<std::size_t> free;
+  for (std::size_t i = 0; i < theta_.size(); ++i)
+    if (at_first[i] > 0 && theta_[i] > low[i] && theta_[i] < high[i]) free.push_back(i);
+  const std::vector<Coupling> couplings = problem_.penalty().couplings(scale);
+  const Metric metric(at_first, couplings, std::move(free));
+  return solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
+               [&](const std::vector<double>& residual) { return metric.solve(residual); });
 }
 
 std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<std::vector<double>>& vectors) const {

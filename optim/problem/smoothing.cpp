@@ -3,6 +3,7 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <array>
+#include <cmath>
 #include <stdexcept>
 
 namespace isochron {
@@ -117,6 +118,15 @@ void QuadraticPenalty::add_gradient(const std::vector<double>& theta, PenaltySca
 void QuadraticPenalty::add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const {
   for (const Square& s : squares_)
     for (const auto& [i, factor] : s.form.entries) diagonal[i] += 2 * s.scaled(scale) * factor * factor;
+}
+
+void QuadraticPenalty::add_noise(PenaltyScale scale, const Stream& stream, std::uint32_t draw,
+                                 std::vector<double>& gradient) const {
+  for (std::size_t k = 0; k < squares_.size(); ++k) {
+    Rng rng(stream, k, draw);
+    const double noise = std::copysign(std::sqrt(2 * squares_[k].scaled(scale)), rng.uniform() - 0.5);
+    for (const auto& [i, factor] : squares_[k].form.entries) gradient[i] += noise * factor;
+  }
 }
 
 std::vector<Coupling> QuadraticPenalty::couplings(PenaltyScale scale) const {

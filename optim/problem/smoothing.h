@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/random.h"
 #include "core/scene/scene.h"
 #include "optim/problem/bending.h"
 #include "optim/problem/objective.h"
@@ -56,7 +57,9 @@ class QuadraticPenalty {
   void add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const;
   /// The diagonal of that.
   void add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const;
-  /// And its entries beside the diagonal.
+  /// Adds random signs times the forms, so that the covariance of what is added is the second derivative.
+  void add_noise(PenaltyScale scale, const Stream& stream, std::uint32_t draw, std::vector<double>& gradient) const;
+  /// Entries of the second derivative beside the diagonal.
   std::vector<Coupling> couplings(PenaltyScale scale) const;
 
  private:

@@ -8,7 +8,7 @@
 #include <deque>
 #include <optional>
 
-#include "optim/solvers/metric.h"
+#include "optim/problem/metric.h"
 #include "optim/solvers/optimizer.h"
 
 namespace isochron {

@@ -1,4 +1,4 @@
-#include "optim/solvers/metric.h"
+#include "optim/problem/metric.h"
 
 #include <stdexcept>
 

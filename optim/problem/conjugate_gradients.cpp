@@ -1,0 +1,83 @@
+#include "optim/problem/conjugate_gradients.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "optim/problem/vector_math.h"
+
+namespace isochron {
+namespace {
+
+using Vector = std::vector<double>;
+using Precondition = std::function<Vector(const Vector&)>;
+
+/// Of one right-hand side.
+class Solution {
+ public:
+  Solution(const Vector& right_side, const Precondition& precondition, const SolutionLimits& limits)
+      : precondition_(precondition), limits_(limits), x_(right_side.size(), 0.0), residual_(right_side) {
+    direction_ = precondition_(residual_);
+    square_ = dot(residual_, direction_);
+    ended_ = !(square_ > 0);
+  }
+  const Vector& x() const { return x_; }
+  const Vector& direction() const { return direction_; }
+  bool ended() const { return ended_; }
+
+  /// `product`: that of the matrix with the direction.
+  void step(const Vector& product) {
+    const double curvature = dot(direction_, product);
+    if (!(curvature > 0)) {  // noise is all that is left
+      ended_ = true;
+      return;
+    }
+    const double length = square_ / curvature;
+    for (std::size_t i = 0; i < x_.size(); ++i) {
+      x_[i] += length * direction_[i];
+      residual_[i] -= length * product[i];
+    }
+    gains_.push_back(length * square_);  // they add up to x'b
+    const Vector next = precondition_(residual_);
+    const double square = dot(residual_, next);
+    for (std::size_t i = 0; i < x_.size(); ++i) direction_[i] = next[i] + square / square_ * direction_[i];
+    square_ = square;
+    const auto count = static_cast<int>(gains_.size());
+    const double last = std::accumulate(gains_.end() - std::min(limits_.last_steps, count), gains_.end(), 0.0);
+    ended_ =
+        !(square_ > 0) || count == limits_.most_steps ||
+        (count > limits_.last_steps && last < limits_.least_gain * std::accumulate(gains_.begin(), gains_.end(), 0.0));
+  }
+
+ private:
+  const Precondition& precondition_;
+  const SolutionLimits& limits_;
+  Vector x_, residual_, direction_, gains_;
+  double square_ = 0;
+  bool ended_ = false;
+};
+
+}  // namespace
+
+VectorList solve(const std::function<VectorList(const VectorList&)>& products, const VectorList& right_sides,
+                 const Precondition& precondition, const SolutionLimits& limits) {
+  std::vector<Solution> solutions;
+  solutions.reserve(right_sides.size());
+  for (const Vector& b : right_sides) solutions.emplace_back(b, precondition, limits);
+  for (;;) {
+    std::vector<Solution*> going;
+    VectorList directions;
+    for (Solution& solution : solutions)
+      if (!solution.ended()) {
+        going.push_back(&solution);
+        directions.push_back(solution.direction());
+      }
+    if (going.empty()) break;
+    const VectorList made = products(directions);
+    for (std::size_t i = 0; i < going.size(); ++i) going[i]->step(made[i]);
+  }
+  VectorList found;
+  for (const Solution& solution : solutions) found.push_back(solution.x());
+  return found;
+}
+
+}  // namespace isochron

@@ -1,0 +1,24 @@
+// Linear systems of a matrix that is known by its products alone.
+#pragma once
+#include <functional>
+#include <vector>
+
+namespace isochron {
+
+/// When a system counts as solved: once the last steps add less than `least_gain` to x'b, but after `most_steps` in any case.
+struct SolutionLimits {
+  int most_steps = 24;
+  int last_steps = 4;
+  double least_gain = 0.05;
+};
+
+using VectorList = std::vector<std::vector<double>>;
+
+/// Solutions x of A x = b for several right-hand sides at once, by conjugate gradients: x'b grows from step to step, up to that
+/// of the solution. `products`: A times each of some vectors; A symmetric, and where noise makes it indefinite an equation
+/// ends early. `precondition`: an approximate inverse, symmetric; unknowns for which it gives 0 stay 0.
+VectorList solve(const std::function<VectorList(const VectorList&)>& products, const VectorList& right_sides,
+                 const std::function<std::vector<double>(const std::vector<double>&)>& precondition,
+                 const SolutionLimits& limits = {});
+
+}  // namespace isochron
