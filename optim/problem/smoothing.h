@@ -53,6 +53,14 @@ class QuadraticPenalty {
   bool empty() const { return squares_.empty(); }
   double value(const std::vector<double>& theta, PenaltyScale scale) const;
   void add_gradient(const std::vector<double>& theta, PenaltyScale scale, std::vector<double>& gradient) const;
+  /// What belongs to the unknowns of one block.
+  struct Share {
+    double value = 0;  ///< as above
+    double rank = 0;   ///< independent forms, one constant left open
+  };
+  Share share(const Parameters::Block& block, const std::vector<double>& theta, PenaltyScale scale) const;
+  /// v'Pv of the same, P being the second derivative.
+  double curved(const Parameters::Block& block, const std::vector<double>& v, PenaltyScale scale) const;
   /// Adds the second derivative, n x n row after row.
   void add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const;
   /// The diagonal of that.
@@ -68,6 +76,10 @@ class QuadraticPenalty {
     double weight;
     bool prior;  ///< or of slopes
     double scaled(PenaltyScale scale) const { return weight * (prior ? scale.priors : scale.slopes); }
+    bool of(const Parameters::Block& block) const {
+      const int i = form.entries.empty() ? -1 : form.entries[0].first;
+      return i >= block.begin && i < block.begin + block.count;
+    }
   };
   std::vector<Square> squares_;
 };

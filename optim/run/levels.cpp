@@ -14,6 +14,7 @@
 #include "core/scene/scene_copy.h"
 #include "core/scene/scene_loader.h"
 #include "optim/experiment/files.h"
+#include "optim/problem/evidence.h"
 #include "optim/remesh/remesh.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/level_log.h"
@@ -114,10 +115,19 @@ class Levels {
         return false;
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
+      if (!first) follow_evidence(former, theta, level - 1, next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
     return true;
+  }
+
+  void follow_evidence(const Problem& former, const std::vector<double>& theta, int level,
+                       std::vector<ParameterSpec>& next) const {
+    const std::vector<double> factors =
+        evidence_factors(former, former.read_target(folder(level) + "/target.exr"), theta);
+    for (std::size_t i = 0; i < next.size(); ++i)
+      for (double* weight : {&next[i].bending, &next[i].slopes}) *weight *= factors[i];
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {

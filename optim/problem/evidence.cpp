@@ -1,0 +1,39 @@
+#include "optim/problem/evidence.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "optim/problem/rendered_curvature.h"
+
+namespace isochron {
+namespace {
+
+/// Each knows the trace to a standard error of sqrt(2 rank).
+constexpr int kSamples = 2;
+
+}  // namespace
+
+std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
+                                     const std::vector<double>& theta) {
+  const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
+  std::vector<double> factors(specs.size(), 1.0);
+  if (std::none_of(specs.begin(), specs.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return factors;
+  const Poll poll = [] {};
+  const RenderedCurvature curvature(problem, target, theta, poll);
+  const std::vector<std::vector<double>> samples = curvature.samples(kSamples);
+  const QuadraticPenalty& penalty = problem.penalty();
+  const PenaltyScale scale = problem.penalty_scale(target);
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const Parameters::Block& block = problem.parameters().blocks()[i];
+    const auto [value, rank] = penalty.share(block, theta, scale);
+    if (!specs[i].evidence || rank < 1) continue;
+    double trace = 0;
+    for (const std::vector<double>& sample : samples) trace += penalty.curved(block, sample, scale) / kSamples;
+    // What the samples' noise may hide counts as determined, so that the weight stays finite.
+    const double determined = std::max(rank - trace, std::sqrt(2 * rank / kSamples));
+    factors[i] = determined * scale.priors / (2 * value);
+  }
+  return factors;
+}
+
+}  // namespace isochron

@@ -1,0 +1,19 @@
+// How strong smoothing has to be, by what the data say.
+//
+// Penalty and likelihood together are a posterior, and the weight of a penalty is the precision of its prior. The weight w that makes the
+// data most probable, the posterior taken for normal, meets 2 w E = g: E is the penalty of what was found per unit of w, and
+// g = rank - tr((H + P)^-1 P) counts what the data determine rather than the prior (MacKay, "Bayesian interpolation", 1992). The
+// trace comes from samples of the posterior (RenderedCurvature::samples).
+#pragma once
+#include <vector>
+
+#include "optim/problem/problem.h"
+
+namespace isochron {
+
+/// By what the weights of each parameter's smoothing are to be multiplied, in the order of the blocks; 1 where the parameter has
+/// none or asks for no `evidence`. At theta, where a fit to counts has come to rest. The same for any number of threads and ranks.
+std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
+                                     const std::vector<double>& theta);
+
+}  // namespace isochron
