@@ -146,6 +146,7 @@ class Levels {
     if (level < remeshed_.remesh.levels && has_ended(folder(level) + "/summary.yaml")) return ended_as(level);
     RunOptions options = options_;
     options.folder = folder(level);
+    options.errors = level == remeshed_.remesh.levels;
     options.report = [this](const std::string& text) { report_ = text; };
     options.progress = [this, level](Progress progress) {
       progress.level = level;

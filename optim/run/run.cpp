@@ -168,7 +168,7 @@ class Run {
     geometry.write("final", state_.theta);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);
-    errors_ = find_errors(*optimizer, final);
+    if (options_.errors) errors_ = find_errors(*optimizer, final);
     judge_expected_counts();
     if (fit_ && left_its_data(*fit_, state_, last_)) result.status = RunStatus::diverged;
     zero_gradients_ = zero_gradient_report(parameters_, final.gradient);

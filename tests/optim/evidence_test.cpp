@@ -1,0 +1,151 @@
+// How strong smoothing has to be by what counts say, and the samples of the posterior that tell it. With so many samples that the
+// noise of the counts is larger than that of the images.
+#include "optim/problem/evidence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+
+#include "optim/problem/rendered_curvature.h"
+#include "optim/run/run.h"
+#include "optim/run/summary.h"
+#include "tests/optim/temporary_folder.h"
+
+namespace isochron {
+namespace {
+
+constexpr int kSide = 8;
+
+/// A plane half a metre from a wall, painted by vertex, seen by 8 x 8 points of a confocal scan that count photons.
+class Painted : public testing::Test {
+ protected:
+  Painted() {
+    std::string mesh, paint;
+    for (int y = 0; y <= kSide; ++y)
+      for (int x = 0; x <= kSide; ++x) {
+        const double u = x / (0.5 * kSide) - 1, v = y / (0.5 * kSide) - 1;
+        mesh += "v " + std::to_string(0.3 * u) + " " + std::to_string(0.3 * v) + " 0.5\n";
+        paint += (paint.empty() ? "" : ", ") + std::to_string(0.5 + 0.3 * std::sin(3 * u) * std::cos(2 * v));
+      }
+    const auto at = [](int x, int y) { return " " + std::to_string(y * (kSide + 1) + x + 1); };
+    for (int y = 0; y < kSide; ++y)
+      for (int x = 0; x < kSide; ++x)
+        mesh += "f" + at(x, y) + at(x + 1, y + 1) + at(x + 1, y) + "\nf" + at(x, y) + at(x, y + 1) + at(x + 1, y + 1) +
+                "\n";
+    folder_.write("plane.obj", mesh);
+    folder_.write("scene.yaml",
+                  "capture:\n"
+                  "  sensor: {corner: [-0.3, 0.3, 0], across: [0.6, 0, 0], down: [0, -0.6, 0], size: [8, 8]}\n"
+                  "  normal: [0, 0, 1]\n  laser: confocal\n"
+                  "materials: {paint: {type: diffuse, albedo: 0.5}}\n"
+                  "shapes: [{name: plane, file: plane.obj, material: paint}]\n");
+    folder_.write("response.csv", "offset,value\n-60,0\n0,1\n60,0\n");
+    experiment_ = folder_.write(
+        "painted.yaml",
+        "name: painted\nscene: scene.yaml\nmax_bounces: 1\n"
+        "gates: {kind: bins, unit: ps, scene_unit_m: 1, start: 3200, width: 32, count: 60, response: response.csv}\n"
+        "parameters:\n"
+        "  - {name: paint, type: albedo, shape: plane, per: vertex, initial: 0.5, target: [" +
+            paint +
+            "], smoothing: {slopes: 1.0e-6, evidence: true}}\n"
+            "  - {name: gain, type: gain, initial: 1000, target: 1000, lower: 999.9, upper: 1000.1}\n"
+            "target: {samples: 16384, noise: {counts: true}}\nloss: {kind: poisson}\n"
+            "samples: {primal: 512, interior: 512, visibility: 0, path_length: 0}\n"
+            "optimizer: {method: quasi_newton, iterations: 4, inner_iterations: 10}\n"
+            "output: {histogram_samples: 256}\n");
+  }
+
+  /// A fit with that weight: the problem, its target and what was found.
+  struct Fit {
+    std::unique_ptr<Problem> problem;
+    GatedImage target;
+    std::vector<double> theta;
+  };
+  Fit fit(double weight) {
+    const std::string out = folder_.file("out");
+    RunOptions options;
+    options.folder = out;
+    options.force = true;
+    options.errors = false;
+    start_run(load_experiment(experiment_, {"parameters[0].smoothing.slopes=" + std::to_string(weight * 1e9) + "e-9"}),
+              options);
+    auto problem = std::make_unique<Problem>(load_experiment(out + "/experiment.yaml"));
+    GatedImage target = problem->read_target(out + "/target.exr");
+    std::vector<double> theta = final_values(out + "/summary.yaml", problem->parameters());
+    return {std::move(problem), std::move(target), std::move(theta)};
+  }
+
+  TemporaryFolder folder_;
+  std::string experiment_;
+};
+
+/// Trace of (A + B)^-1 B of symmetric matrices of n x n without their last row and column, by Cholesky factors.
+double trace_of_solution(const std::vector<double>& a, const std::vector<double>& b, std::size_t n) {
+  const std::size_t m = n - 1;
+  std::vector<double> factor(m * m, 0.0);
+  for (std::size_t i = 0; i < m; ++i)
+    for (std::size_t j = 0; j <= i; ++j) {
+      double sum = a[i * n + j] + b[i * n + j];
+      for (std::size_t k = 0; k < j; ++k) sum -= factor[i * m + k] * factor[j * m + k];
+      factor[i * m + j] = i == j ? std::sqrt(sum) : sum / factor[j * m + j];
+    }
+  double trace = 0;
+  for (std::size_t column = 0; column < m; ++column) {
+    std::vector<double> x(m);
+    for (std::size_t i = 0; i < m; ++i) {
+      x[i] = b[i * n + column];
+      for (std::size_t k = 0; k < i; ++k) x[i] -= factor[i * m + k] * x[k];
+      x[i] /= factor[i * m + i];
+    }
+    for (std::size_t i = m; i-- > 0;) {
+      for (std::size_t k = i + 1; k < m; ++k) x[i] -= factor[k * m + i] * x[k];
+      x[i] /= factor[i * m + i];
+    }
+    trace += x[column];
+  }
+  return trace;
+}
+
+/// Forty samples know the trace to a standard error of sqrt(2 x 80 / 40) = 2; false alarms at 5 of them: 6e-7. Conjugate gradients end 5 %
+/// below, and the noise of the Jacobian adds to the samples.
+TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
+  const Fit fit = this->fit(1e-6);
+  const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta, [] {});
+  const Curvatures all = curvature.all();
+  // Without the gain, which its bounds hold all but fixed.
+  const double expected = trace_of_solution(all.data, all.prior, fit.theta.size());
+  ASSERT_GT(expected, 15);
+  ASSERT_LT(expected, 70);
+  constexpr int kSamples = 40;
+  const Parameters::Block& paint = fit.problem->parameters().blocks()[0];
+  double sum = 0;
+  for (const std::vector<double>& sample : curvature.samples(kSamples))
+    sum += fit.problem->penalty().curved(paint, sample, fit.problem->penalty_scale(fit.target)) / kSamples;
+  EXPECT_NEAR(sum, expected, 5 * 2 + 0.05 * expected);
+}
+
+/// From a weight a hundred times too small, and one as much too large, to the same one, and to about that of the truth's own
+/// slopes, which is known as well as so many numbers that the data determine tell a variance.
+TEST_F(Painted, EvidenceHasOneFixedPoint) {
+  double ends[2], of_truth = 0;
+  int i = 0;
+  for (const double start : {1e-10, 1e-6}) {
+    double weight = start;
+    for (int round = 0; round < 3; ++round) {
+      const Fit fit = this->fit(weight);
+      const Problem& problem = *fit.problem;
+      const PenaltyScale scale = problem.penalty_scale(fit.target);
+      const auto [value, rank] =
+          problem.penalty().share(problem.parameters().blocks()[0], problem.parameters().target(), scale);
+      of_truth = weight * rank * scale.priors / (2 * value);
+      weight *= evidence_factors(problem, fit.target, fit.theta)[0];
+    }
+    ends[i++] = weight;
+  }
+  EXPECT_NEAR(std::log(ends[0] / ends[1]), 0, std::log(2)) << ends[0] << " " << ends[1];
+  EXPECT_NEAR(std::log(ends[0] / of_truth), 0, std::log(3)) << ends[0] << " " << of_truth;
+}
+
+}  // namespace
+}  // namespace isochron
