@@ -11,7 +11,9 @@ namespace {
 
 // Cut into small triangles, the scene is the same: so are all paths, drawn by the same numbers, but for rounding. The lamp
 // stays whole, as the choice of its triangles takes up the numbers. Where a ray just misses an edge in one scene and hits it
-// in the other a pixel changes (3 of 256 do); a path in another's place, pixel or numbers changes them all.
+// in the other a pixel changes: 2 or 3 of 256, by more than a ten-thousandth of the picture's mean. Less is the rounding of what
+// cancels or of a gate's tail. A Poisson number of mean 3 exceeds 16 with a probability of 4e-9 (false alarms); a path in
+// another's place, pixel or numbers changes all that are lit.
 TEST(LargeScene, TheSamePicturesAsInLargeTriangles) {
   const Scene coarse = load_scene(TEST_DATA "/validation/scene.yaml"), fine = subdivided(coarse, 30, "light");
   ASSERT_LT(coarse.triangles.size(), 100u);
@@ -27,13 +29,21 @@ TEST(LargeScene, TheSamePicturesAsInLargeTriangles) {
   };
   const std::vector<GatedImage> a = run(coarse), b = run(fine);
   for (std::size_t k = 0; k < a.size(); ++k) {
-    int lit = 0, other = 0;
-    for (std::size_t i = 0; i < a[k].data.size(); ++i) {
-      lit += a[k].data[i] != 0;
-      other += std::abs(a[k].data[i] - b[k].data[i]) > 1e-4 * std::abs(a[k].data[i]);
+    const std::size_t values = a[k].data.size();
+    double mean = 0;
+    for (const double x : a[k].data) mean += std::abs(x) / static_cast<double>(values);
+    int lit = 0, other = 0;  // pixels
+    for (std::size_t pixel = 0; pixel < values; pixel += gates.size()) {
+      bool is_lit = false, differs = false;
+      for (std::size_t i = pixel; i < pixel + gates.size(); ++i) {
+        is_lit |= a[k].data[i] != 0;
+        differs |= std::abs(a[k].data[i] - b[k].data[i]) > 1e-4 * mean;
+      }
+      lit += is_lit;
+      other += differs;
     }
-    EXPECT_GT(lit, 200) << k;
-    EXPECT_LT(other, 0.03 * lit) << k;
+    EXPECT_GT(lit, 80) << k;
+    EXPECT_LE(other, 16) << k;
   }
 }
 

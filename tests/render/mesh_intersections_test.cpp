@@ -66,11 +66,13 @@ void expect_same_bits(const MeshIntersections& a, const MeshIntersections& b) {
   }
 }
 
-/// Every edge against every triangle, by Cramer's rule.
+/// Every edge against every triangle, by Cramer's rule. What is within the ray offset of an edge's end, or no longer than it, touches.
 std::vector<MeshIntersection> by_brute_force(const Scene& scene) {
+  const double touching = ray_offset(scene);
   std::map<std::array<int, 2>, std::vector<Vec3>> points;
   for (const Edge& edge : scene.edges) {
     const Vec3 from = scene.positions[edge.vertex[0]], d = scene.positions[edge.vertex[1]] - from;
+    const double margin = touching / length(d);
     for (int t = 0; t < static_cast<int>(scene.triangles.size()); ++t) {
       const auto& v = scene.triangles[t].vertex;
       if (std::find_first_of(v.begin(), v.end(), edge.vertex.begin(), edge.vertex.end()) != v.end()) continue;
@@ -79,7 +81,7 @@ std::vector<MeshIntersection> by_brute_force(const Scene& scene) {
       const double determinant = dot(p, n);
       if (determinant == 0) continue;
       const double a = dot(r, n) / determinant, b = dot(d, m) / determinant, along = dot(q, m) / determinant;
-      if (!(a >= 0 && b >= 0 && a + b <= 1 && along > 0 && along < 1)) continue;
+      if (!(a >= 0 && b >= 0 && a + b <= 1 && along > margin && along < 1 - margin)) continue;
       for (const int face : edge.face)
         if (face >= 0) points[{std::min(face, t), std::max(face, t)}].push_back(from + d * along);
     }
@@ -89,7 +91,8 @@ std::vector<MeshIntersection> by_brute_force(const Scene& scene) {
     for (const int v : scene.triangles[pair[0]].vertex)
       for (const int w : scene.triangles[pair[1]].vertex)
         if (v == w) of_pair.push_back(scene.positions[v]);
-    if (of_pair.size() > 1) result.push_back({pair, {of_pair.front(), of_pair.back()}});
+    if (of_pair.size() > 1 && length(of_pair.back() - of_pair.front()) > touching)
+      result.push_back({pair, {of_pair.front(), of_pair.back()}});
   }
   return result;
 }

@@ -158,6 +158,7 @@ TEST(GatePick, LeavesGradientsUnbiased) {
 TEST(GatePick, ProbabilitiesAndDensity) {
   const GateSet gates(GateShape::gaussian(0.3), {5.0, 5.4, 6.5});
   GatedImage adjoint = uneven_adjoint(4, 4, 3);
+  for (int pixel = 0; pixel < 4; ++pixel) adjoint.at(pixel, pixel % 3) = 0.1;  // each has a gate to pick
   for (int g = 0; g < 3; ++g) adjoint.at(5, g) = 0;
   for (const GatePick& pick : {GatePick(gates), GatePick(gates, adjoint)}) {
     for (int pixel = GatePick::kImage; pixel < 4; ++pixel) {
