@@ -1,5 +1,7 @@
 #include "optim/problem/metric.h"
 
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
 #include <stdexcept>
 
 namespace isochron {
@@ -9,6 +11,14 @@ namespace {
 constexpr double kMore = 1 + 0x1p-30;
 
 }  // namespace
+
+/// Of the free unknowns, in their order.
+struct Metric::Factors {
+  Eigen::SparseMatrix<double> matrix;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> cholesky;
+};
+
+Metric::~Metric() = default;
 
 Metric::Metric(const std::vector<double>& diagonal, const std::vector<Coupling>& couplings,
                std::vector<std::size_t> free)
@@ -27,10 +37,12 @@ Metric::Metric(const std::vector<double>& diagonal, const std::vector<Coupling>&
     entries.emplace_back(b, a, c.curvature);
   }
   const auto n = static_cast<Eigen::Index>(free_.size());
-  matrix_.resize(n, n);
-  matrix_.setFromTriplets(entries.begin(), entries.end());
-  factors_ = std::make_unique<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>>(matrix_);
-  if (factors_->info() != Eigen::Success) throw std::logic_error("metric: the matrix is not definite");
+  auto factors = std::make_unique<Factors>();
+  factors->matrix.resize(n, n);
+  factors->matrix.setFromTriplets(entries.begin(), entries.end());
+  factors->cholesky.compute(factors->matrix);
+  if (factors->cholesky.info() != Eigen::Success) throw std::logic_error("metric: the matrix is not definite");
+  factors_ = std::move(factors);
 }
 
 double Metric::dot(const std::vector<double>& a, const std::vector<double>& b) const {
@@ -45,9 +57,9 @@ std::vector<double> Metric::times(const std::vector<double>& v) const {
     for (const std::size_t i : free_) result[i] = diagonal_[i] * v[i];
     return result;
   }
-  Eigen::VectorXd values(matrix_.rows());
+  Eigen::VectorXd values(factors_->matrix.rows());
   for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
-  const Eigen::VectorXd product = matrix_ * values;
+  const Eigen::VectorXd product = factors_->matrix * values;
   for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = product[static_cast<Eigen::Index>(k)];
   return result;
 }
@@ -58,9 +70,9 @@ std::vector<double> Metric::solve(const std::vector<double>& v) const {
     for (const std::size_t i : free_) result[i] = v[i] / diagonal_[i];
     return result;
   }
-  Eigen::VectorXd values(matrix_.rows());
+  Eigen::VectorXd values(factors_->matrix.rows());
   for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
-  const Eigen::VectorXd solution = factors_->solve(values);
+  const Eigen::VectorXd solution = factors_->cholesky.solve(values);
   for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = solution[static_cast<Eigen::Index>(k)];
   return result;
 }

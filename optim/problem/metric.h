@@ -1,7 +1,5 @@
 // The metric of quasi_newton: what a gradient is divided by.
 #pragma once
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseCore>
 #include <memory>
 #include <vector>
 
@@ -15,6 +13,7 @@ class Metric {
  public:
   /// diagonal > 0 at the `free` unknowns, and at least what the couplings need for a semidefinite matrix. Both must outlive this.
   Metric(const std::vector<double>& diagonal, const std::vector<Coupling>& couplings, std::vector<std::size_t> free);
+  ~Metric();
   const std::vector<std::size_t>& free() const { return free_; }
   double dot(const std::vector<double>& a, const std::vector<double>& b) const;
   std::vector<double> times(const std::vector<double>& v) const;
@@ -23,8 +22,8 @@ class Metric {
  private:
   const std::vector<double>& diagonal_;
   std::vector<std::size_t> free_;
-  Eigen::SparseMatrix<double> matrix_;  ///< of the free unknowns; empty without couplings
-  std::unique_ptr<Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>> factors_;
+  struct Factors;
+  std::unique_ptr<const Factors> factors_;  ///< null without couplings
 };
 
 }  // namespace isochron

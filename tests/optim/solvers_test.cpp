@@ -62,8 +62,8 @@ TEST_P(Solvers, ReachTheTargetOfAnExactProblem) {
 // one run in 200 000 still goes on.
 TEST_P(Solvers, StopByDefaultInTheNoise) {
   OptimizerSpec with_default = spec();
-  const bool stops = GetParam() != OptimizerMethod::adam;
-  EXPECT_EQ(with_default.window(), stops ? 5 : 0);
+  const bool stops = GetParam() != OptimizerMethod::adam;  // whose windows are longer than this run
+  EXPECT_EQ(with_default.window(), stops ? 5 : 50);
   with_default.stop_window = with_default.window();
   ExponentialFit fit;
   fit.residual_noise = 0.05;
@@ -271,7 +271,8 @@ TEST_P(Solvers, TellOfRejectedSteps) {
 TEST_P(Solvers, GoOnWhereTheLossIsBelowZero) {
   // An unbiased estimate near the optimum; the constant is beside the point.
   ExponentialFit fit;
-  fit.loss_noise = 0.01;
+  // Noise that hides the fall ends a search of quasi_newton: QuasiNewton.EndsSearchesThatNoiseHides.
+  fit.loss_noise = GetParam() == OptimizerMethod::quasi_newton ? 1e-6 : 0.01;
   fit.inject = [](auto&, double loss) { return loss - 0.01; };
   Checkpoint state;
   state.theta = {1.95, 0.68};  // a loss of 6e-4 less the constant

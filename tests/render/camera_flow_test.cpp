@@ -2,6 +2,8 @@
 // variance does.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/paths/vertex_flow.h"
 #include "core/techniques/secondary_boundary.h"
 #include "tests/render/scene_building.h"
@@ -10,24 +12,28 @@
 namespace isochron::testing {
 namespace {
 
-/// Two estimates of the same values, more than `least` of which are not zero: mean of their squared z-scores
-/// below `most`, root mean square error below `error` times that of the second one's values.
+/// Two estimates of the same values, more than `least` of which are not zero: median of their squared z-scores
+/// below `most`, root mean square error below `error` times that of the second one's values. The median, since rare large
+/// samples that few batches of a pixel have, and others do not, make z-scores with heavy tails.
 void expect_same(const std::vector<Batches>& one, const std::vector<Batches>& other, int least, double most,
                  double error) {
-  double sum = 0, difference = 0, scale = 0;
+  std::vector<double> squares;
+  double difference = 0, scale = 0;
   int count = 0;
   for (std::size_t i = 0; i < one.size(); ++i) {
     const Estimate a = one[i].estimate(), b = other[i].estimate();
     if (a.standard_error == 0 && b.standard_error == 0) continue;
-    sum += std::pow(z_score(a, b), 2);
+    squares.push_back(std::pow(z_score(a, b), 2));
     difference += std::pow(std::hypot(a.standard_error, b.standard_error), 2);
     scale += b.mean * b.mean;
     ++count;
   }
   ASSERT_GT(count, least);
-  EXPECT_LT(sum / count, most) << count << " values";
+  const auto middle = squares.begin() + count / 2;
+  std::nth_element(squares.begin(), middle, squares.end());
+  EXPECT_LT(*middle, most) << count << " values";
   EXPECT_LT(std::sqrt(difference / scale), error);
-  ::testing::Test::RecordProperty("mean_square_z", std::to_string(sum / count));
+  ::testing::Test::RecordProperty("median_square_z", std::to_string(*middle));
   ::testing::Test::RecordProperty("error_over_scale", std::to_string(std::sqrt(difference / scale)));
 }
 
@@ -45,9 +51,9 @@ void PrintTo(const FlowCase& c, std::ostream* out) {
 
 class CameraFlowOfEveryPixel : public ::testing::TestWithParam<FlowCase> {};
 
-/// Two radii give the same derivative in every pixel. Mean of squared z-scores over 64 pixels, 2 gates and 3
-/// motions (of which one third or so see something): with 32 batches its expectation is 31/29 = 1.07 and, the
-/// motions being correlated, its standard deviation at most 0.15: the limit of 1.7 means a false-alarm rate
+/// Two radii give the same derivative in every pixel. Median of squared z-scores over 64 pixels, 2 gates and 3
+/// motions (of which one third or so see something): with 32 batches its expectation is 0.47 and, the
+/// motions being correlated, its standard deviation at most 0.13: the limit of 1.06 means a false-alarm rate
 /// below 1e-4.
 TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
   const FlowCase& c = GetParam();
@@ -83,7 +89,7 @@ TEST_P(CameraFlowOfEveryPixel, GivesTheSameDerivative) {
     return pixels;
   };
   const auto one = estimate(c.radius), other = estimate(c.reference_radius);
-  expect_same(one, other, 100, 1.7, c.glass ? 0.8 : 0.3);
+  expect_same(one, other, 100, 1.06, c.glass ? 0.8 : 0.3);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -119,7 +125,7 @@ Scene corner_with_board() {
 
 /// Against finite differences in every pixel: a static board in the corner hides parts of it from the camera
 /// and from each other. Most follows, so that what the camera sees beside the board's edges flows across
-/// them. Mean of squared z-scores over 64 pixels: 1.07 expected, standard deviation 0.19; limit 1.9,
+/// them. Median of squared z-scores over 64 pixels: 0.47 expected, standard deviation 0.14; limit 1.06,
 /// false-alarm rate below 1e-4.
 TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
   const Scene scene = corner_with_board();
@@ -149,7 +155,7 @@ TEST(CameraFlow, AgreesWithFiniteDifferencesBehindStaticEdges) {
       reference[i].add((plus.data[i] - minus.data[i]) / (2 * kStep));
     }
   }
-  expect_same(ours, reference, 32, 1.9, 0.04);
+  expect_same(ours, reference, 32, 1.06, 0.04);
 }
 
 /// Takes the velocities of boundary segments, everything being moved along (0.3, 1, 0.5).

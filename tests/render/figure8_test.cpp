@@ -26,7 +26,7 @@ void PrintTo(const Figure8Case& c, std::ostream* out) {
 class Figure8 : public ::testing::TestWithParam<Figure8Case> {};
 
 TEST_P(Figure8, Pixels) {
-  constexpr int kBatches = 32, kTermSamples[3] = {32, 48, 4}, kReferenceSamples = 64;
+  constexpr int kBatches = 32, kTermSamples[3] = {32, 48, 4}, kReferenceSamples = 128;
   constexpr double kStep = 0.004;
   Scene scene = load_scene(PROJECT_ROOT "/scenes/bunny/scene.yaml");
   scene.camera.width = scene.camera.height = 16;
