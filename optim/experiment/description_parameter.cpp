@@ -177,8 +177,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         {.only = of({vertices})});
     inner.value("evidence", field::boolean(spec.evidence),
                 "of counts, in a run in levels: each level but the first multiplies the weights of slopes and bending "
-                "by what makes "
-                "the data of the one before most probable");
+                "by what makes the data of the one before most probable");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0 && spec.bending == 0});

@@ -69,7 +69,8 @@ struct ParameterSpec {
   RemeshSpec remesh;     ///< of type vertices
   /// Of type vertices, see bending.h; 0: none.
   double bending = 0;  ///< weight of a prior on curved surfaces
-  /// Of types vertices and texture: each level but the first takes the weights that the data of the one before ask for, see evidence.h.
+  /// Of types vertices and texture: each level but the first takes the weights that the data of the one before ask
+  /// for, see evidence.h.
   bool evidence = false;
   /// Of type time_offset: standard deviation of a normal prior about the initial values; 0: none.
   double prior_width = 0;

@@ -17,7 +17,6 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
                                      const std::vector<double>& theta) {
   const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
   std::vector<double> factors(specs.size(), 1.0);
-  if (std::none_of(specs.begin(), specs.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return factors;
   const Poll poll = [] {};
   const RenderedCurvature curvature(problem, target, theta, poll);
   const std::vector<std::vector<double>> samples = curvature.samples(kSamples);

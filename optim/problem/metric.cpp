@@ -45,6 +45,21 @@ Metric::Metric(const std::vector<double>& diagonal, const std::vector<Coupling>&
   factors_ = std::move(factors);
 }
 
+/// What becomes of the free unknowns: one by one without couplings, else all together, in their order.
+template <class Single, class Together>
+std::vector<double> Metric::of_free(const std::vector<double>& v, Single&& single, Together&& together) const {
+  std::vector<double> result(v.size(), 0.0);
+  if (!factors_) {
+    for (const std::size_t i : free_) result[i] = single(i, v[i]);
+    return result;
+  }
+  Eigen::VectorXd values(factors_->matrix.rows());
+  for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
+  values = together(values);
+  for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = values[static_cast<Eigen::Index>(k)];
+  return result;
+}
+
 double Metric::dot(const std::vector<double>& a, const std::vector<double>& b) const {
   double sum = 0;
   for (const std::size_t i : free_) sum += a[i] * b[i];
@@ -52,29 +67,15 @@ double Metric::dot(const std::vector<double>& a, const std::vector<double>& b) c
 }
 
 std::vector<double> Metric::times(const std::vector<double>& v) const {
-  std::vector<double> result(v.size(), 0.0);
-  if (!factors_) {
-    for (const std::size_t i : free_) result[i] = diagonal_[i] * v[i];
-    return result;
-  }
-  Eigen::VectorXd values(factors_->matrix.rows());
-  for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
-  const Eigen::VectorXd product = factors_->matrix * values;
-  for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = product[static_cast<Eigen::Index>(k)];
-  return result;
+  return of_free(
+      v, [this](std::size_t i, double value) { return diagonal_[i] * value; },
+      [this](const Eigen::VectorXd& values) -> Eigen::VectorXd { return factors_->matrix * values; });
 }
 
 std::vector<double> Metric::solve(const std::vector<double>& v) const {
-  std::vector<double> result(v.size(), 0.0);
-  if (!factors_) {
-    for (const std::size_t i : free_) result[i] = v[i] / diagonal_[i];
-    return result;
-  }
-  Eigen::VectorXd values(factors_->matrix.rows());
-  for (std::size_t k = 0; k < free_.size(); ++k) values[static_cast<Eigen::Index>(k)] = v[free_[k]];
-  const Eigen::VectorXd solution = factors_->cholesky.solve(values);
-  for (std::size_t k = 0; k < free_.size(); ++k) result[free_[k]] = solution[static_cast<Eigen::Index>(k)];
-  return result;
+  return of_free(
+      v, [this](std::size_t i, double value) { return value / diagonal_[i]; },
+      [this](const Eigen::VectorXd& values) -> Eigen::VectorXd { return factors_->cholesky.solve(values); });
 }
 
 }  // namespace isochron

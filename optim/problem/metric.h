@@ -20,6 +20,9 @@ class Metric {
   std::vector<double> solve(const std::vector<double>& v) const;
 
  private:
+  template <class Single, class Together>
+  std::vector<double> of_free(const std::vector<double>& v, Single&& single, Together&& together) const;
+
   const std::vector<double>& diagonal_;
   std::vector<std::size_t> free_;
   struct Factors;

@@ -145,8 +145,7 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
   if (leaves_out_jumps())
     warning(
         fmt::format("{}: samples.path_length: 0 leaves the jumps of the gates out of the derivatives by what changes "
-                    "the lengths of "
-                    "paths, which would lead a fit astray",
+                    "the lengths of paths, which would lead a fit astray",
                     experiment_.file));
   std::string stacked = stacked_warning(parameters_->apply(parameters_->initial()));
   if (stacked.empty() && parameters_->target_known())

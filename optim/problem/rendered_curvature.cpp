@@ -34,11 +34,7 @@ RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& t
   for (int k = 0; k < kGradients; ++k) {
     Evaluation at = problem.evaluate(theta, target, kMatrixIteration + k, poll);
     if (k == 0) weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
-    for (std::size_t i = 0; i < theta.size(); ++i)
-      if ((theta[i] <= parameters.lower()[i] && at.gradient[i] > 0) ||
-          (theta[i] >= parameters.upper()[i] && at.gradient[i] < 0))
-        at.gradient[i] = 0;
-    gradients_.push_back(std::move(at.gradient));
+    gradients_.push_back(within_bounds(std::move(at.gradient), theta, parameters.lower(), parameters.upper()));
   }
 }
 

@@ -32,4 +32,12 @@ inline double norm(const std::vector<double>& v) {
   return std::sqrt(sum);
 }
 
+/// The gradient but for what leads beyond the bounds.
+inline std::vector<double> within_bounds(std::vector<double> gradient, const std::vector<double>& theta,
+                                         const std::vector<double>& lower, const std::vector<double>& upper) {
+  for (std::size_t i = 0; i < gradient.size(); ++i)
+    if ((theta[i] <= lower[i] && gradient[i] > 0) || (theta[i] >= upper[i] && gradient[i] < 0)) gradient[i] = 0;
+  return gradient;
+}
+
 }  // namespace isochron

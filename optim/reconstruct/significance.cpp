@@ -2,17 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "core/gates/normal.h"
 
 namespace isochron {
 
 double normal_quantile_above(double probability) {
-  double low = 0, high = 40;  // beyond, a double holds no probability
-  for (int i = 0; i < 200 && low < high; ++i) {
-    const double middle = 0.5 * (low + high);
-    (0.5 * std::erfc(middle / std::numbers::sqrt2) > probability ? low : high) = middle;
-  }
-  return high;
+  return -normal_quantile_lower(probability, probability - 0.5);
 }
 
 double surface_threshold(std::vector<float> values) {

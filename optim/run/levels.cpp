@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/base/error.h"
+#include "core/base/progress.h"
 #include "core/base/ranks.h"
 #include "core/base/yaml_reader.h"
 #include "core/scene/mesh_writer.h"
@@ -124,6 +125,8 @@ class Levels {
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, int level,
                        std::vector<ParameterSpec>& next) const {
+    if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
+    const ProgressStage stage("weighing the smoothing", 1);
     const std::vector<double> factors =
         evidence_factors(former, former.read_target(folder(level) + "/target.exr"), theta);
     for (std::size_t i = 0; i < next.size(); ++i)

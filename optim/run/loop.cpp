@@ -6,6 +6,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "optim/problem/vector_math.h"
+
 namespace isochron {
 namespace {
 
@@ -20,14 +22,6 @@ bool all_finite(const std::vector<double>& values) {
 /// Whether the image's error is below `rmse`, beyond doubt.
 bool agree(const Evaluation& now, double rmse) {
   return rmse > 0 && now.mean_squared_error + 2 * now.mean_squared_error_noise <= rmse * rmse;
-}
-
-/// The gradient without what leads beyond bounds.
-std::vector<double> within_bounds(const Objective& objective, const std::vector<double>& theta,
-                                  std::vector<double> gradient) {
-  for (std::size_t i = 0; i < gradient.size(); ++i)
-    if (gradient[i] > 0 ? theta[i] <= objective.lower()[i] : theta[i] >= objective.upper()[i]) gradient[i] = 0;
-  return gradient;
 }
 
 bool exploded(const Evaluation& now, const Checkpoint& state) {
@@ -64,8 +58,8 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
     const bool finite = std::isfinite(now.loss) && all_finite(now.gradient);
     const bool agrees = agree(now, options.converged_rmse);
     Safeguard safeguard(stop_window, state.safeguard);
-    const Verdict verdict =
-        safeguard.observe(now.loss, finite, state.theta, within_bounds(objective, state.theta, now.gradient));
+    const Verdict verdict = safeguard.observe(
+        now.loss, finite, state.theta, within_bounds(now.gradient, state.theta, objective.lower(), objective.upper()));
     const bool last = state.iteration >= options.iterations;
     const bool diverged = verdict == Verdict::give_up || (last && (!finite || exploded(now, state)));
     if (agrees || diverged || verdict == Verdict::settled || last) {
