@@ -265,6 +265,11 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_levels(problem);
     // Here, so that a message names the user's file and not the run's copy of it.
     if (!experiment.target.images.empty()) problem.read_target(experiment.target.images);
+    for (const ParameterSpec& spec : experiment.parameters)
+      if (spec.evidence && !remeshed_parameter(experiment) && options.warning)
+        options.warning(
+            fmt::format("{}: {}: smoothing.evidence chooses weights between levels (remesh), which are missing",
+                        experiment.file, spec.name));
     if (problem.leaves_out_jumps()) {
       copied.samples.path_length = experiment.samples.interior;
       if (options.warning)
