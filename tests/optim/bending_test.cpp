@@ -73,11 +73,11 @@ Mesh sphere(double radius, int rings) {
   return mesh;
 }
 
-/// The unit square in uneven triangles.
-Mesh sheet(int side) {
+/// The unit square in triangles, uneven by so much of their sides.
+Mesh sheet(int side, double uneven) {
   Mesh mesh;
   std::mt19937 rng(test_seed(5));
-  std::uniform_real_distribution<double> off(-0.3, 0.3);
+  std::uniform_real_distribution<double> off(-uneven, uneven);
   for (int y = 0; y <= side; ++y)
     for (int x = 0; x <= side; ++x) {
       const bool inside = x > 0 && y > 0 && x < side && y < side;
@@ -101,7 +101,7 @@ TEST(Bending, OfASphereOfAnySizeIs16Pi) {
 
 TEST(Bending, OfAPlaneIsNoneHoweverUnevenItsMesh) {
   for (const auto direction : {VertexDirection::fixed, VertexDirection::free}) {
-    const auto plane = surface(sheet(12), direction);
+    const auto plane = surface(sheet(12, 0.3), direction);
     const std::vector<LinearForm> forms = plane->forms();
     EXPECT_EQ(forms.size(), 11u * 11u);  // not of the border
     EXPECT_LT(energy(forms, plane->parameters->initial()), 1e-20);
@@ -109,9 +109,11 @@ TEST(Bending, OfAPlaneIsNoneHoweverUnevenItsMesh) {
 }
 
 /// z = a sin(k x): the curvature is a k^2 sin(k x), its square's integral over whole waves a^2 k^4 / 2. The direction is 2 long.
+/// Single vertices of uneven triangles see curvature that is not there, which adds to the sum of squares: 1.6 % here, up to 30 % where
+/// triangles are uneven by 0.3.
 TEST(Bending, OfAWaveOnAPlane) {
   constexpr int kSide = 64;
-  const Mesh mesh = sheet(kSide);
+  const Mesh mesh = sheet(kSide, 0.1);
   const auto plane = surface(mesh, VertexDirection::fixed);
   const Parameters& parameters = *plane->parameters;
   const double a = 0.003, k = 2 * std::numbers::pi;
@@ -120,12 +122,12 @@ TEST(Bending, OfAWaveOnAPlane) {
   for (std::size_t i = 0; i < theta.size(); ++i)
     theta[i] = a / 2 * std::sin(k * parameters.scene().positions[field.vertices[i]].x);
   const double inside = 1 - 2.0 / kSide;  // of the width; at the other border the wave has no curvature
-  EXPECT_NEAR(energy(plane->forms(), theta) / (inside * a * a * std::pow(k, 4) / 2), 1, 0.1);
+  EXPECT_NEAR(energy(plane->forms(), theta) / (inside * a * a * std::pow(k, 4) / 2), 1, 0.03);
 }
 
 /// The forms are those of the surface where it begins, offsets included.
 TEST(Bending, IsThatOfTheSurfaceAsItBegins) {
-  const Mesh mesh = sheet(10);
+  const Mesh mesh = sheet(10, 0.3);
   const auto plane = surface(mesh, VertexDirection::fixed);
   const Parameters& flat = *plane->parameters;
   std::vector<double> bump = flat.initial();
