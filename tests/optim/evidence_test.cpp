@@ -141,14 +141,16 @@ TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
 }
 
 /// From a weight a hundred times too small, and one as much too large, to the same one, and to about that of the truth's own
-/// slopes, which is known as well as so many numbers that the data determine tell a variance.
+/// slopes, which is known as well as so many numbers that the data determine tell a variance. The images' noise makes what is found
+/// rougher: with 4096 samples 0.49 to 0.64 of the truth's weight at four seeds, 0.1 of a logarithm apart; with 512 about a third,
+/// where the last bits decided.
 TEST_F(Painted, EvidenceHasOneFixedPoint) {
   double ends[2], of_truth = 0;
   int i = 0;
   for (const double start : {1e-10, 1e-6}) {
     double weight = start;
     for (int round = 0; round < 3; ++round) {
-      const Fit fit = this->fit(weight);
+      const Fit fit = this->fit(weight, 4096);
       const Problem& problem = *fit.problem;
       const PenaltyScale scale = problem.penalty_scale(fit.target);
       const auto [value, rank] =
@@ -159,6 +161,7 @@ TEST_F(Painted, EvidenceHasOneFixedPoint) {
     ends[i++] = weight;
   }
   EXPECT_NEAR(std::log(ends[0] / ends[1]), 0, std::log(2)) << ends[0] << " " << ends[1];
+  RecordProperty("of_truth", std::to_string(ends[0] / of_truth));
   EXPECT_NEAR(std::log(ends[0] / of_truth), 0, std::log(3)) << ends[0] << " " << of_truth;
 }
 
