@@ -7,6 +7,7 @@
 namespace isochron {
 
 void add_run(CLI::App& app, Action& action);
+void add_reconstruct(CLI::App& app, Action& action);
 void add_resume(CLI::App& app, Action& action);
 void add_report(CLI::App& app, Action& action);
 void add_render(CLI::App& app, Action& action);

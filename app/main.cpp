@@ -89,6 +89,7 @@ int run_program(int argc, char** argv) {
   app.footer("Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");
   isochron::Action action;
   isochron::add_run(app, action);
+  isochron::add_reconstruct(app, action);
   isochron::add_resume(app, action);
   isochron::add_report(app, action);
   isochron::add_render(app, action);

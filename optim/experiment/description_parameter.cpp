@@ -176,8 +176,8 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
         {.only = of({vertices})});
     inner.value("evidence", field::boolean(spec.evidence),
-                "of counts, in a run in levels: each level but the first multiplies the weights of slopes and bending "
-                "by what makes the data of the one before most probable");
+                "of counts, in a run in levels: each level but the first multiplies the weight of bending, or without "
+                "bending that of slopes, by what makes the data of the one before most probable");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0 && spec.bending == 0});

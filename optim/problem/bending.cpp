@@ -13,7 +13,7 @@ struct Around {
   std::map<int, double> weight;  ///< half the cotangents of the angles opposite to each edge
   double area = 0;
   Vec3 normal;
-  bool border = false;
+  std::vector<int> along;  ///< neighbours along the border; empty inside
 };
 
 std::vector<Around> surroundings(const Scene& scene, const Shape& shape) {
@@ -34,52 +34,98 @@ std::vector<Around> surroundings(const Scene& scene, const Shape& shape) {
   for (int e = shape.first_edge; e < shape.first_edge + shape.edge_count; ++e) {
     const Edge& edge = scene.edges[e];
     if (edge.face[1] >= 0 && !edge.sector) continue;
-    for (const int v : edge.vertex) around[v - shape.first_vertex].border = true;
+    for (int k = 0; k < 2; ++k) around[edge.vertex[k] - shape.first_vertex].along.push_back(edge.vertex[1 - k]);
   }
   return around;
+}
+
+/// Linear forms of positions as forms of a field's unknowns.
+class Forms {
+ public:
+  Forms(const Parameters& parameters, const Parameters::VertexField& field, const std::vector<double>& theta)
+      : theta_(theta),
+        scene_(parameters.apply(theta)),
+        basis_(parameters.tangent(theta)),
+        layout_(scene_),
+        first_(field.begin),
+        last_(field.begin + field.stride * static_cast<int>(field.vertices.size())) {}
+
+  const Scene& scene() const { return scene_; }
+
+  /// The sum over the pairs of factor times (direction . position).
+  LinearForm of(const std::vector<std::pair<int, double>>& factors, const Vec3& direction) const {
+    std::map<int, double> entries;
+    LinearForm form;
+    for (const auto& [vertex, factor] : factors)
+      for (int axis = 0; axis < 3; ++axis) {
+        const double part = factor * direction[axis];
+        form.constant += part * scene_.positions[vertex][axis];
+        const int row = layout_.vertex(vertex, axis);
+        for (int k = basis_.row_begin[row]; k < basis_.row_begin[row + 1]; ++k)
+          if (const auto& [column, coefficient] = basis_.entries[k]; column >= first_ && column < last_)
+            entries[column] += part * coefficient;
+      }
+    for (const auto& [unknown, coefficient] : entries) {
+      form.entries.emplace_back(unknown, coefficient);
+      form.constant -= coefficient * theta_[unknown];
+    }
+    return form;
+  }
+
+ private:
+  const std::vector<double>& theta_;
+  const Scene scene_;
+  const TangentBasis basis_;
+  const DofLayout layout_;
+  const int first_, last_;
+};
+
+LinearForm mean_curvature(const Forms& forms, int v, const Around& here) {
+  std::vector<std::pair<int, double>> factors;
+  for (const auto& [neighbour, weight] : here.weight) {
+    factors.emplace_back(v, weight);
+    factors.emplace_back(neighbour, -weight);
+  }
+  return forms.of(factors, normalize(here.normal) / std::sqrt(here.area));
+}
+
+/// The change of the border's unit tangent at v over the root of the length that it takes, each axis, times the root of `size`.
+void add_border_curvature(const Forms& forms, int v, const Around& here, double size, std::vector<LinearForm>& result) {
+  const std::vector<Vec3>& at = forms.scene().positions;
+  const double to = length(at[here.along[0]] - at[v]), from = length(at[here.along[1]] - at[v]);
+  if (!(to > 0 && from > 0)) return;
+  const double scale = std::sqrt(2 * size / (to + from));
+  for (int axis = 0; axis < 3; ++axis) {
+    Vec3 direction;
+    direction[axis] = scale;
+    LinearForm form =
+        forms.of({{here.along[0], 1 / to}, {here.along[1], 1 / from}, {v, -1 / to - 1 / from}}, direction);
+    if (!form.entries.empty()) result.push_back(std::move(form));
+  }
 }
 
 }  // namespace
 
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta) {
-  const Scene scene = parameters.apply(theta);
-  const TangentBasis basis = parameters.tangent(theta);
-  const DofLayout layout(scene);
-  const int first = field.begin, last = field.begin + field.stride * static_cast<int>(field.vertices.size());
-  std::vector<LinearForm> forms;
-  if (field.vertices.empty()) return forms;
-  const Shape& shape = *std::find_if(scene.shapes.begin(), scene.shapes.end(), [&](const Shape& s) {
+  std::vector<LinearForm> result;
+  if (field.vertices.empty()) return result;
+  const Forms forms(parameters, field, theta);
+  const std::vector<Shape>& shapes = forms.scene().shapes;
+  const Shape& shape = *std::find_if(shapes.begin(), shapes.end(), [&](const Shape& s) {
     return field.vertices.front() < s.first_vertex + s.vertex_count;
   });
-  const std::vector<Around> around = surroundings(scene, shape);
+  const std::vector<Around> around = surroundings(forms.scene(), shape);
+  double area = 0;
+  for (const Around& each : around) area += each.area;
   for (const int v : field.vertices) {
     const Around& here = around[v - shape.first_vertex];
-    if (here.border || !(here.area > 0)) continue;
-    const Vec3 across = normalize(here.normal) / std::sqrt(here.area);
-    std::map<int, double> entries;
-    LinearForm form;
-    const auto add = [&](int vertex, double factor) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const double part = factor * across[axis];
-        form.constant += part * scene.positions[vertex][axis];
-        const int row = layout.vertex(vertex, axis);
-        for (int k = basis.row_begin[row]; k < basis.row_begin[row + 1]; ++k)
-          if (const auto& [column, coefficient] = basis.entries[k]; column >= first && column < last)
-            entries[column] += part * coefficient;
-      }
-    };
-    for (const auto& [neighbour, weight] : here.weight) {
-      add(v, weight);
-      add(neighbour, -weight);
-    }
-    for (const auto& [unknown, coefficient] : entries) {
-      form.entries.emplace_back(unknown, coefficient);
-      form.constant -= coefficient * theta[unknown];
-    }
-    forms.push_back(std::move(form));
+    if (here.along.size() == 2)
+      add_border_curvature(forms, v, here, std::sqrt(area), result);
+    else if (here.along.empty() && here.area > 0)
+      result.push_back(mean_curvature(forms, v, here));
   }
-  return forms;
+  return result;
 }
 
 }  // namespace isochron

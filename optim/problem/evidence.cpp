@@ -21,8 +21,9 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
   const RenderedCurvature curvature(problem, target, theta, poll);
   const std::vector<std::vector<double>> samples = curvature.samples(kSamples);
   const QuadraticPenalty& penalty = problem.penalty();
-  const PenaltyScale scale = problem.penalty_scale(target);
   for (std::size_t i = 0; i < specs.size(); ++i) {
+    PenaltyScale scale = problem.penalty_scale(target);
+    if (specs[i].bending > 0) scale.slopes = 0;
     const Parameters::Block& block = problem.parameters().blocks()[i];
     const auto [value, rank] = penalty.share(block, theta, scale);
     if (!specs[i].evidence || rank < 1) continue;

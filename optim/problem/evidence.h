@@ -11,8 +11,9 @@
 
 namespace isochron {
 
-/// By what the weights of each parameter's smoothing are to be multiplied, in the order of the blocks; 1 where the parameter has
-/// none or asks for no `evidence`. At theta, where a fit to counts has come to rest. The same for any number of threads and ranks.
+/// By what the weight of each parameter's smoothing is to be multiplied, in the order of the blocks; 1 where the parameter has
+/// none or asks for no `evidence`. Of bending, or where there is none of slopes: slopes of a surface that bends are about its motion within a
+/// level, which is no property of it. At theta, where a fit to counts has come to rest. The same for any number of threads and ranks.
 std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
                                      const std::vector<double>& theta);
 

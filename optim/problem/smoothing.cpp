@@ -112,7 +112,7 @@ QuadraticPenalty::Share QuadraticPenalty::share(const Parameters::Block& block, 
                                                 PenaltyScale scale) const {
   Share share;
   for (const Square& s : squares_) {
-    if (!s.of(block)) continue;
+    if (!s.of(block) || s.scaled(scale) == 0) continue;
     const double form = s.form.at(theta);
     share.value += s.scaled(scale) * form * form;
     ++share.rank;

@@ -53,7 +53,7 @@ class QuadraticPenalty {
   bool empty() const { return squares_.empty(); }
   double value(const std::vector<double>& theta, PenaltyScale scale) const;
   void add_gradient(const std::vector<double>& theta, PenaltyScale scale, std::vector<double>& gradient) const;
-  /// What belongs to the unknowns of one block.
+  /// What belongs to the unknowns of one block, and has a scale.
   struct Share {
     double value = 0;  ///< as above
     double rank = 0;   ///< independent forms, one constant left open

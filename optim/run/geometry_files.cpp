@@ -27,6 +27,17 @@ bool all_known(const Scene& scene, const Shape& shape) {
                       [](const Vec3& p) { return std::isnan(p.x) || std::isnan(p.y) || std::isnan(p.z); });
 }
 
+std::vector<VertexProperty> properties(const Scene& scene, const Shape& shape, const std::vector<double>& errors) {
+  std::vector<VertexProperty> result;
+  const auto add = [&](const char* name, const std::vector<double>& values) {
+    const auto first = values.begin() + shape.first_vertex;
+    result.push_back({name, {first, first + shape.vertex_count}});
+  };
+  if (shape.textured) add("albedo", scene.texture);
+  if (!errors.empty()) add("standard_error", errors);
+  return result;
+}
+
 }  // namespace
 
 GeometryFiles::GeometryFiles(const std::string& folder, const OutputSpec& output, const Parameters& parameters)
@@ -45,7 +56,8 @@ GeometryFiles::GeometryFiles(const std::string& folder, const OutputSpec& output
   if (!files_.empty()) on_first_rank([&] { std::filesystem::create_directories(folder_); });
 }
 
-void GeometryFiles::write(const std::string& moment, const std::vector<double>& theta) const {
+void GeometryFiles::write(const std::string& moment, const std::vector<double>& theta,
+                          const std::vector<double>& errors) const {
   if (files_.empty()) return;
   const auto formats = mesh_formats();
   const MeshFormat& format = *std::find_if(formats.begin(), formats.end(),
@@ -54,7 +66,7 @@ void GeometryFiles::write(const std::string& moment, const std::vector<double>& 
   for (const File& file : files_) {
     const Shape& shape = scene.shapes[file.shape];
     if (!all_known(scene, shape)) continue;
-    write_file_atomically(path(moment, file), format.write(scene, shape));
+    write_file_atomically(path(moment, file), format.write(scene, shape, properties(scene, shape, errors)));
   }
 }
 

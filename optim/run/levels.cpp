@@ -129,8 +129,7 @@ class Levels {
     const ProgressStage stage("weighing the smoothing", 1);
     const std::vector<double> factors =
         evidence_factors(former, former.read_target(folder(level) + "/target.exr"), theta);
-    for (std::size_t i = 0; i < next.size(); ++i)
-      for (double* weight : {&next[i].bending, &next[i].slopes}) *weight *= factors[i];
+    for (std::size_t i = 0; i < next.size(); ++i) (next[i].bending > 0 ? next[i].bending : next[i].slopes) *= factors[i];
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {
@@ -185,7 +184,7 @@ class Levels {
     std::string text = *read_file(folder(level) + "/summary.yaml");
     if (more || under_way)
       text = fmt::format("status: {}{}", name(RunStatus::interrupted), text.substr(text.find('\n')));
-    write_file_atomically(file("summary.yaml"), text + levels_yaml());
+    write_file_atomically(file("summary.yaml"), text + read_file(file("start.yaml")).value_or("") + levels_yaml());
   }
 
   /// Files of those names, and meshes whose names begin so.

@@ -22,6 +22,7 @@
 #include "optim/problem/problem.h"
 #include "optim/problem/rendered_curvature.h"
 #include "optim/problem/rendered_objective.h"
+#include "optim/problem/surface_errors.h"
 #include "optim/problem/vector_math.h"
 #include "optim/run/checkpoint.h"
 #include "optim/run/fit.h"
@@ -165,18 +166,20 @@ class Run {
       stage.advance();
     };
     LoopResult result = run_loop(objective, *optimizer, spec.window(), loop, state_);
-    geometry.write("final", state_.theta);
+    std::vector<double> of_surfaces;
+    if (options_.errors) of_surfaces = find_errors(*optimizer, final);
+    geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);
-    if (options_.errors) errors_ = find_errors(*optimizer, final);
     judge_expected_counts();
     if (fit_ && left_its_data(*fit_, state_, last_)) result.status = RunStatus::diverged;
     zero_gradients_ = zero_gradient_report(parameters_, final.gradient);
     return result;
   }
 
-  /// Of all unknowns together where their matrix is not too large. As it ends, a run is not interrupted.
-  ParameterErrors find_errors(const Optimizer& optimizer, const Evaluation& final) const {
+  /// Of all unknowns together where their matrix is not too large; those of surfaces are returned, where there are any. As it
+  /// ends, a run is not interrupted.
+  std::vector<double> find_errors(const Optimizer& optimizer, const Evaluation& final) {
     const std::vector<double>& theta = state_.theta;
     const double unknowns = parameters_.size();
     const bool together =
@@ -188,9 +191,11 @@ class Run {
     const std::vector<std::string>& names = parameters_.component_names();
     const Poll poll = [] {};
     const RenderedCurvature curvature(problem_, target_, theta, poll);
-    if (together) return joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta);
-    return eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(), curvature.gradients(), noise,
-                             blocks, names, theta);
+    errors_ = together ? joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta)
+                       : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
+                                           curvature.gradients(), noise, blocks, names, theta);
+    if (!has_surface_errors(problem_)) return {};
+    return surface_errors(problem_, curvature, theta, noise.scale);
   }
 
   /// What the final parameters make of the counts, with far less noise than an iteration's image.
@@ -282,6 +287,7 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
     lock.emplace(prepare_run_folder(options.folder, options.force, options.warning));
     write_inputs(options.folder, inputs, copied);
+    for (const auto& [name, contents] : options.files) write_file_atomically(options.folder + "/" + name, contents);
     write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
   });
   // As a resumed run does, so that both see the same to the last bit.

@@ -7,6 +7,7 @@
 // that was killed anywhere and resumed gives the same bits.
 #pragma once
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,10 @@ struct LevelSurface;
 
 struct RunOptions {
   std::string folder;
-  bool force = false;                             ///< overwrite a run that the folder holds (else it is moved aside)
+  bool force = false;  ///< overwrite a run that the folder holds (else it is moved aside)
+  /// Name and contents of files that are put beside experiment.yaml as the run begins. What is in a `start.yaml` a summary of levels has,
+  /// too.
+  std::map<std::string, std::string> files;
   std::function<bool()> stop;                     ///< asked between passes; true: leave a checkpoint and return
   std::function<void(const Progress&)> progress;  ///< after every row of the log
   /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends

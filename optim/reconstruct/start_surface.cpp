@@ -1,0 +1,215 @@
+#include "optim/reconstruct/start_surface.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <set>
+#include <utility>
+#include <vector>
+
+namespace isochron {
+namespace {
+
+constexpr int kSide = 2;              // voxels that make a lateral resolution
+constexpr int kRings = 2;             // voxels beyond what is significant
+constexpr int kSmoothings = 2;        // means over 3 x 3 voxels: about a lateral resolution wide
+constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
+constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// A depth for each line of sight; not a number where there is none.
+struct DepthMap {
+  int width, height;
+  std::vector<double> depth;
+  double& at(int a, int u) { return depth[u * width + a]; }
+  double at(int a, int u) const { return a < 0 || u < 0 || a >= width || u >= height ? kNone : depth[u * width + a]; }
+  bool has(int a, int u) const { return std::isfinite(at(a, u)); }
+  /// Mean over those of the 3 x 3 lines about it that have one.
+  double mean_around(int a, int u) const {
+    double sum = 0;
+    int count = 0;
+    for (int du = -1; du <= 1; ++du)
+      for (int da = -1; da <= 1; ++da)
+        if (has(a + da, u + du)) {
+          sum += at(a + da, u + du);
+          ++count;
+        }
+    return count == 0 ? kNone : sum / count;
+  }
+  template <class Change>
+  DepthMap changed(Change&& change) const {
+    DepthMap result = *this;
+    for (int u = 0; u < height; ++u)
+      for (int a = 0; a < width; ++a) result.at(a, u) = change(a, u);
+    return result;
+  }
+  DepthMap grown() const {
+    DepthMap result = *this;
+    for (int ring = 0; ring < kRings; ++ring)
+      result =
+          result.changed([&](int a, int u) { return result.has(a, u) ? result.at(a, u) : result.mean_around(a, u); });
+    return result;
+  }
+  DepthMap smooth() const {
+    DepthMap result = *this;
+    for (int round = 0; round < kSmoothings; ++round)
+      result = result.changed([&](int a, int u) { return result.has(a, u) ? result.mean_around(a, u) : kNone; });
+    return result;
+  }
+};
+
+/// The depths with room for the margin about them.
+DepthMap padded(const BackProjection& volume, const std::vector<double>& depth) {
+  constexpr int kRoom = kRings + kSide;
+  const int width = static_cast<int>(volume.across.size()), height = static_cast<int>(volume.up.size());
+  DepthMap map{width + 2 * kRoom, height + 2 * kRoom, {}};
+  map.depth.assign(static_cast<std::size_t>(map.width) * map.height, kNone);
+  for (int u = 0; u < height; ++u)
+    for (int a = 0; a < width; ++a) map.at(a + kRoom, u + kRoom) = depth[u * width + a];
+  return map;
+}
+
+/// The pieces that hang together without jumps of more than `jump` from line to line, each alone.
+std::vector<DepthMap> pieces(const DepthMap& map, double jump) {
+  std::vector<DepthMap> result;
+  DepthMap left = map;
+  for (int start = 0; start < static_cast<int>(map.depth.size()); ++start) {
+    if (!std::isfinite(left.depth[start])) continue;
+    DepthMap piece = map.changed([](int, int) { return kNone; });
+    std::vector<std::pair<int, int>> open{{start % map.width, start / map.width}};
+    piece.depth[start] = left.depth[start];
+    left.depth[start] = kNone;
+    while (!open.empty()) {
+      const auto [a, u] = open.back();
+      open.pop_back();
+      for (const auto& [da, du] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+        if (!left.has(a + da, u + du) || std::abs(left.at(a + da, u + du) - map.at(a, u)) > jump) continue;
+        piece.at(a + da, u + du) = left.at(a + da, u + du);
+        left.at(a + da, u + du) = kNone;
+        open.emplace_back(a + da, u + du);
+      }
+    }
+    result.push_back(std::move(piece));
+  }
+  return result;
+}
+
+bool meet(const DepthMap& one, const DepthMap& other, double jump) {
+  for (std::size_t i = 0; i < one.depth.size(); ++i)
+    if (std::abs(one.depth[i] - other.depth[i]) <= jump) return true;
+  return false;
+}
+
+/// With what margins make one part of put together.
+std::vector<DepthMap> joined(std::vector<DepthMap> parts, double jump) {
+  std::vector<DepthMap> grown;
+  for (const DepthMap& part : parts) grown.push_back(part.grown());
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    for (std::size_t k = i + 1; k < parts.size(); ++k) {
+      if (!meet(grown[i], grown[k], jump)) continue;
+      parts[i] =
+          parts[i].changed([&](int a, int u) { return parts[i].has(a, u) ? parts[i].at(a, u) : parts[k].at(a, u); });
+      grown[i] = parts[i].grown();
+      parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(k));
+      grown.erase(grown.begin() + static_cast<std::ptrdiff_t>(k));
+      k = i;  // what is larger now may meet others
+    }
+  return grown;
+}
+
+/// Which cells, of kSide x kSide lines, have triangles: those with all corners and no jump between them, no two of which touch at a
+/// corner alone.
+std::set<std::pair<int, int>> cells(const DepthMap& map, double jump) {
+  std::set<std::pair<int, int>> result;
+  for (int u = 0; u + kSide < map.height; u += kSide)
+    for (int a = 0; a + kSide < map.width; a += kSide) {
+      const auto [low, high] =
+          std::minmax({map.at(a, u), map.at(a + kSide, u), map.at(a, u + kSide), map.at(a + kSide, u + kSide)});
+      const bool whole =
+          map.has(a, u) && map.has(a + kSide, u) && map.has(a, u + kSide) && map.has(a + kSide, u + kSide);
+      if (whole && high - low <= jump) result.emplace(a, u);
+    }
+  for (bool touching = true; touching;) {
+    touching = false;
+    for (const auto& [a, u] : result) {
+      for (const int side : {-kSide, kSide})
+        touching = touching || (result.contains({a + side, u + kSide}) && !result.contains({a + side, u}) &&
+                                !result.contains({a, u + kSide}));
+      if (touching) {
+        result.erase({a, u});
+        break;
+      }
+    }
+  }
+  return result;
+}
+
+/// Vertices in the wall's frame, as if a voxel were 1 wide across and up.
+Mesh meshed(const DepthMap& map, double jump) {
+  Mesh mesh;
+  std::map<std::pair<int, int>, int> numbers;
+  const auto vertex = [&](int a, int u) {
+    const auto [entry, is_new] = numbers.emplace(std::pair{a, u}, static_cast<int>(mesh.positions.size()));
+    if (is_new) mesh.positions.push_back({static_cast<double>(a), static_cast<double>(u), map.at(a, u)});
+    return entry->second;
+  };
+  for (const auto& [a, u] : cells(map, jump)) {
+    const std::array corners{vertex(a, u), vertex(a, u + kSide), vertex(a + kSide, u + kSide), vertex(a + kSide, u)};
+    const auto depth = [&](int k) { return mesh.positions[corners[k]].z; };
+    // Along the diagonal over which the sheet bends less.
+    const int first = std::abs(depth(1) - depth(3)) < std::abs(depth(0) - depth(2)) ? 1 : 0;
+    const auto corner = [&](int k) { return corners[(first + k) % 4]; };
+    mesh.faces.push_back({corner(0), corner(1), corner(2)});
+    mesh.faces.push_back({corner(0), corner(2), corner(3)});
+  }
+  return mesh;
+}
+
+void round_borders(Mesh& mesh) {
+  std::set<std::pair<int, int>> sides;
+  for (const auto& face : mesh.faces)
+    for (int k = 0; k < 3; ++k) sides.emplace(face[k], face[(k + 1) % 3]);
+  std::map<int, std::array<int, 2>> neighbours;  // of border vertices, before and after
+  for (const auto& [from, to] : sides)
+    if (!sides.contains({to, from})) {
+      neighbours[from][1] = to;
+      neighbours[to][0] = from;
+    }
+  for (int round = 0; round < kRoundings; ++round) {
+    const std::vector<Vec3> old = mesh.positions;
+    for (const auto& [v, beside] : neighbours)
+      mesh.positions[v] = 0.5 * old[v] + 0.25 * (old[beside[0]] + old[beside[1]]);
+  }
+}
+
+}  // namespace
+
+Mesh start_surface(const BackProjection& volume, const FirstSurface& first) {
+  Mesh result;
+  if (volume.depth.empty() || volume.across.size() < 2) return result;
+  const double voxel = volume.across[1] - volume.across[0];
+  const DepthMap map = padded(volume, first.depth);
+  const double least = 0.125 * std::numbers::pi * volume.lateral_resolution * volume.lateral_resolution;
+  std::vector<DepthMap> parts = pieces(map, kSteepestJoint * voxel);
+  std::erase_if(parts, [&](const DepthMap& part) {
+    const auto count = std::count_if(part.depth.begin(), part.depth.end(), [](double d) { return std::isfinite(d); });
+    return static_cast<double>(count) * voxel * voxel < least;
+  });
+  const double jump = kSteepestJoint * std::numbers::sqrt2 * kSide * voxel;
+  const double left = volume.across[0] - 0.5 * voxel * (map.width - static_cast<int>(volume.across.size())),
+               bottom = volume.up[0] - 0.5 * voxel * (map.height - static_cast<int>(volume.up.size()));
+  for (const DepthMap& part : joined(std::move(parts), jump)) {
+    Mesh mesh = meshed(part.smooth(), jump);
+    round_borders(mesh);
+    const int before = static_cast<int>(result.positions.size());
+    for (const Vec3& p : mesh.positions)
+      result.positions.push_back(volume.frame.to_capture({left + p.x * voxel, bottom + p.y * voxel, p.z}));
+    for (const auto& face : mesh.faces) result.faces.push_back({face[0] + before, face[1] + before, face[2] + before});
+  }
+  return result;
+}
+
+}  // namespace isochron
