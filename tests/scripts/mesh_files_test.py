@@ -15,7 +15,7 @@ PROGRAM = sys.argv.pop(1)
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "app/python"))
 import numpy as np
 from isochron.errors import InputError
-from isochron.mesh_files import read_mesh, read_polygons, read_run_mesh, read_scene_mesh
+from isochron.mesh_files import read_mesh, read_polygons, read_run_mesh, read_run_surface, read_scene_mesh, read_vertex_values
 
 FIELD = pathlib.Path(__file__).resolve().parents[1] / "data/field"
 POINTS = [(0, 0, 0), (1.1, 0, 0), (1.1, 1, 0), (0, 1, 0), (0.5, 0.5, 0.7)]  # a pyramid; 1.1 and 0.7 are no floats
@@ -107,6 +107,28 @@ class MeshFilesTest(unittest.TestCase):
         mesh = read_polygons(self.folder / "a.obj")
         self.assertEqual([list(face) for face in mesh.faces], [list(face) for face in FACES])
         np.testing.assert_array_equal(mesh.normals, [(0, 0, -1)])
+
+    def test_values_of_vertices(self):
+        points = [(9, 9, 9), *POINTS]  # the first has no face
+        head = ("ply\nformat {}\nelement vertex 6\nproperty double x\nproperty double y\nproperty double z\nproperty double albedo\n"
+                "property float standard_error\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n")
+        rows = [struct.pack("<4df", *point, 0.1 * i, float("nan") if i == 2 else 0.5 * i) for i, point in enumerate(points)]
+        faces = [struct.pack("<B3i", 3, *(i + 1 for i in face)) for face in TRIANGLES]
+        binary = self.write("a.ply", head.format("binary_little_endian 1.0").encode() + b"".join(rows + faces))
+        lines = [f"{x} {y} {z} {0.1 * i} {'nan' if i == 2 else 0.5 * i}" for i, (x, y, z) in enumerate(points)]
+        lines += [f"3 {a + 1} {b + 1} {c + 1}" for a, b, c in TRIANGLES]
+        text = self.write("b.ply", (head.format("ascii 1.0") + "\n".join(lines) + "\n").encode())
+        for path in (binary, text):
+            np.testing.assert_allclose(read_vertex_values(path, "albedo"), 0.1 * np.arange(6), rtol=1e-15)
+            np.testing.assert_array_equal(read_vertex_values(path, "standard_error"), [0, 0.5, np.nan, 1.5, 2, 2.5])
+            found, triangles, values = read_run_surface(path)
+            np.testing.assert_array_equal(found[triangles], np.array(POINTS)[TRIANGLES])
+            self.assertEqual(list(values), ["albedo", "standard_error"])
+            np.testing.assert_array_equal(values["standard_error"], [0.5, np.nan, 1.5, 2, 2.5])
+            with self.assertRaisesRegex(InputError, r"ply: vertices have no property 'x' \(there are: albedo, standard_error\)$"):
+                read_vertex_values(path, "x")
+        with self.assertRaisesRegex(InputError, r"obj: vertices have no property 'albedo' \(there are: none\)$"):
+            read_vertex_values(self.write("c.obj", obj()), "albedo")
 
     def test_vertices_are_numbered_as_the_program_does(self):
         (self.folder / "experiment.yaml").write_text(EXPERIMENT)

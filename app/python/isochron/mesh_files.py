@@ -2,7 +2,7 @@
 
 import re
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,12 +13,13 @@ from isochron.errors import InputError
 class Polygons:
     """`points` [N, 3] and `faces`, lists of numbers of points that run counter-clockwise seen from the outside, or an array
     where all are as long. Where the file gives normals, they are `normals` [M, 3], and `corners` are numbers of them, as
-    faces are of points."""
+    faces are of points. `values` are what a PLY file says beside that of its vertices: name -> [N]."""
 
     points: np.ndarray
     faces: list | np.ndarray
     normals: np.ndarray | None = None
     corners: list | np.ndarray | None = None
+    values: dict = field(default_factory=dict)
 
     def triangles(self):
         """[M, 3], of polygons cut as the program does: from their first corner where they are convex, else so that the area is
@@ -105,9 +106,23 @@ def read_mesh(path):
 
 def read_run_mesh(path):
     """A mesh that a run wrote, with the vertices alone that have a face: those that parameters have values for."""
-    points, triangles = read_mesh(path)
-    used, triangles = np.unique(triangles, return_inverse=True)
-    return points[used], triangles.reshape(-1, 3)
+    return read_run_surface(path)[:2]
+
+
+def read_run_surface(path):
+    """As read_run_mesh, and what the file says of these vertices: name -> [N], such as `albedo`."""
+    mesh = read_polygons(path)
+    triangles = mesh.triangles()
+    used, renumbered = np.unique(triangles, return_inverse=True)
+    return mesh.points[used], renumbered.reshape(triangles.shape), {name: each[used] for name, each in mesh.values.items()}
+
+
+def read_vertex_values(path, name):
+    """A property of a PLY file's vertices [N], as the file counts them. Raises InputError, also where there is none."""
+    values = read_polygons(path).values
+    if name not in values:
+        raise InputError(f"{path}: vertices have no property '{name}' (there are: {', '.join(values) or 'none'})")
+    return values[name]
 
 
 def name_in_files(shape):
@@ -222,10 +237,13 @@ def _read_ply(data):
     points = np.stack([vertices[axis] for axis in "xyz"], axis=1).astype(float)
     faces = faces["vertex_indices" if "vertex_indices" in faces else "vertex_index"]
     faces = faces.astype(int) if isinstance(faces, np.ndarray) else [np.asarray(face, int).tolist() for face in faces]
+    places = [f"{kind}{axis}" for kind in ("", "n") for axis in "xyz"]
+    values = {name: np.array(vertices[name], float) for name, kind in next(properties for element, _, properties in elements if element == "vertex")
+              if not isinstance(kind, list) and name not in places}
     if "nx" not in vertices:
-        return Polygons(points, faces)
+        return Polygons(points, faces, values=values)
     normals = np.stack([vertices["n" + axis] for axis in "xyz"], axis=1).astype(float)
-    return Polygons(points, faces, normals, faces)
+    return Polygons(points, faces, normals, faces, values)
 
 
 class _BinaryRows:
