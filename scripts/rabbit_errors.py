@@ -19,6 +19,7 @@ import numpy as np
 
 import use_package
 from isochron.mesh_files import read_mesh
+from isochron.pictures.raster import Seen
 
 SCENE = pathlib.Path(__file__).resolve().parents[1] / "scenes/rabbit"
 STEP = 0.002  # metres
@@ -28,19 +29,7 @@ HALF = 0.3
 def depths(vertices, triangles):
     """Distance from the wall on a grid of lines at right angles to it; NaN where nothing is met."""
     along = np.arange(-HALF, HALF, STEP)
-    seen = np.full((len(along), len(along)), np.nan)
-    for a, b, c in vertices[triangles]:
-        low, high = (np.searchsorted(along, f((a, b, c), axis=0)[:2]) for f in (np.min, np.max))
-        area = np.cross(b[:2] - a[:2], c[:2] - a[:2])
-        if (low == high).any() or area == 0:
-            continue
-        x, y = np.meshgrid(along[low[0]:high[0]] - a[0], along[low[1]:high[1]] - a[1])
-        v = (x * (c[1] - a[1]) - y * (c[0] - a[0])) / area
-        w = (y * (b[0] - a[0]) - x * (b[1] - a[1])) / area
-        depth = np.where((v >= 0) & (w >= 0) & (v + w <= 1), a[2] + v * (b[2] - a[2]) + w * (c[2] - a[2]), np.nan)
-        part = seen[low[1]:high[1], low[0]:high[0]]
-        part[:] = np.fmin(part, depth)
-    return seen
+    return Seen(vertices, triangles, along, along).depth
 
 
 def errors(vertices, triangles):

@@ -129,6 +129,7 @@ class PlotCaptureTest(unittest.TestCase):
             result = subprocess.run(command, capture_output=True, text=True, check=False)
             self.assertEqual((result.returncode, result.stdout, result.stderr), (0, "", ""))
             self.assert_picture()
+        self.assertFalse((self.folder / "surface.png").exists())  # of reconstructions alone
         self.assert_drawn("-o", self.folder / "other.png", png=self.folder / "other.png")
 
     def test_bent_surface_mask_and_window(self):

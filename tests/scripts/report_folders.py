@@ -3,6 +3,7 @@
 import html.parser
 import json
 import pathlib
+import shutil
 import struct
 import sys
 
@@ -54,9 +55,12 @@ COLUMNS = ["height", "colour[0]", "colour[1]", "colour[2]"]
 TRIANGLES = [(0, 1, 2), (0, 2, 3)]
 
 
-def write_ply(path, points, triangles):
-    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\nproperty double x\nproperty double y\n"
-            f"property double z\nelement face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n")
+def write_ply(path, points, triangles, **values):
+    """values: of the vertices, by the property's name."""
+    properties = "".join(f"property double {name}\n" for name in ("x", "y", "z", *values))
+    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{properties}"
+            f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n")
+    points = np.column_stack([points, *values.values()])
     faces = b"".join(struct.pack("<B3i", 3, *t) for t in triangles)
     path.write_bytes(head.encode() + np.asarray(points, "<f8").tobytes() + faces)
 
@@ -106,7 +110,7 @@ def write_run(folder, status="iterations_reached", name="box", channels="Y", fra
     return folder
 
 
-def write_capture_run(folder, bins=40, columns=6, rows=5):
+def write_capture_run(folder, bins=40, columns=6, rows=5, shape="board"):
     (folder / "inputs/scene").mkdir(parents=True)
     (folder / "frames").mkdir()
     (folder / "geometry").mkdir()
@@ -116,8 +120,8 @@ def write_capture_run(folder, bins=40, columns=6, rows=5):
     (folder / "experiment.yaml").write_text(
         "name: small\nscene: inputs/scene/s.yaml\ngates: {kind: bins, unit: ps, scene_unit_m: 1}\nloss: {kind: poisson}\n"
         "optimizer: {method: quasi_newton, iterations: 2}\ntarget: {samples: 64}\nparameters:\n"
-        "  - {name: z, type: translation, shape: board, direction: [0, 0, 1], initial: 0, target: 0.02}\n"
-        "  - {name: paint, type: albedo, per: vertex, shape: board, initial: 0.5}\n")
+        f"  - {{name: z, type: translation, shape: {shape}, direction: [0, 0, 1], initial: 0, target: 0.02}}\n"
+        f"  - {{name: paint, type: albedo, per: vertex, shape: {shape}, initial: 0.5}}\n")
     (folder / "summary.yaml").write_text(
         "status: iterations_reached\niterations: 2\nstandard_errors_from: gauss_newton_products\nstandard_errors:\n"
         "  z: 0.0005\n  paint: [0.1, 0.1, 0.2, .inf]\nundetermined: [paint]\nsteps_left:\n  z: 0.25\ncombinations:\n"
@@ -137,9 +141,25 @@ def write_capture_run(folder, bins=40, columns=6, rows=5):
         exr.write(folder / f"{name}.exr", {f"gate{g:03d}.Y": layer.T for g, layer in enumerate(light)}, notes)
     square = np.array([[-0.2, 0.2, 0.5], [0.2, 0.2, 0.5], [0.2, -0.2, 0.5], [-0.2, -0.2, 0.5]])
     for moment, z in (("initial", 0), ("final", 0.019), ("target", 0.02)):
-        write_ply(folder / f"geometry/{moment}_board.ply", square + [0, 0, z], TRIANGLES)
+        write_ply(folder / f"geometry/{moment}_{shape}.ply", square + [0, 0, z], TRIANGLES)
     (folder / "log.csv").write_text("iteration,seconds,loss,z,paint[0],loss_noise\n"
                                     "0,1,2,0,0.5,0.1\n1,2,1,0.01,0.4,0.1\n2,3,0.6,0.019,0.2,0.1\n")
+    return folder
+
+
+def write_reconstruction(folder):
+    """A run in one level, whose fit is a square, and what is seen of it by back-projection: two triangles that do not touch."""
+    level = write_capture_run(folder / "levels/1", shape="surface")
+    shutil.copytree(level, folder, dirs_exist_ok=True)
+    with open(folder / "summary.yaml", "a") as summary:
+        summary.write("fit: {deviance: 1234.5, degrees_of_freedom: 1000, floor: 1200, p_value: 0.3, verdict: explained}\n"
+                      "start: {method: back_projection, seconds: 2.5, significance: 41.75}\n"
+                      "levels:\n  - {edge_length: 0.01, vertices: 4, iterations: 2, loss: 0.5, seconds: 3.5, status: converged}\n")
+    square = np.array([[-0.2, 0.2, 0.5], [0.2, 0.2, 0.5], [0.2, -0.2, 0.6], [-0.2, -0.2, 0.6]])
+    write_ply(folder / "geometry/final_surface.ply", square, [t[::-1] for t in TRIANGLES], albedo=[0.2, 0.4, 0.6, 0.8],
+              standard_error=[0.001, 0.002, 0.003, np.nan])
+    parts = np.array([[-0.2, 0.2, 0.51], [-0.05, 0.2, 0.51], [-0.2, 0, 0.51], [0.05, -0.2, 0.62], [0.2, 0, 0.62], [0.2, -0.2, 0.62]])
+    write_ply(folder / "back_projection.ply", parts, [(0, 1, 2), (3, 4, 5)], albedo=[1, 2, 3, 4, 5, 6])
     return folder
 
 

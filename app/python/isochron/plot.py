@@ -1,6 +1,6 @@
 """Draws what the program wrote into a folder: a false-colour PNG beside every EXR, residual.png (final - target), and
-rmse.png from log.csv; of the run of a capture also capture.png (plot_capture.py). With --pixel or --row, instead of
-these, one pixel's or one row's light over the gates.
+rmse.png from log.csv; of the run of a capture also capture.png (plot_capture.py), and of a reconstruction surface.png. With
+--pixel or --row, instead of these, one pixel's or one row's light over the gates.
 
 usage: plot.py DIR [--pixel COLUMN,ROW] [--row ROW]
 
@@ -82,6 +82,8 @@ class Pictures:
             self.attempt(plot_log, self.log, self.log, self.folder.experiment, quantity)
         if (self.directory / "final.h5").exists():  # only captures have it
             self.attempt(self.draw_capture, self.directory / "capture.png")
+        if (self.directory / "back_projection.ply").exists():  # only reconstructions have it
+            self.attempt(self.draw_surface, self.directory / "surface.png")
 
     def draw_capture(self):
         # Imported here as h5py and SciPy take longer to load than most folders to be drawn.
@@ -89,6 +91,12 @@ class Pictures:
         from isochron.pictures.capture_sheet import draw_sheet
 
         draw_sheet(CaptureRun(self.directory), self.directory / "capture.png")
+
+    def draw_surface(self):
+        from isochron.pictures.found_surface import FoundSurface
+        from isochron.pictures.surface_sheet import draw_surface_sheet
+
+        draw_surface_sheet(FoundSurface(self.directory), self.directory / "surface.png")
 
     def draw_residual(self):
         final, target = (self.stacks.get(self.directory / f"{name}.exr", {}).get("") for name in ("final", "target"))

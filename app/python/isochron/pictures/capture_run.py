@@ -18,10 +18,11 @@ METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time;
 
 
 class Surface:
-    """A shape as the fit left it: vertices in the wall's frame, an albedo for each of them or None."""
+    """A shape as the fit left it: vertices in the wall's frame; for each of them, or None, an albedo and the standard error of its
+    place along the normal, in metres."""
 
-    def __init__(self, name, points, triangles, albedo):
-        self.name, self.points, self.triangles, self.albedo = name, points, triangles, albedo
+    def __init__(self, name, points, triangles, albedo, errors=None):
+        self.name, self.points, self.triangles, self.albedo, self.errors = name, points, triangles, albedo, errors
 
 
 class CaptureRun:
@@ -66,7 +67,6 @@ class CaptureRun:
         self.fit = light[first].reshape(len(light), points.shape[0], -1)
         self.points = points.reshape(points.shape[0], -1, 3)
         self.delta, self.start = capture.delta_t, capture.t_start
-        normals = capture.normals.reshape(-1, 3)
         laser = (points if capture.laser is None else capture.laser).reshape(-1, 3)
         origins = capture.origins
         flat = self.points.reshape(-1, 3)
@@ -77,7 +77,7 @@ class CaptureRun:
         if origins:
             self.extra = sum(np.linalg.norm(ends - origin, axis=-1)
                              for ends, origin in zip((self.laser, self.points), origins))
-        self.wall = Wall(self.points, normals)
+        self.wall = Wall.of(capture)
         self.lengths = self.start + self.delta * np.arange(len(self.fit) + 1)  # borders of the bins
         self.times = self.lengths / METRES_PER_PS
 

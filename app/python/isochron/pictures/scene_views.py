@@ -77,7 +77,7 @@ class Views:
         self.figure.colorbar(mesh, cax=axes.inset_axes([1.025, 0, 0.04, 1]), extend=extend).set_label(label)
 
 
-def _scale_of_albedo(values):
+def scale_of_albedo(values):
     """0 to a high percentile: single vertices that hardly any light reaches can have any albedo."""
     values = np.concatenate(values)
     return 0.0, max(float(np.percentile(values, 99)), 1e-6), bool(values.max() > np.percentile(values, 99))
@@ -92,7 +92,7 @@ def draw_views(figure, run, chosen, with_box=True):
     has_paint, has_depth = (any(v is not None for v in values) for values in (painted, bent))
     views = Views(figure, run, low, high, chosen, 1 + has_paint + has_depth, with_box)
     if has_paint:
-        first, last, beyond = _scale_of_albedo([v for v in painted if v is not None])
+        first, last, beyond = scale_of_albedo([v for v in painted if v is not None])
         views.add("Recovered albedo, seen from the wall",
                   lambda axes: draw_surfaces(axes, run, painted, "inferno", (first, last)), "albedo",
                   "max" if beyond else "neither")

@@ -41,6 +41,11 @@ class Wall:
         low, high = self.points[..., :2].reshape(-1, 2).min(axis=0), self.points[..., :2].reshape(-1, 2).max(axis=0)
         self.low, self.high = low, high
 
+    @classmethod
+    def of(cls, capture):
+        """That of a capture's sensor points; those in no order are one row."""
+        return cls(capture.points.reshape(len(capture.points), -1, 3), capture.normals.reshape(-1, 3))
+
     def place(self, points):
         """(across, up, distance from the wall) of points of the world."""
         return np.stack([points @ self.across.unit - self.across.zero, points @ self.up.unit - self.up.zero,
