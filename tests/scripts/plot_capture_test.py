@@ -275,6 +275,8 @@ class WallTest(unittest.TestCase):
         # 0.1 m along the columns is to the left.
         place = wall.place(np.array([0.1, 0.2, 0.3]) @ turn + [1, 2, 3])
         np.testing.assert_allclose(place, [-0.1, 2.2, 0.3], atol=1e-12)
+        places = generator(2).uniform(-1, 1, (5, 3))
+        np.testing.assert_allclose(wall.place(wall.world(places)), places, atol=1e-12)
 
     def test_one_row_has_y_up_and_a_floor_x(self):
         self.assertEqual(Wall(grid(4, 1), np.array([[0, 0, 1.0]])).up.label, "y (m)")

@@ -28,6 +28,8 @@ except ImportError:
 
 import numpy as np
 from PIL import Image
+from report_folders import write_reconstruction
+from isochron.report.__main__ import main as write_report
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 DRIVER = shutil.which("chromedriver")
@@ -74,6 +76,8 @@ class BrowserTest(unittest.TestCase):
         cls.runs["comparison"] = pathlib.Path(folder.name) / "comparison.html"
         folders = [cls.runs[name].parent for name in EXPERIMENTS]
         subprocess.run([PROGRAM, "report", *folders, "-o", cls.runs["comparison"], "--quiet"], check=True)
+        cls.runs["reconstruction"] = pathlib.Path(folder.name) / "reconstruction/report.html"
+        write_report([str(write_reconstruction(cls.runs["reconstruction"].parent))])
         cls.browser = open_browser()
         cls.addClassCleanup(cls.browser.quit)
 
@@ -112,7 +116,7 @@ class BrowserTest(unittest.TestCase):
         self.assertEqual(missing, [])
 
     def test_pictures_load_and_nothing_else(self):
-        for name, least in (("cube", 12 + 4), ("letter", 3 + 1 + 4), ("comparison", 3)):
+        for name, least in (("cube", 12 + 4), ("letter", 3 + 1 + 4), ("comparison", 3), ("reconstruction", 5)):
             for scheme in ("light", "dark"):
                 self.open(name, scheme)
                 self.assertGreaterEqual(len(self.find("img")), least, name)
@@ -152,26 +156,52 @@ class BrowserTest(unittest.TestCase):
         self.assertNotEqual(self.find("#capture img")[0].get_attribute("src"), last)
         self.assert_pictures_are_there()
 
+    def view(self):
+        """Pixels of the canvas alone, without the mark of focus around it."""
+        data = self.script("return arguments[0].toDataURL().split(',')[1]", self.find("#view")[0])
+        return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA")).astype(int)
+
+    def test_surfaces_have_colours_that_keys_switch(self):
+        self.open("reconstruction")
+        shown = {}
+        button = self.find("input[value=albedo]")[0]
+        for layer, key in (("albedo", None), ("uncertainty", Keys.ARROW_RIGHT), ("shape", Keys.ARROW_RIGHT)):
+            if key:
+                button.send_keys(key)
+                button = self.script("return document.activeElement")
+            self.assertEqual(self.find("input[name=layer]:checked")[0].get_attribute("value"), layer)
+            self.assertEqual([s.get_attribute("data-layer") for s in self.find("[data-layer]") if s.is_displayed()],
+                             [layer] if layer != "shape" else [])
+            shown[layer] = self.view()
+            self.shot(f"reconstruction_{layer}", "#geometry")
+        middle = shown["shape"].shape[1] // 2
+
+        def colours(layer):  # of what is drawn of the fit in full, in the right half
+            part = shown[layer][:, middle:]
+            return part[(part[..., 3] == 255) & (np.ptp(part[..., :3], axis=-1) > 20)][:, :3]
+
+        self.assertGreater(len(colours("shape")), 1000)
+        self.assertTrue((colours("shape")[:, 2] > colours("shape")[:, 0]).all())  # the page's blue
+        for layer in ("albedo", "uncertainty"):
+            self.assertGreater(np.count_nonzero(np.abs(shown[layer] - shown["shape"]).sum(-1) > 60), 1000, layer)
+            self.assertGreater((colours(layer)[:, 0] > colours(layer)[:, 2]).mean(), 0.3, layer)  # inferno, plasma: warm
+        self.assertGreater(np.count_nonzero(np.abs(shown["albedo"] - shown["uncertainty"]).sum(-1) > 60), 1000)
+
     def test_geometry_turns(self):
         self.open("cube")
         canvas, = self.find("#view")
-
-        def pixels():  # of the canvas alone, without the mark of focus around it
-            data = self.script("return arguments[0].toDataURL().split(',')[1]", self.find("#view")[0])
-            return np.asarray(Image.open(io.BytesIO(base64.b64decode(data))).convert("RGBA")).astype(int)
-
-        first = pixels()
+        first = self.view()
         self.assertGreater(np.ptp(first, axis=(0, 1)).max(), 150)
         canvas.send_keys(Keys.ARROW_LEFT, "+")
-        turned = pixels()
+        turned = self.view()
         self.shot("cube_turned", "#geometry")
         self.assertGreater(np.count_nonzero(np.abs(turned - first).sum(-1) > 60), 500)
         canvas.send_keys(Keys.HOME)
-        self.assertEqual(np.abs(pixels() - first).max(), 0)
+        self.assertEqual(np.abs(self.view() - first).max(), 0)
         self.find("#edges")[0].click()
-        self.assertGreater(np.abs(pixels() - first).max(), 60)
+        self.assertGreater(np.abs(self.view() - first).max(), 60)
         self.open("cube", "dark")
-        self.assertGreater(np.count_nonzero(np.abs(pixels() - first).sum(-1) > 60), 500)
+        self.assertGreater(np.count_nonzero(np.abs(self.view() - first).sum(-1) > 60), 500)
 
     def test_charts_tell_values(self):
         self.open("cube")

@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """isochron.report on folders of runs in every state: what the pages say, and that everybody can read them."""
 
+import base64
 import contextlib
 import fcntl
 import io
@@ -12,7 +13,7 @@ import tempfile
 import time
 import unittest
 
-from report_folders import EXPERIMENT, Page, images, write_capture_run, write_log, write_run
+from report_folders import EXPERIMENT, Page, images, write_capture_run, write_log, write_reconstruction, write_run
 import numpy as np
 from isochron import exr
 from isochron.report import __main__ as program
@@ -246,6 +247,50 @@ class ReportTest(unittest.TestCase):
         self.assertIn("Seen from the wall", page.words)
         (self.folder / "final.h5").unlink()  # not finished
         self.assertNotIn("Histograms", self.page().words)
+
+    def view(self):
+        return json.loads(re.search(r'id="view-data">(.*?)</script>', self.text)[1])
+
+    def test_reconstruction(self):
+        write_reconstruction(self.folder)
+        page = self.page()
+        self.assertEqual([words for level, words in page.headings if level == 2][:4],
+                         ["How it ended", "The surface", "Geometry", "Parameters"])
+        for words in ("The fit explains the data: deviance 1234.5", "Levels, of which the page shows the last",
+                      "Begun from back projection, significant by 41.8 standard deviations of the counts' noise, which took 2.5 s.",
+                      "Seen from the wall: depth, albedo and standard error of the surface, and depth and albedo by back-projection."):
+            self.assertIn(words, page.words)
+        switches = page.all("input", type="radio", name="layer")
+        self.assertEqual([(s["value"], "checked" in s) for s in switches], [("shape", False), ("albedo", True), ("uncertainty", False)])
+        self.assertEqual([("hidden" in d) for d in page.all("div") if "data-layer" in d], [False, True])
+        view = self.view()
+        self.assertEqual(view["names"], {"initial": "back-projection", "current": "fit"})
+        self.assertEqual([list(m["layers"]) for m in view["meshes"]], [["albedo"], ["albedo", "uncertainty"]])
+
+        def values(mesh, key, kind):
+            return np.frombuffer(base64.b64decode(mesh[key]), kind).reshape(-1, 3)
+
+        fit = view["meshes"][1]
+        np.testing.assert_allclose(values(fit, "points", "<f4")[0], [-0.2, 0.2, 0.5], rtol=1e-6)  # the capture's coordinates
+        np.testing.assert_array_equal(values(fit, "triangles", "<u4"), [(2, 1, 0), (3, 2, 0)])
+        for layer in ("albedo", "uncertainty"):
+            colours = values(fit["layers"], layer, "u1").astype(int)
+            self.assertEqual(len(np.unique(colours, axis=0)), 4)
+            self.assertGreater(colours[3].min(), 0.7 * 255)  # nothing is known of the last vertex: pale
+            self.assertLess(colours[:3].min(axis=1).max(), 0.6 * 255)
+        self.assertEqual(len(view["lines"]), 1)  # the wall; the scene's surface is not drawn twice
+
+    def test_reconstruction_that_lacks_something(self):
+        write_reconstruction(self.folder)
+        (self.folder / "geometry/final_surface.ply").unlink()
+        page = self.page()
+        self.assertIn("Seen from the wall: depth and albedo by back-projection, which it was begun from.", page.words)
+        self.assertEqual(page.all("input", type="radio"), [])
+        self.assertEqual(self.view()["names"], {"initial": "initial", "current": "final", "target": "target"})
+        (self.folder / "back_projection.ply").write_bytes(b"ply")
+        page = self.page()
+        self.assertIn("back_projection.ply: is no PLY file", page.words)
+        self.assertNotIn("The surface", [words for _, words in page.headings])
 
     def test_several_runs(self):
         write_run(self.folder)

@@ -11,7 +11,8 @@ from isochron.pictures.capture_run import METRES, Surface
 from isochron.pictures.reading import PlotError, numbers, read_yaml
 from isochron.pictures.wall import Wall
 
-FIT, BACK_PROJECTION = "geometry/final_surface.ply", "back_projection.ply"
+SHAPE = "surface"  # as reconstructions name it in their scenes
+FIT, BACK_PROJECTION = f"geometry/final_{SHAPE}.ply", "back_projection.ply"
 
 
 def width_at_half(offsets, values):
@@ -29,6 +30,8 @@ def width_at_half(offsets, values):
 
 class FoundSurface:
     """`surfaces` are those of the fit and of back-projection, in this order, of which the first may be missing."""
+
+    shape = SHAPE
 
     def __init__(self, directory):
         self.directory = directory

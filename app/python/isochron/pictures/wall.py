@@ -51,6 +51,12 @@ class Wall:
         return np.stack([points @ self.across.unit - self.across.zero, points @ self.up.unit - self.up.zero,
                          (points - self.middle) @ self.normal], axis=-1)
 
+    def world(self, places):
+        """The opposite of `place`."""
+        across, up, depth = np.moveaxis(np.asarray(places)[..., np.newaxis], -2, 0)
+        return ((across + self.across.zero) * self.across.unit + (up + self.up.zero) * self.up.unit
+                + (depth + self.middle @ self.normal) * self.normal)
+
     def spread_points(self, used):
         """Numbers (column, row) of four sensor points, or as many as there are, spread over those that are `used`: first
         the upper left as seen from the wall, then the upper right and the lower two; along a line, from the left."""

@@ -7,8 +7,10 @@ import numpy as np
 from isochron.errors import InputError
 from isochron.mesh_files import name_in_files, read_run_mesh, read_scene_mesh
 from isochron.report.markup import Markup, data_for_scripts, element, section
+from isochron.report.surface import colours_of, found_surface, layer_switch
 
 MOST_TRIANGLES = 2500  # of a mesh; larger ones are shown coarser
+MOST_OF_FOUND = 6000  # of what a reconstruction found, whose colours need more
 MOST_LINES = 1500  # of a shape's outline
 ROUND_TRIANGLES = 100  # of the net of a shape without sharp edges
 SHARP, FOLDED = np.cos(np.radians((30, 0.2)))  # angles of edges that are drawn, of what stands still and of what moves
@@ -60,11 +62,15 @@ class Geometry:
     def __init__(self, run):
         self.run, self.meshes, self.lines, self.marks, self.notes = run, [], [], [], []
         self.up, self.eye, self.look = np.array([0.0, 1, 0]), None, None
-        self.moved = {}
-        for moment in ("initial", "current", "target"):
-            self._find(moment)
-        if self.moved:
+        self.moved, self.coarse, self.names, self.bars = {}, [], {}, {}
+        found = found_surface(run)
+        if found and found.fit:
+            self._add_found(found)
+        else:
+            for moment in ("initial", "current", "target"):
+                self._find(moment)
             self._add_meshes()
+        if self.meshes:
             self._read_scene()
 
     def _find(self, moment):
@@ -78,16 +84,32 @@ class Geometry:
                         self.moved.setdefault(shape, {})[moment] = mesh
 
     def _add_meshes(self):
-        self.coarse = []
         for shape, moments in self.moved.items():
             names = [m for m in moments if len(moments[m][0]) == len(next(iter(moments.values()))[0])]
-            triangles = moments[names[0]][1]
-            points = [moments[m][0] for m in names]
-            if len(triangles) > MOST_TRIANGLES:
-                self.coarse.append(shape)
-                points, triangles = coarser(points, triangles)
+            points, triangles = self._coarser(shape, [moments[m][0] for m in names], moments[names[0]][1], MOST_TRIANGLES)
             for name, p in zip(names, points):
-                self.meshes.append({"shape": shape, "moment": name, "points": p, "triangles": triangles})
+                self.meshes.append({"shape": shape, "moment": name, "points": p, "triangles": triangles, "layers": {}})
+        present = {mesh["moment"] for mesh in self.meshes}
+        self.names = {m: "final" if m == "current" and self.run.ended else m for m in MOMENTS if m in present}
+
+    def _add_found(self, found):
+        """Back-projection stands where other runs have the initial shape."""
+        self.moved = {found.shape: {}}
+        for moment, surface in (("initial", found.back_projection), ("current", found.fit)):
+            layers, bars = colours_of(found, surface)
+            (points, *colours), triangles = self._coarser(surface.name, [found.wall.world(surface.points), *layers.values()],
+                                                          surface.triangles, MOST_OF_FOUND)
+            self.meshes.append({"shape": surface.name, "moment": moment, "points": points, "triangles": triangles,
+                                "layers": dict(zip(layers, colours))})
+            self.names[moment] = surface.name
+            for layer, bar in bars.items():
+                self.bars.setdefault(layer, []).append(bar)
+
+    def _coarser(self, shape, moments, triangles, most):
+        if len(triangles) <= most:
+            return moments, triangles
+        self.coarse.append(shape)
+        return coarser(moments, triangles, most)
 
     def _read_scene(self):
         path, scene = self.run.scene_path, self.run.scene
@@ -155,16 +177,17 @@ class Geometry:
         moving = np.concatenate([m["points"] for m in self.meshes])
         low, high = everything.min(axis=0), everything.max(axis=0)
         middle = (moving.min(axis=0) + moving.max(axis=0)) / 2
-        # The moving shapes are in the middle; of a scene that is far larger, what is about them.
+        # The moving shapes are in the middle; of a scene that is far larger, what is about them. What was found fills the view.
         size = float(np.linalg.norm(high - low)) / 2 or 1.0
         near = float(np.linalg.norm(np.ptp(moving, axis=0))) / 2 or size
         back = self.eye - middle if self.eye is not None else np.array([0.4, 0.3, 1.0])
         back = back / (np.linalg.norm(back) or 1)
         meshes = [{"shape": m["shape"], "moment": m["moment"], "points": packed(m["points"], "<f4"),
                    "triangles": packed(m["triangles"], "<u4"),
+                   "layers": {name: packed(np.rint(colours), "u1") for name, colours in m["layers"].items()},
                    "edges": packed(outline(m["points"], m["triangles"], FOLDED), "<u4")} for m in self.meshes]
         lines = [{"points": packed(p, "<f4"), "pairs": packed(pairs, "<u4")} for p, pairs in self.lines]
-        return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, 3.6 * near),
+        return {"meshes": meshes, "lines": lines, "middle": middle.tolist(), "radius": min(size, (1.3 if self.bars else 3.6) * near),
                 "up": self.up.tolist(), "back": back.tolist(), "marks": [[name, at.tolist()] for name, at in self.marks]}
 
 
@@ -175,13 +198,14 @@ def geometry_section(run):
     geometry = Geometry(run)
     if not geometry.meshes:
         return Markup("")
-    present = {mesh["moment"] for mesh in geometry.meshes}
-    names = {m: "final" if m == "current" and run.ended else m for m in MOMENTS if m in present}
+    names = geometry.names
     box = element("label", element("input", type="checkbox", checked=True, id="edges"), " ",
                   element("span", class_="key m-target", aria_hidden="true"), " the target's edges in every view")
     shapes = ", ".join(geometry.moved)
     words = (f"The scene from its camera's side. {shapes}: {', '.join(names.values())}, side by side; "
              "other shapes as outlines.")
+    if geometry.bars:
+        words = f"The surface and the wall, from behind the wall: {', '.join(names.values())}, side by side."
     canvas = element("canvas", words, id="view", width="1200", height="440", tabindex="0", role="img", aria_label=words,
                      aria_describedby="view-keys")
     keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: as at first.", class_="note",
@@ -189,7 +213,7 @@ def geometry_section(run):
     notes = [f"{name}: drawn coarser than it is" for name in geometry.coarse]
     notes += geometry.notes
     controls = element("p", box, class_="controls") if "target" in names and len(names) > 1 else None
-    return section("geometry", "Geometry", controls, canvas, keys,
+    return section("geometry", "Geometry", controls, layer_switch(geometry.bars), canvas, keys,
                    element("p", "; ".join(notes) + ".", class_="note") if notes else None, distances(geometry, names),
                    data_for_scripts({**geometry.data(), "names": names}, id="view-data"))
 

@@ -68,6 +68,7 @@ if (canvas) {
     mesh.points = new Float32Array(bytes(mesh.points));
     mesh.triangles = new Uint32Array(bytes(mesh.triangles));
     mesh.edges = new Uint32Array(bytes(mesh.edges));
+    for (const layer in mesh.layers) mesh.layers[layer] = new Uint8Array(bytes(mesh.layers[layer]));
   }
   for (const line of scene.lines) {
     line.points = new Float32Array(bytes(line.points));
@@ -86,6 +87,9 @@ if (canvas) {
   const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const channels = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
   const moments = Object.keys(scene.names);
+  // What colours mean: one for each moment, or the vertices' own.
+  const switches = [...document.querySelectorAll("input[name=layer]")];
+  const layer = () => switches.find((s) => s.checked)?.value ?? "shape";
   const draw = () => {
     const ratio = devicePixelRatio || 1;
     canvas.width = Math.round((canvas.clientWidth || 1200) * ratio);
@@ -129,17 +133,20 @@ if (canvas) {
     const faces = [];
     const rgb = channels(style(`--${moment}`));
     for (const mesh of scene.meshes.filter((m) => m.moment === moment)) {
+      const own = mesh.layers[layer()];
       const at = Array.from({length: mesh.points.length / 3}, (_, i) => project(mesh.points, i));
       const p = (k) => [mesh.points[3 * k], mesh.points[3 * k + 1], mesh.points[3 * k + 2]];
       const minus = (u, v) => u.map((x, k) => x - v[k]);
       for (let i = 0; i < mesh.triangles.length; i += 3) {
         const [a, b, d] = [0, 1, 2].map((k) => mesh.triangles[i + k]);
         const normal = unit(cross(minus(p(b), p(a)), minus(p(d), p(a))));
-        const light = 0.35 + 0.65 * Math.abs(dot(normal, unit(back.map((v, k) => v + 0.7 * above[k] + 0.5 * right[k]))));
+        const facing = Math.abs(dot(normal, unit(back.map((v, k) => v + 0.7 * above[k] + 0.5 * right[k]))));
+        const light = own ? 0.6 + 0.4 * facing : 0.35 + 0.65 * facing;  // colours that are values stay legible
+        const colour = own ? [0, 1, 2].map((k) => (own[3 * a + k] + own[3 * b + k] + own[3 * d + k]) / 3) : rgb;
         const corners = [at[a], at[b], at[d]];
         if (corners.some((corner) => isNaN(corner[0]))) continue;
         faces.push({corners, depth: corners[0][2] + corners[1][2] + corners[2][2],
-                    colour: `rgb(${rgb.map((v) => Math.round(v * light)).join(",")})`});
+                    colour: `rgb(${colour.map((v) => Math.round(v * light)).join(",")})`});
       }
     }
     faces.sort((a, b) => b.depth - a.depth);
@@ -200,7 +207,12 @@ if (canvas) {
   });
   for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { held = null; });
   document.getElementById("edges")?.addEventListener("change", draw);
+  const recolour = () => {
+    for (const scale of document.querySelectorAll("[data-layer]")) scale.hidden = scale.dataset.layer !== layer();
+    draw();
+  };
+  for (const one of switches) one.addEventListener("change", recolour);
   addEventListener("resize", draw);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  draw();
+  recolour();
 }

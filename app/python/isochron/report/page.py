@@ -9,13 +9,14 @@ from isochron.report.images import derivatives_section, images_section
 from isochron.report.markup import Markup, element, section
 from isochron.report.results import convergence_section, ending, headline, parameters_section
 from isochron.report.settings import asked_section, cost_section, in_short
+from isochron.report.surface import found_surface, surface_section
 
 
 def resource(name):
     return Markup((importlib.resources.files("isochron.report") / name).read_text(encoding="utf-8"))
 
 
-TITLES = {"asked": "What was asked", "ended": "How it ended", "stands": "Where it stands", "parameters": "Parameters",
+TITLES = {"asked": "What was asked", "ended": "How it ended", "stands": "Where it stands", "surface": "The surface", "parameters": "Parameters",
           "convergence": "Convergence", "capture": "The capture", "images": "Images", "geometry": "Geometry",
           "derivatives": "Derivatives", "cost": "Cost and versions", "results": "Results",
           "differences": "Settings that differ", "curves": "Curves"}
@@ -52,8 +53,11 @@ def attempt(run, build):
 def run_page(run):
     header = element("header", element("h1", run.name), element("p", f"isochron, run in {run.directory}", class_="quiet"),
                      element("p", in_short(run)))
-    builders = [parameters_section, convergence_section, capture_section, images_section, geometry_section,
+    builders = [surface_section, parameters_section, convergence_section, capture_section, images_section, geometry_section,
                 derivatives_section, asked_section, cost_section]
+    if found_surface(run):  # what was asked for comes first
+        builders.remove(geometry_section)
+        builders.insert(1, geometry_section)
     if run.is_capture and "target" in run.images:
         builders.remove(images_section)  # of hundreds of bins; slices show them
     sections = {build.__name__.removesuffix("_section"): attempt(run, build) for build in builders}

@@ -4,6 +4,7 @@ import numpy as np
 
 from isochron.report.charts import Chart, Series, grid
 from isochron.report.markup import element, join, number, section, seconds, table
+from isochron.report.run import as_numbers
 
 MOST_ROWS = 4  # components of a parameter that are listed one by one
 MOST_WORST = 3
@@ -251,7 +252,23 @@ def ending(run):
     if run.ended and isinstance(share, float):
         words.append(f"Noise makes {100 * share:.0f} % of the loss's variance over the last rows.")
     badge = element("span", run.state, class_=f"badge {run.state}")
-    return join([element("p", badge, " ", " ".join(words), class_="ending"), levels(run), fit(run), bounds(run), notes(run)])
+    return join([element("p", badge, " ", " ".join(words), class_="ending"), start(run), levels(run), fit(run), bounds(run),
+                 notes(run)])
+
+
+def start(run):
+    """Of a reconstruction: where its surface comes from."""
+    found = run.whole.get("start")
+    if not isinstance(found, dict):
+        return ""
+    method = str(found.get("method", "unknown")).replace("_", " ")
+    spent, significance = (as_numbers(found.get(key)) for key in ("seconds", "significance"))
+    words = [f"Begun from {method}"]
+    if significance is not None:
+        words.append(f"significant by {number(significance[0], 3)} standard deviations of the counts' noise")
+    if spent is not None:
+        words.append(f"which took {seconds(spent[0])}")
+    return element("p", f"{', '.join(words)}.", class_="start")
 
 
 def levels(run):
@@ -274,7 +291,7 @@ FIT = {"explained": "The fit explains the data", "unexplained": "The fit does no
 
 def fit(run):
     """Whether the counts are explained, with the numbers behind it."""
-    found = run.summary.get("fit") if run.ended else None
+    found = run.whole.get("fit") or run.summary.get("fit") if run.ended else None
     if not isinstance(found, dict) or found.get("verdict") not in FIT:
         return ""
     return element("p", f"{FIT[found['verdict']]}: deviance {number(found['deviance'], 6)}, to be expected "

@@ -75,7 +75,8 @@ class Run:
             raise NoRun(f"{directory}: no such folder")
         if not (self.directory / "experiment.yaml").exists():
             raise NoRun(f"{directory}: holds no run (there is no experiment.yaml)")
-        levels = (self.read(read_yaml, "summary.yaml") or {}).get("levels")
+        self.top, self.whole = self.directory, self.read(read_yaml, "summary.yaml") or {}  # of all levels
+        levels = self.whole.get("levels")
         self.levels = [level for level in levels if isinstance(level, dict)] if isinstance(levels, list) else []
         self.directory = last_level(self.directory)
         self.experiment = self.read(read_yaml, "experiment.yaml") or {}
