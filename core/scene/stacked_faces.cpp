@@ -219,8 +219,8 @@ void StackedFaces::find_between(const Scene& scene, int a, int b) {
 }
 
 std::span<const std::array<int, 2>> StackedFaces::of(int triangle) const {
-  const auto [begin, end] = std::ranges::equal_range(pairs_, triangle, {}, [](const auto& pair) { return pair[0]; });
-  return {begin, end};
+  const auto first = [](const std::array<int, 2>& pair) { return pair[0]; };
+  return {std::ranges::lower_bound(pairs_, triangle, {}, first), std::ranges::upper_bound(pairs_, triangle, {}, first)};
 }
 
 std::string stacked_warning(const Scene& scene) {
