@@ -16,6 +16,10 @@ constexpr std::uint32_t kProductsIteration = kMostIterations + 2u, kMatrixIterat
 /// Their scatter is known to a factor of about 1 +- 1 / sqrt(10).
 constexpr int kGradients = 6;
 
+/// Of a posterior's samples. With the prior in the preconditioner the last twelve of 24 changed scatters of the rabbit's vertices by less than
+/// their own standard error.
+constexpr int kSampleSteps = 12;
+
 /// Of the diagonal, which preconditions: each knows an entry to a factor of about 1 +- sqrt(2 / 12).
 constexpr int kProbes = 12;
 
@@ -111,7 +115,8 @@ std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
   const std::vector<Coupling> couplings = problem_.penalty().couplings(scale);
   const Metric metric(at_first, couplings, std::move(free));
   return solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
-               [&](const std::vector<double>& residual) { return metric.solve(residual); });
+               [&](const std::vector<double>& residual) { return metric.solve(residual); },
+               {.most_steps = kSampleSteps});
 }
 
 std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<std::vector<double>>& vectors) const {

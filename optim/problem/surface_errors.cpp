@@ -7,7 +7,7 @@ namespace isochron {
 namespace {
 
 /// An error is known to a factor of about 1 +- 1 / sqrt(2 x this). They share their passes over the Jacobian.
-constexpr int kSamples = 6;
+constexpr int kSamples = 4;
 
 bool has_errors(const ParameterSpec& spec) {
   return spec.type == ParameterType::vertices && spec.bending > 0;

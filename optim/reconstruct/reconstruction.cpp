@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 /// Paths that a level may trace per second of the fit: primal samples of a histogram are half as many again as derivatives', and a fit
 /// takes some hundred times both. Measured on two cores of 2020 with the rabbit of scenes/rabbit.
-constexpr double kSamplesPerSecond = 3500;
+constexpr double kSamplesPerSecond = 7000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 constexpr int kMostLevels = 3;
 constexpr double kMostVertices = 10000;

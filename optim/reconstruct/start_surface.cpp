@@ -13,11 +13,12 @@
 namespace isochron {
 namespace {
 
-constexpr int kSide = 2;              // voxels that make a lateral resolution
-constexpr int kRings = 2;             // voxels beyond what is significant
-constexpr int kSmoothings = 2;        // means over 3 x 3 voxels: about a lateral resolution wide
-constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
-constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
+constexpr int kSide = 2;               // voxels that make a lateral resolution
+constexpr int kRings = 2;              // voxels beyond what is significant
+constexpr int kSmoothings = 2;         // means over 3 x 3 voxels: about a lateral resolution wide
+constexpr int kRoundings = 6;          // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
+constexpr double kSteepestJoint = 2;   // depth over distance, as of the first surface
+constexpr int kRoom = kRings + kSide;  // voxels about what is significant
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// A depth for each line of sight; not a number where there is none.
@@ -46,12 +47,29 @@ struct DepthMap {
       for (int a = 0; a < width; ++a) result.at(a, u) = change(a, u);
     return result;
   }
-  DepthMap grown() const {
+  DepthMap grown(const BackProjection& volume, double jump) const {
     DepthMap result = *this;
     for (int ring = 0; ring < kRings; ++ring)
-      result =
-          result.changed([&](int a, int u) { return result.has(a, u) ? result.at(a, u) : result.mean_around(a, u); });
+      result = result.changed([&](int a, int u) {
+        return result.has(a, u) ? result.at(a, u) : brightest(volume, a, u, result.mean_around(a, u), jump);
+      });
     return result;
+  }
+  /// Where the line's albedo is greatest, no farther than `jump` from `depth`, which stays where nothing is known.
+  static double brightest(const BackProjection& volume, int a, int u, double depth, double jump) {
+    const int x = a - kRoom, y = u - kRoom;
+    double best = depth;
+    if (!std::isfinite(depth) || x < 0 || y < 0 || x >= static_cast<int>(volume.across.size()) ||
+        y >= static_cast<int>(volume.up.size()))
+      return best;
+    float greatest = 0;
+    for (std::size_t d = 0; d < volume.depth.size(); ++d) {
+      const float albedo = volume.albedo[volume.index(d, y, x)];
+      if (std::abs(volume.depth[d] - depth) > jump || albedo <= greatest) continue;
+      greatest = albedo;
+      best = volume.depth[d];
+    }
+    return best;
   }
   DepthMap smooth() const {
     DepthMap result = *this;
@@ -63,7 +81,6 @@ struct DepthMap {
 
 /// The depths with room for the margin about them.
 DepthMap padded(const BackProjection& volume, const std::vector<double>& depth) {
-  constexpr int kRoom = kRings + kSide;
   const int width = static_cast<int>(volume.across.size()), height = static_cast<int>(volume.up.size());
   DepthMap map{width + 2 * kRoom, height + 2 * kRoom, {}};
   map.depth.assign(static_cast<std::size_t>(map.width) * map.height, kNone);
@@ -104,15 +121,15 @@ bool meet(const DepthMap& one, const DepthMap& other, double jump) {
 }
 
 /// With what margins make one part of put together.
-std::vector<DepthMap> joined(std::vector<DepthMap> parts, double jump) {
+std::vector<DepthMap> joined(std::vector<DepthMap> parts, const BackProjection& volume, double step, double jump) {
   std::vector<DepthMap> grown;
-  for (const DepthMap& part : parts) grown.push_back(part.grown());
+  for (const DepthMap& part : parts) grown.push_back(part.grown(volume, step));
   for (std::size_t i = 0; i < parts.size(); ++i)
     for (std::size_t k = i + 1; k < parts.size(); ++k) {
       if (!meet(grown[i], grown[k], jump)) continue;
       parts[i] =
           parts[i].changed([&](int a, int u) { return parts[i].has(a, u) ? parts[i].at(a, u) : parts[k].at(a, u); });
-      grown[i] = parts[i].grown();
+      grown[i] = parts[i].grown(volume, step);
       parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(k));
       grown.erase(grown.begin() + static_cast<std::ptrdiff_t>(k));
       k = i;  // what is larger now may meet others
@@ -201,7 +218,7 @@ Mesh start_surface(const BackProjection& volume, const FirstSurface& first) {
   const double jump = kSteepestJoint * std::numbers::sqrt2 * kSide * voxel;
   const double left = volume.across[0] - 0.5 * voxel * (map.width - static_cast<int>(volume.across.size())),
                bottom = volume.up[0] - 0.5 * voxel * (map.height - static_cast<int>(volume.up.size()));
-  for (const DepthMap& part : joined(std::move(parts), jump)) {
+  for (const DepthMap& part : joined(std::move(parts), volume, kSteepestJoint * voxel, jump)) {
     Mesh mesh = meshed(part.smooth(), jump);
     round_borders(mesh);
     const int before = static_cast<int>(result.positions.size());
