@@ -32,12 +32,18 @@ def depths(vertices, triangles):
     return Seen(vertices, triangles, along, along).depth
 
 
+def errors_of_depths(off):
+    """Of differences in millimetres; NaN where there are none."""
+    median, most = np.quantile(np.abs(off), [0.5, 0.8]) if off.size else (np.nan, np.nan)
+    return {"median_mm": median, "within_80_mm": most}
+
+
 def errors(vertices, triangles):
-    found, true = depths(np.asarray(vertices), np.asarray(triangles)), depths(*read_mesh(SCENE / "rabbit.obj"))
+    found, true = depths(vertices, triangles), depths(*read_mesh(SCENE / "rabbit.obj"))
     in_found, in_true = np.isfinite(found), np.isfinite(true)
     both = in_found & in_true
     off = 1000 * (found - true)[both]
-    return {"median_mm": np.median(np.abs(off)), "within_80_mm": np.quantile(np.abs(off), 0.8), "bias_mm": np.median(off),
+    return {**errors_of_depths(off), "bias_mm": np.median(off) if off.size else np.nan,
             "silhouette": both.sum() / (in_found | in_true).sum(), "extra": (in_found & ~in_true).sum() / in_true.sum(),
             "missed": (in_true & ~in_found).sum() / in_true.sum()}
 

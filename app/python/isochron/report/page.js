@@ -141,7 +141,7 @@ if (canvas) {
         const [a, b, d] = [0, 1, 2].map((k) => mesh.triangles[i + k]);
         const normal = unit(cross(minus(p(b), p(a)), minus(p(d), p(a))));
         const facing = Math.abs(dot(normal, unit(back.map((v, k) => v + 0.7 * above[k] + 0.5 * right[k]))));
-        const light = own ? 0.6 + 0.4 * facing : 0.35 + 0.65 * facing;  // colours that are values stay legible
+        const light = own ? 0.7 + 0.3 * facing : 0.35 + 0.65 * facing;  // colours that are values stay legible
         const colour = own ? [0, 1, 2].map((k) => (own[3 * a + k] + own[3 * b + k] + own[3 * d + k]) / 3) : rgb;
         const corners = [at[a], at[b], at[d]];
         if (corners.some((corner) => isNaN(corner[0]))) continue;

@@ -1,0 +1,127 @@
+#!/usr/bin/python3
+"""How far from the hidden rabbit (scenes/rabbit) three methods come with the same photons: the reconstruction, back-projection, and the
+light-cone transform (light_cone.py). Each sweep writes a table, experiments/measured/rabbit_SWEEP.csv, after every capture:
+
+    method                        fit, back_projection or light_cone
+    photons, points, limit, seed  per point, along each side of the wall, --seconds of the reconstruction, of all random numbers
+    median_mm, within_80_mm       of the differences in depth, where method and truth see something
+    shared_..._mm                 the same where back-projection sees something, too
+    silhouette                    intersection over union of what is seen
+    seconds                       wall, of the whole method
+    verdict                       of the fit
+
+The transform has two settings, its filter's ratio of signal to noise and how bright a surface has to be. They are chosen by the truth, in
+its favour: of all whose silhouette is within a tenth of the best, those with the least 80 % error.
+"""
+
+import argparse
+import itertools
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+import numpy as np
+
+import light_cone
+import rabbit_errors
+from isochron.captures import read_capture
+from isochron.mesh_files import read_mesh
+from reproduction.measure import ROOT, Failure, program, summary
+from reproduction.tables import write_rows
+
+RESPONSE = rabbit_errors.SCENE / "response.csv"
+METRES_PER_PS = 0.299792458e-3
+REACH = 0.7  # metres: beyond the rabbit as seen from the wall's corners
+RATIOS, BRIGHTNESSES = (0.1, 1, 10, 100), (0.1, 0.15, 0.2, 0.25, 0.3)
+METHODS = ("fit", "back_projection", "light_cone")
+USUAL = {"photons": 2000, "points": 64, "seconds": 300}
+COLUMNS = ("method", "photons", "points", "limit", "seed", "median_mm", "within_80_mm", "shared_median_mm", "shared_within_80_mm",
+           "silhouette", "seconds", "verdict")
+
+
+def by_light_cone(capture):
+    """Vertices and triangles, and the seconds that one setting takes."""
+    offsets, values = np.loadtxt(RESPONSE, delimiter=",", skiprows=1).T
+    start, seconds, tried = time.monotonic(), None, []
+    for volume in light_cone.volumes(capture, offsets[values.argmax()] * METRES_PER_PS, REACH, RATIOS):
+        surfaces = [light_cone.surface(volume, least) for least in BRIGHTNESSES]
+        seconds = seconds or time.monotonic() - start
+        tried += [(rabbit_errors.errors(*surface), surface) for surface in surfaces]
+    best = max(errors["silhouette"] for errors, _ in tried)
+    good = [(errors["within_80_mm"], i) for i, (errors, _) in enumerate(tried) if errors["silhouette"] >= 0.9 * best]
+    return tried[min(good)[1]][1], seconds
+
+
+def by_fit(path, limit, seed, folder):
+    """Vertices and triangles, or None where there is no signal; and the verdict."""
+    try:
+        program("reconstruct", path, "-o", folder, "--response", RESPONSE, "--seconds", limit, "--seed", seed, "--force")
+    except Failure:
+        if not (folder / "summary.yaml").exists() or summary(folder)["fit"]["verdict"] != "no_signal":
+            raise
+        return None, "no_signal"
+    return read_mesh(folder / "geometry/final_surface.ply"), summary(folder)["fit"]["verdict"]
+
+
+def row_of(found, seen, seconds, verdict=""):
+    """The last columns; `seen`: depths of back-projection."""
+    if found is None or not len(found[1]):
+        return ("",) * 5 + (f"{seconds:.3g}", verdict)
+    errors, true = rabbit_errors.errors(*found), rabbit_errors.depths(*read_mesh(rabbit_errors.SCENE / "rabbit.obj"))
+    off = 1000 * (rabbit_errors.depths(*found) - true)
+    shared = rabbit_errors.errors_of_depths(off[np.isfinite(off) & np.isfinite(seen)])
+    numbers = (errors["median_mm"], errors["within_80_mm"], shared["median_mm"], shared["within_80_mm"], errors["silhouette"], seconds)
+    return (*(f"{value:.3g}" for value in numbers), verdict)
+
+
+def measure(options, photons, points, limits, seed, folder):
+    """Rows of one capture."""
+    path = folder / "capture.h5"
+    subprocess.run([sys.executable, ROOT / "scripts/rabbit_capture.py", path, "--points", str(points), "--counts", str(photons), "--seed",
+                    str(seed)], check=True)
+    *projected, spent = rabbit_errors.surface(path)
+    seen = rabbit_errors.depths(*projected)
+    start = f"{photons:g}", points, "", seed
+    if "back_projection" in options.methods:
+        yield "back_projection", *start, *row_of(projected, seen, spent["seconds"])
+    if "light_cone" in options.methods:
+        found, seconds = by_light_cone(read_capture(path))
+        yield "light_cone", *start, *row_of(found, seen, seconds)
+    for limit in limits if "fit" in options.methods else ():
+        began = time.monotonic()
+        found, verdict = by_fit(path, limit, seed, folder / "run")
+        yield "fit", f"{photons:g}", points, f"{limit:g}", seed, *row_of(found, seen, time.monotonic() - began, verdict)
+
+
+def sweep(options, name):
+    values = {**{key: [value] for key, value in USUAL.items()}, name: getattr(options, name)}
+    rows = []
+    with tempfile.TemporaryDirectory() as temporary:
+        for seed, photons, points in itertools.product(range(1, options.seeds + 1), values["photons"], values["points"]):
+            for row in measure(options, photons, points, values["seconds"], seed, pathlib.Path(temporary)):
+                rows.append(row)
+                print(*row, flush=True)
+            write_rows(options.output / f"rabbit_{name}.csv", COLUMNS, rows)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--photons", type=float, nargs="+", help="sweep: 20 63 200 630 2000 6300 20000, for example")
+    parser.add_argument("--points", type=int, nargs="+", help="sweep: 8 16 32 64")
+    parser.add_argument("--seconds", type=float, nargs="+", help="sweep: 30 60 120 300")
+    parser.add_argument("--seeds", type=int, default=1, help="captures of each kind (default 1)")
+    parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="default: all")
+    parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
+    options = parser.parse_args()
+    names = [name for name in USUAL if getattr(options, name)]
+    if not names:
+        parser.error(f"no sweep: give one of {', '.join(f'--{name}' for name in USUAL)}")
+    for name in names:
+        sweep(options, name)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,111 @@
+#!/usr/bin/python3
+"""The light-cone transform on surfaces whose place is known, errors of the rabbit itself, and the tables and pictures of the study."""
+
+import pathlib
+import sys
+import tempfile
+import unittest
+import unittest.mock
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+import light_cone
+import matplotlib.image
+import numpy as np
+import plot_rabbit_study
+import rabbit_errors
+import rabbit_study
+from isochron.captures import Capture
+from isochron.mesh_files import read_mesh
+from reproduction.tables import write_rows
+
+BIN, BINS, REACH = 0.005, 400, 0.8
+
+
+def capture(places, side=16, half=0.25, late=0.0):
+    """Light of small diffuse surfaces, of equal area, seen by a confocal wall."""
+    along = np.linspace(half, -half, side)
+    points = np.stack([*np.meshgrid(-along, along, indexing="ij"), np.zeros((side, side))], axis=-1)
+    counts = np.zeros((BINS, side, side))
+    for place in places:
+        distance = np.linalg.norm(points - place, axis=-1)
+        at = (2 * distance + late) / BIN - 0.5  # between two bins' middles
+        first = at.astype(int)
+        for later, share in ((0, first + 1 - at), (1, at - first)):
+            np.add.at(counts, (first + later, *np.indices((side, side))), share / distance**4)
+    return Capture(counts, points, np.broadcast_to([0, 0, 1.0], points.shape), None, BIN, 0.0, None)
+
+
+class LightConeTest(unittest.TestCase):
+    def test_points_are_found(self):
+        for place, late in (((0.05, -0.1, 0.4), 0), ((-0.15, 0.12, 0.55), 0.03)):
+            volume, = light_cone.volumes(capture([place], late=late), late, REACH, [10])
+            i, j, k = np.unravel_index(volume.albedo.argmax(), volume.albedo.shape)
+            self.assertLess(abs(volume.across[i] - place[0]), 0.04)  # a little over the distance of points
+            self.assertLess(abs(volume.up[j] - place[1]), 0.04)
+            self.assertLess(abs(np.sqrt(volume.squares[k]) - place[2]), BIN)
+
+    def test_a_plate_at_an_angle(self):
+        x, y = (a.ravel() for a in np.meshgrid(np.linspace(-0.12, 0.12, 49), np.linspace(-0.12, 0.12, 49)))
+        volume, = light_cone.volumes(capture(np.stack([x, y, 0.5 + 0.2 * x], axis=-1)), 0, REACH, [1])
+        vertices, triangles = light_cone.surface(volume, 0.3)
+        used = vertices[np.unique(triangles)]
+        self.assertGreater(len(used), 20)
+        self.assertLess(np.abs(used[:, :2]).max(), 0.12 + 0.04)
+        inner = used[np.abs(used[:, :2]).max(axis=1) < 0.1]
+        self.assertLess(np.abs(inner[:, 2] - 0.5 - 0.2 * inner[:, 0]).max(), 0.02)
+
+    def test_counts_are_kept(self):
+        light = capture([(0, 0, 0.3)])
+        counts, step = light_cone.counts_over_squares(light, 0, REACH)
+        self.assertEqual(counts.shape, (16, 16, light_cone.CELLS))
+        np.testing.assert_allclose(counts.sum(axis=2), light.counts.sum(axis=0), rtol=1e-12)
+        middles = step * (np.arange(light_cone.CELLS) + 0.5)
+        distance = np.linalg.norm(light.points - [0, 0, 0.3], axis=-1)
+        np.testing.assert_allclose(counts @ np.sqrt(middles) / counts.sum(axis=2), distance, atol=BIN)
+
+    def test_kernel_is_a_paraboloid(self):
+        values = light_cone.kernel((16, 16, 128), (0.05, 0.05), 0.005)
+        self.assertAlmostEqual(float(np.linalg.norm(values)), 1, 5)
+        for i, j in ((0, 0), (3, 0), (2, -4)):
+            mean = values[i, j] @ np.arange(128) / values[i, j].sum()
+            self.assertAlmostEqual(mean, (i * i + j * j + 1 / 6) * 0.0025 / 0.005, delta=0.01)  # 1/6: of a pixel's extent
+
+
+class StudyTest(unittest.TestCase):
+    def test_the_rabbit_has_no_errors(self):
+        vertices, triangles = read_mesh(rabbit_errors.SCENE / "rabbit.obj")
+        true = rabbit_errors.depths(vertices, triangles)
+        self.assertEqual(rabbit_study.row_of((vertices, triangles), true, 2.0, "explained"), ("0", "0", "0", "0", "1", "2", "explained"))
+        half = np.where(np.arange(len(true)) < len(true) / 2, true, np.nan)  # where the other method sees something
+        moved = vertices + [0, 0, 0.004] * (vertices[:, :1] > 0)
+        row = rabbit_study.row_of((moved, triangles), half, 2.0)
+        self.assertEqual(row[1], "4")
+        self.assertEqual((row[2], row[3]), ("0", "0"))
+        self.assertEqual(rabbit_study.row_of(None, true, 1.0, "no_signal"), ("", "", "", "", "", "1", "no_signal"))
+
+    def test_the_transform_settles_on_what_sees_most(self):
+        surfaces = {(1, 0.1): (0.9, 9), (1, 0.2): (0.5, 1), (2, 0.1): (0.85, 5), (2, 0.2): (0.82, 7)}  # silhouette, 80 % error
+        with unittest.mock.patch.multiple(rabbit_study, RATIOS=(1, 2), BRIGHTNESSES=(0.1, 0.2)), \
+                unittest.mock.patch.multiple(light_cone, volumes=lambda *arguments: iter(arguments[3]),
+                                             surface=lambda ratio, least: (ratio, least)), \
+                unittest.mock.patch.object(rabbit_errors, "errors", lambda *key: dict(zip(("silhouette", "within_80_mm"), surfaces[key]))):
+            self.assertEqual(rabbit_study.by_light_cone(None)[0], (2, 0.1))
+
+    def test_pictures(self):
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = pathlib.Path(temporary)
+            self.assertEqual(plot_rabbit_study.main([str(folder)]), 2)
+            rows = [("back_projection", 2000, 64, "", 1, 2, 7, 2, 7, 0.7, 10, ""), ("light_cone", 2000, 64, "", 1, 2, 6, 2, 5, 0.7, 5, ""),
+                    ("fit", 2000, 64, 30, 1, "", "", "", "", "", 5, "no_signal"),
+                    *(("fit", 2000, 64, limit, seed, 1, 3 + seed, 1, 3, 0.9, limit + seed, verdict) for limit, seed, verdict in
+                      ((60, 1, "explained"), (60, 2, "explained"), (60, 3, "unexplained"), (120, 1, "explained")))]
+            write_rows(folder / "rabbit_seconds.csv", rabbit_study.COLUMNS, rows)
+            self.assertEqual(plot_rabbit_study.main([str(folder), str(folder / "a.png")]), 0)
+            self.assertGreater(np.ptp(matplotlib.image.imread(folder / "a.png")[..., :3]), 0.9)
+            fits = [row for row in plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv") if row["method"] == "fit"]
+            self.assertEqual(plot_rabbit_study.medians(fits, "seconds", "within_80_mm"), [[62, 121], [5, 4]])
+
+
+if __name__ == "__main__":
+    unittest.main()
