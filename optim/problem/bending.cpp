@@ -62,7 +62,8 @@ class Forms {
         form.constant += part * scene_.positions[vertex][axis];
         const int row = layout_.vertex(vertex, axis);
         for (int k = basis_.row_begin[row]; k < basis_.row_begin[row + 1]; ++k)
-          if (const auto& [column, coefficient] = basis_.entries[k]; column >= first_ && column < last_)
+          if (const auto& [column, coefficient] = basis_.entries[k];
+              column >= first_ && column < last_ && part * coefficient != 0)
             entries[column] += part * coefficient;
       }
     for (const auto& [unknown, coefficient] : entries) {

@@ -185,21 +185,33 @@ Mesh meshed(const DepthMap& map, double jump) {
   return mesh;
 }
 
+/// Vertices of borders move towards the middle of their two neighbours there, but where a face would turn away from the wall.
 void round_borders(Mesh& mesh) {
   std::set<std::pair<int, int>> sides;
-  for (const auto& face : mesh.faces)
-    for (int k = 0; k < 3; ++k) sides.emplace(face[k], face[(k + 1) % 3]);
-  std::map<int, std::array<int, 2>> neighbours;  // of border vertices, before and after
-  for (const auto& [from, to] : sides)
-    if (!sides.contains({to, from})) {
-      neighbours[from][1] = to;
-      neighbours[to][0] = from;
+  std::vector<std::vector<int>> faces(mesh.positions.size());
+  for (int f = 0; f < static_cast<int>(mesh.faces.size()); ++f)
+    for (int k = 0; k < 3; ++k) {
+      sides.emplace(mesh.faces[f][k], mesh.faces[f][(k + 1) % 3]);
+      faces[mesh.faces[f][k]].push_back(f);
     }
-  for (int round = 0; round < kRoundings; ++round) {
-    const std::vector<Vec3> old = mesh.positions;
-    for (const auto& [v, beside] : neighbours)
-      mesh.positions[v] = 0.5 * old[v] + 0.25 * (old[beside[0]] + old[beside[1]]);
+  std::map<int, std::array<int, 2>> neighbours;  // of border vertices, before and after
+  for (const auto& [from, to] : sides) {
+    if (sides.contains({to, from})) continue;
+    neighbours[from][1] = to;
+    neighbours[to][0] = from;
   }
+  const auto turned = [&](int f) {
+    const auto& [a, b, c] = mesh.faces[f];
+    const std::vector<Vec3>& at = mesh.positions;
+    return !(cross(at[b] - at[a], at[c] - at[a]).z < 0);
+  };
+  for (int round = 0; round < kRoundings; ++round)
+    for (const auto& [v, beside] : neighbours) {
+      Vec3& place = mesh.positions[v];
+      const Vec3 old = place;
+      place = 0.5 * old + 0.25 * (mesh.positions[beside[0]] + mesh.positions[beside[1]]);
+      if (std::any_of(faces[v].begin(), faces[v].end(), turned)) place = old;
+    }
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 
 #include "core/scene/mesh.h"
@@ -37,8 +38,7 @@ TEST(MeshWriter, BothKindsAreReadBackInTheSameOrder) {
 TEST(MeshWriter, VerticesAreThoseOfTheFileThatWasRead) {
   // In the file: one without a face, the second of the shape, its first, the second again, the others.
   Scene scene = two_shapes();
-  scene.shapes[1].file_vertices =
-      std::make_shared<const FileVertices>(FileVertices{{-1, 1, 0, 1, 2, 3}, {{7, 7, 7}}});
+  scene.shapes[1].file_vertices = std::make_shared<const FileVertices>(FileVertices{{-1, 1, 0, 1, 2, 3}, {{7, 7, 7}}});
   const std::vector<Vec3>& p = scene.positions;
   TemporaryFolder folder;
   folder.write("m.ply", to_ply(scene, scene.shapes[1]));
@@ -47,6 +47,23 @@ TEST(MeshWriter, VerticesAreThoseOfTheFileThatWasRead) {
     const Mesh mesh = read_mesh(folder.path(name));
     EXPECT_EQ(mesh.positions, (std::vector<Vec3>{{7, 7, 7}, p[2], p[1], p[2], p[3], p[4]})) << name;
     EXPECT_EQ(mesh.faces, (std::vector<std::array<int, 3>>{{2, 1, 4}, {1, 5, 4}})) << name;
+  }
+}
+
+/// Numbers of vertices are those of the file, and what has no face has no property.
+TEST(MeshWriter, PropertiesAreThoseOfTheFilesVertices) {
+  Scene scene = two_shapes();
+  scene.shapes[1].file_vertices = std::make_shared<const FileVertices>(FileVertices{{-1, 1, 0, 1, 2, 3}, {{7, 7, 7}}});
+  const VertexProperty properties[] = {{"albedo", {0.5, 1.0 / 3, 2, 3}}, {"other", {10, 11, 12, 13}}};
+  const std::string ply = to_ply(scene, scene.shapes[1], properties);
+  EXPECT_NE(ply.find("property double z\nproperty double albedo\nproperty double other\nelement face"),
+            std::string::npos);
+  const std::vector<double> albedo{NAN, 1.0 / 3, 0.5, 1.0 / 3, 2, 3}, other{NAN, 11, 10, 11, 12, 13};
+  for (std::size_t i = 0; i < albedo.size(); ++i) {
+    double row[5];
+    std::memcpy(row, ply.data() + ply.find("end_header\n") + 11 + i * sizeof row, sizeof row);
+    EXPECT_TRUE(row[3] == albedo[i] || (std::isnan(row[3]) && i == 0)) << i;
+    EXPECT_TRUE(row[4] == other[i] || (std::isnan(row[4]) && i == 0)) << i;
   }
 }
 

@@ -1,0 +1,114 @@
+// Captures to surfaces by one command, from counts of a plate that a closed form gives.
+#include "core/image/capture_file.h"
+#include "core/scene/mesh.h"
+#include "tests/app/program.h"
+#include "tests/reconstruct/simulated.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kPs = 0.299792458e-3;
+
+class Reconstruct : public Program {
+ protected:
+  Reconstruct() { write("plate.h5", 1000); }
+
+  /// A plate of 16 x 16 cm, 0.4 m in front of 12 x 12 points, with so many photons a point.
+  void write(const std::string& name, double photons) {
+    std::mt19937 random(test_seed(3));
+    CaptureFile capture =
+        expected_counts(square_wall(12, 0.5), plate({0.02, -0.01, 0.4}, 0.16, 0.16, 0.004), 200, 32 * kPs, photons);
+    write_capture(folder_.file(name), counted(capture, 0.3, random));
+  }
+
+  std::vector<std::string> command(const std::string& out, std::vector<std::string> more = {},
+                                   const std::string& capture = "plate.h5") const {
+    std::vector<std::string> arguments{"reconstruct", folder_.file(capture), "-o",        folder_.file(out),
+                                       "--quiet",     "--no-plots",          "--seconds", "1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  }
+
+  void expect_same(const std::string& a, const std::string& b) const {
+    for (const char* file : {"/experiment.yaml", "/scene.yaml", "/start.ply", "/back_projection.ply", "/final.exr",
+                             "/final.h5", "/geometry/final_surface.ply"})
+      EXPECT_TRUE(folder_.has(b + file) && folder_.read(a + file) == folder_.read(b + file)) << file;
+    EXPECT_EQ(log(a), log(b));
+  }
+};
+
+/// The plate's depth, middle and size; counts are those of 1000 photons at each of 144 points, so that depths are known to a fraction
+/// of a millimetre, and what is left is the fit, of few samples here.
+TEST_F(Reconstruct, FindsAPlate) {
+  const Result result = run(command("out", {"--seconds", "60"}));
+  ASSERT_EQ(result.status, 0) << result.errors;
+  const Mesh mesh = read_mesh(folder_.file("out/geometry/final_surface.ply"));
+  double area = 0, depth = 0;
+  Vec3 middle;
+  for (const auto& face : mesh.faces) {
+    const Vec3 &a = mesh.positions[face[0]], &b = mesh.positions[face[1]], &c = mesh.positions[face[2]];
+    const double part = -0.5 * cross(b - a, c - a).z;  // faces look at the wall
+    area += part;
+    middle += (a + b + c) * (part / 3);
+    depth += part * std::abs((a.z + b.z + c.z) / 3 - 0.4);
+  }
+  EXPECT_NEAR(area, 0.16 * 0.16, 0.1 * 0.16 * 0.16);
+  EXPECT_LT(depth / area, 0.003);
+  EXPECT_NEAR(middle.x / area, 0.02, 0.003);
+  EXPECT_NEAR(middle.y / area, -0.01, 0.003);
+  const std::string ply = folder_.read("out/geometry/final_surface.ply");
+  EXPECT_NE(ply.find("property double albedo\nproperty double standard_error\n"), std::string::npos);
+  const std::string summary = folder_.read("out/summary.yaml");
+  for (const char* key : {"\nfit: {", "\nstart: {method: back_projection, seconds: ", "\nlevels:\n"})
+    EXPECT_NE(summary.find(key), std::string::npos) << key;
+  EXPECT_EQ(run({"run", folder_.file("out/experiment.yaml"), "-o", folder_.file("again"), "--quiet", "--no-plots",
+                 "--set", "optimizer.iterations=0"})
+                .status,
+            0)
+      << "the folder is no experiment";
+}
+
+TEST_F(Reconstruct, TheSameBitsForAnyThreadsAndAfterAKill) {
+  ASSERT_EQ(run(command("one", {"--threads", "1"})).status, 0);
+  ASSERT_EQ(run(command("two", {"--threads", "2"})).status, 0);
+  expect_same("one", "two");
+  const std::vector<std::function<bool()>> moments = {[&] { return folder_.has("killed0/levels/1/log.csv"); },
+                                                      [&] { return folder_.has("killed1/levels/2/experiment.yaml"); }};
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    const std::string out = "killed" + std::to_string(i);
+    EXPECT_EQ(run(command(out), SIGKILL, moments[i]).status, -SIGKILL);
+    ASSERT_EQ(run({"resume", folder_.file(out), "--quiet", "--no-plots"}).status, 0);
+    expect_same("one", out);
+    EXPECT_NE(folder_.read(out + "/summary.yaml").find("\nstart: {"), std::string::npos);
+  }
+}
+
+TEST_F(Reconstruct, SaysHowMuchLightIsMissing) {
+  write("dark.h5", 0.01);
+  const Result result = run(command("out", {}, "dark.h5"));
+  EXPECT_EQ(result.status, 1);
+  EXPECT_NE(result.errors.find("no light of a hidden surface stands out"), std::string::npos) << result.errors;
+  EXPECT_NE(folder_.read("out/summary.yaml").find("fit: {verdict: no_signal, photons_needed: "), std::string::npos);
+}
+
+TEST_F(Reconstruct, SaysInOneLineWhatIsWrong) {
+  folder_.write("long.csv", "offset,value\n0,1\n100000,1\n");
+  folder_.write("words.csv", "offset,value\n0,one\n");
+  const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
+      {command("out", {}, "absent.h5"), "absent.h5"},
+      {command("out", {"--response", folder_.file("absent.csv")}), "absent.csv"},
+      {command("out", {"--response", folder_.file("words.csv")}), "words.csv"},
+      {command("out", {"--response", folder_.file("long.csv")}), "too few"},
+      {command("out", {"--seconds", "0"}), "--seconds"},
+  };
+  for (const auto& [arguments, named] : cases) {
+    const Result result = run(arguments);
+    EXPECT_EQ(result.status, 2) << named;
+    EXPECT_NE(result.errors.find(named), std::string::npos) << result.errors;
+    EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+    EXPECT_FALSE(folder_.has("out"));
+  }
+}
+
+}  // namespace
+}  // namespace isochron
