@@ -35,8 +35,8 @@ constexpr int kMostLevels = 3;
 constexpr double kMostVertices = 10000;
 constexpr double kBending =
     3;  // prior's weight at first: three nats for a curvature of 1 over the square of its radius
-constexpr double kMotionSlope = 0.0625;   // expected change of offsets over the distance
-constexpr double kAlbedoChange = 0.01;  // expected across the surface
+constexpr double kMotionSlope = 0.0625;  // expected change of offsets over the distance
+constexpr double kAlbedoChange = 0.1;    // expected across the surface
 
 std::string quoted_path(const std::string& file) {
   std::string text = "\"";
@@ -160,30 +160,50 @@ std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geome
   return {all.least - margin, all.most + margin};
 }
 
-/// Whether the dark bins of points scatter more than Poisson numbers of one mean do, by five standard deviations.
-bool varies(const GatedImage& counts, const Readings& readings, int sensor_points) {
-  const std::vector<double> levels = dark_levels(counts, readings, sensor_points);
-  const double readings_each = readings.count(counts) / sensor_points;
-  double sum = 0, squares = 0;
-  int n = 0;
-  for (const double level : levels)
-    if (std::isfinite(level)) {
-      sum += level;
-      squares += level * level;
-      ++n;
-    }
-  if (n < 2) return false;
-  const double mean = sum / n, variance = (squares - n * mean * mean) / (n - 1);
-  // Half of the readings are dark at least, else the level says little.
-  const double expected = 2 * mean / readings_each;
-  return variance > expected * (1 + 5 * std::sqrt(2.0 / (n - 1)));
+/// What the dark bins of each sensor point say; those whose readings do not count are left out.
+std::vector<double> point_levels(const GatedImage& counts, const Readings& readings, int points) {
+  std::vector<double> levels = dark_levels(counts, readings, points);
+  std::erase_if(levels, [](double level) { return !std::isfinite(level); });
+  return levels;
 }
 
-double total(const GatedImage& image, const Readings& readings) {
-  double sum = 0;
-  for (int p = 0; p < image.width * image.height; ++p)
-    for_each_reading(image, readings, p, [&](std::size_t i) { sum += image.data[i]; });
-  return sum;
+/// Whether they scatter more than Poisson numbers of one mean do, by five standard deviations.
+bool vary(const std::vector<double>& levels, double readings_each) {
+  if (levels.size() < 2) return false;
+  const auto n = static_cast<double>(levels.size());
+  const double mean = std::accumulate(levels.begin(), levels.end(), 0.0) / n;
+  double squares = 0;
+  for (const double level : levels) squares += (level - mean) * (level - mean);
+  // Half of the readings are dark at least, else the level says little.
+  const double expected = 2 * mean / readings_each;
+  return squares / (n - 1) > expected * (1 + 5 * std::sqrt(2 / (n - 1)));
+}
+
+/// Sums over the points, of each gate that counts.
+std::vector<double> by_gate(const GatedImage& image, const Readings& readings) {
+  std::vector<double> sums;
+  for (int g = 0; g < image.gates; ++g) {
+    if (!readings.uses_gate(g)) continue;
+    sums.push_back(0);
+    for (int p = 0; p < image.pixels(); ++p)
+      if (readings.uses_pixel(p)) sums.back() += image.at(p, g);
+  }
+  return sums;
+}
+
+/// The multiple of the light that with a background explains the counts best: weighted least squares of the sums, whose variances are
+/// the counts. What is dark cannot be told from counts alone where a response has a long tail. NaN or below zero: none.
+double multiple_of(const std::vector<double>& light, const std::vector<double>& counts) {
+  double weights = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (std::size_t g = 0; g < light.size(); ++g) {
+    const double w = 1 / std::max(1.0, counts[g]);
+    weights += w;
+    x += w * light[g];
+    y += w * counts[g];
+    xx += w * light[g] * light[g];
+    xy += w * light[g] * counts[g];
+  }
+  return (weights * xy - x * y) / (weights * xx - x * x);
 }
 
 /// Of faces that look away from the wall there are none: the area is that of one side.
@@ -202,16 +222,16 @@ void measure(const std::string& experiment, const Mesh& start, Settings& set,
   const GatedImage counts = problem.make_target([] {});
   const Readings& readings = problem.readings();
   const int points = static_cast<int>(problem.scene().capture->sensor.size());
-  set.background_per_point = varies(counts, readings, points);
+  const std::vector<double> levels = point_levels(counts, readings, points);
+  const double readings_each = readings.count(counts) / points;
+  set.background_per_point = vary(levels, readings_each);
   std::vector<double> theta = problem.parameters().initial();
   for (const Parameters::Block& block : problem.parameters().blocks())
     if (block.name == "background") std::fill_n(theta.begin() + block.begin, block.count, 0.0);
   const GatedImage light =
       problem.render(theta, problem.stream(Pass::render), {0, std::max(kLeastSamples, set.samples / 4)});
-  const double background = dark_levels(counts, readings, 1)[0] * readings.count(counts);
-  const double found = total(counts, readings) - (std::isfinite(background) ? background : 0),
-               made = total(light, readings);
-  if (found > 0 && made > 0) set.gain = found / made;
+  const double gain = multiple_of(by_gate(light, readings), by_gate(counts, readings));
+  if (gain > 0 && std::isfinite(gain)) set.gain = gain;
   // Weights of slopes that are normal with such a standard deviation (optim/README.md).
   const double edges = 1.5 * static_cast<double>(start.faces.size());
   const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings));

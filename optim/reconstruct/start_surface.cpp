@@ -114,6 +114,34 @@ std::vector<DepthMap> pieces(const DepthMap& map, double jump) {
   return result;
 }
 
+/// Of a voxel, 0 where there is none.
+double albedo_at(const BackProjection& volume, int a, int u, double depth) {
+  const int x = a - kRoom, y = u - kRoom;
+  if (x < 0 || y < 0 || x >= static_cast<int>(volume.across.size()) || y >= static_cast<int>(volume.up.size()))
+    return 0;
+  const auto behind = std::lower_bound(volume.depth.begin(), volume.depth.end(), depth);
+  const std::size_t d = std::min<std::size_t>(behind - volume.depth.begin(), volume.depth.size() - 1);
+  const std::size_t nearest = d > 0 && depth - volume.depth[d - 1] < volume.depth[d] - depth ? d - 1 : d;
+  return volume.albedo[volume.index(nearest, y, x)];
+}
+
+/// Without lines of less than half of the albedo that light of the piece comes from on average: what lies beyond its outline looks
+/// as if it had less, as the outline is blurred.
+DepthMap within_outline(const DepthMap& piece, const BackProjection& volume) {
+  double sum = 0, squares = 0;
+  for (int u = 0; u < piece.height; ++u)
+    for (int a = 0; a < piece.width; ++a) {
+      if (!piece.has(a, u)) continue;
+      const double albedo = albedo_at(volume, a, u, piece.at(a, u));
+      sum += albedo;
+      squares += albedo * albedo;
+    }
+  const double least = sum > 0 ? 0.35 * squares / sum : 0;
+  return piece.changed([&](int a, int u) {
+    return piece.has(a, u) && albedo_at(volume, a, u, piece.at(a, u)) >= least ? piece.at(a, u) : kNone;
+  });
+}
+
 bool meet(const DepthMap& one, const DepthMap& other, double jump) {
   for (std::size_t i = 0; i < one.depth.size(); ++i)
     if (std::abs(one.depth[i] - other.depth[i]) <= jump) return true;
@@ -222,7 +250,10 @@ Mesh start_surface(const BackProjection& volume, const FirstSurface& first) {
   const double voxel = volume.across[1] - volume.across[0];
   const DepthMap map = padded(volume, first.depth);
   const double least = 0.125 * std::numbers::pi * volume.lateral_resolution * volume.lateral_resolution;
-  std::vector<DepthMap> parts = pieces(map, kSteepestJoint * voxel);
+  std::vector<DepthMap> parts;
+  for (const DepthMap& piece : pieces(map, kSteepestJoint * voxel))
+    for (DepthMap& part : pieces(within_outline(piece, volume), kSteepestJoint * voxel))
+      parts.push_back(std::move(part));
   std::erase_if(parts, [&](const DepthMap& part) {
     const auto count = std::count_if(part.depth.begin(), part.depth.end(), [](double d) { return std::isfinite(d); });
     return static_cast<double>(count) * voxel * voxel < least;
