@@ -258,7 +258,8 @@ class ReportTest(unittest.TestCase):
                          ["How it ended", "The surface", "Geometry", "Parameters"])
         for words in ("The fit explains the data: deviance 1234.5", "Levels, of which the page shows the last",
                       "Begun from back projection, significant by 41.8 standard deviations of the counts' noise, which took 2.5 s.",
-                      "Seen from the wall: depth, albedo and standard error of the surface, and depth and albedo by back-projection."):
+                      "Seen from the wall: depth, albedo and standard error of the surface, and depth and albedo by back-projection, "
+                      "which it was begun from."):
             self.assertIn(words, page.words)
         switches = page.all("input", type="radio", name="layer")
         self.assertEqual([(s["value"], "checked" in s) for s in switches], [("shape", False), ("albedo", True), ("uncertainty", False)])

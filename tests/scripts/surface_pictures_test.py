@@ -123,6 +123,18 @@ class SurfacePictureTest(unittest.TestCase):
         missing = shades(np.array([[np.nan, 1.0]]), "inferno", 0, 1)
         np.testing.assert_array_equal(missing[..., 3], [[0, 1]])
 
+    def test_pictures_are_about_what_is_not_dark(self):
+        before = self.figure()["Fit: depth"]
+        square = np.array([[-0.2, 0.2, 0.5], [0.2, 0.2, 0.5], [0.2, -0.2, 0.6], [-0.2, -0.2, 0.6]])
+        far = [[0.1, 0.8, 0.1], [0.2, 0.8, 0.1], [0.2, 0.7, 0.1]]
+        for albedo, same in ((0.001, True), (0.5, False)):
+            write_ply(self.folder / "geometry/final_surface.ply", np.concatenate([square, far]), [*TRIANGLES, (4, 5, 6)],
+                      albedo=[0.2, 0.4, 0.6, 0.8] + [albedo] * 3)
+            after = self.figure()["Fit: depth"]
+            self.assertEqual(before[1].get_extent() == after[1].get_extent(), same)
+            if same:
+                np.testing.assert_allclose(self.colour(after, 0.15, 0.1), self.colour(before, 0.15, 0.1), atol=1e-3)
+
     def test_width_of_a_response(self):
         offsets = np.array([0, 1, 2, 4, 5.0])
         self.assertAlmostEqual(width_at_half(offsets, np.array([0, 1, 2, 0, 0.0])), 2)

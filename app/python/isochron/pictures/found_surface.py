@@ -14,6 +14,8 @@ from isochron.pictures.wall import Wall
 SHAPE = "surface"  # as reconstructions name it in their scenes
 FIT, BACK_PROJECTION = f"geometry/final_{SHAPE}.ply", "back_projection.ply"
 
+DARK = 0.05  # of a surface's largest albedos
+
 
 def width_at_half(offsets, values):
     """Of a response's peak, between the first and the last crossing of half its height."""
@@ -70,6 +72,15 @@ class FoundSurface:
     def _read(self, file, name):
         points, triangles, values = read_run_surface(self.directory / file)
         return Surface(name, self.wall.place(points), triangles, values.get("albedo"), values.get("standard_error"))
+
+    @staticmethod
+    def least_lit(surface):
+        """Albedo below which a part sends hardly any light, so that pictures need not be about it."""
+        return -np.inf if surface.albedo is None else DARK * np.percentile(surface.albedo, 99)
+
+    def lit(self, surface):
+        """Which vertices [N] pictures are about."""
+        return np.ones(len(surface.points), bool) if surface.albedo is None else surface.albedo >= self.least_lit(surface)
 
     def undetermined(self, errors):
         """Where the data do not say where the surface is: its standard error is unknown or above the resolution."""

@@ -38,6 +38,7 @@ class Sight:
         seen = Seen(surface.points, surface.triangles, across, up)
         self.depth = seen.depth
         self.albedo = None if surface.albedo is None else seen.of(surface.albedo)
+        self.lit = np.isfinite(self.depth) if self.albedo is None else self.albedo >= found.least_lit(surface)
         self.errors = self.undetermined = None
         if surface.errors is not None:
             errors = seen.of(surface.errors)
@@ -46,9 +47,9 @@ class Sight:
 
 
 def pixels_of(found):
-    """Corners of the pictures, which hold the surfaces, and the places of their pixels."""
+    """Corners of the pictures, which hold all that is not dark of the surfaces, and the places of their pixels."""
     low, high = extent_of(found)
-    places = np.concatenate([surface.points[:, :2] for surface in found.surfaces])
+    places = np.concatenate([surface.points[found.lit(surface), :2] for surface in found.surfaces])
     margin = MARGIN * np.ptp(places, axis=0).max()
     low, high = np.maximum(low, places.min(axis=0) - margin), np.minimum(high, places.max(axis=0) + margin)
     step = (high - low).max() / PIXELS
@@ -85,7 +86,7 @@ def surface_figure(found):
     """To be saved or closed by who calls."""
     low, high, across, up = pixels_of(found)
     sights = [Sight(found, surface, across, up) for surface in found.surfaces]
-    depths = np.concatenate([sight.depth[np.isfinite(sight.depth)] for sight in sights])
+    depths = np.concatenate([sight.depth[sight.lit] for sight in sights])
     ends = np.percentile(depths, [OUTLIERS, 100 - OUTLIERS]) if depths.size else (0, 1)
     with matplotlib.rc_context(STYLE):
         height = PANEL * float(np.clip((high - low)[1] / (high - low)[0], 0.3, 2)) + LINES
@@ -133,6 +134,9 @@ def lines_about(found, sights):
 
 def about_fit(found, sight):
     yield "vertices", f"{len(found.fit.points)}"
+    dark = np.count_nonzero(~found.lit(found.fit))
+    if dark:
+        yield "of them dark", f"{dark}, which may be out of view"
     if sight.errors is not None:
         seen = np.isfinite(sight.depth)
         known = sight.errors[seen & ~sight.undetermined]

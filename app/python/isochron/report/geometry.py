@@ -88,7 +88,8 @@ class Geometry:
             names = [m for m in moments if len(moments[m][0]) == len(next(iter(moments.values()))[0])]
             points, triangles = self._coarser(shape, [moments[m][0] for m in names], moments[names[0]][1], MOST_TRIANGLES)
             for name, p in zip(names, points):
-                self.meshes.append({"shape": shape, "moment": name, "points": p, "triangles": triangles, "layers": {}})
+                self.meshes.append({"shape": shape, "moment": name, "points": p, "triangles": triangles, "layers": {},
+                                    "about": p})
         present = {mesh["moment"] for mesh in self.meshes}
         self.names = {m: "final" if m == "current" and self.run.ended else m for m in MOMENTS if m in present}
 
@@ -97,10 +98,10 @@ class Geometry:
         self.moved = {found.shape: {}}
         for moment, surface in (("initial", found.back_projection), ("current", found.fit)):
             layers, bars = colours_of(found, surface)
-            (points, *colours), triangles = self._coarser(surface.name, [found.wall.world(surface.points), *layers.values()],
-                                                          surface.triangles, MOST_OF_FOUND)
+            whole = found.wall.world(surface.points)
+            (points, *colours), triangles = self._coarser(surface.name, [whole, *layers.values()], surface.triangles, MOST_OF_FOUND)
             self.meshes.append({"shape": surface.name, "moment": moment, "points": points, "triangles": triangles,
-                                "layers": dict(zip(layers, colours))})
+                                "layers": dict(zip(layers, colours)), "about": whole[found.lit(surface)]})
             self.names[moment] = surface.name
             for layer, bar in bars.items():
                 self.bars.setdefault(layer, []).append(bar)
@@ -174,7 +175,7 @@ class Geometry:
 
     def data(self):
         everything = np.concatenate([m["points"] for m in self.meshes] + [p for p, _ in self.lines])
-        moving = np.concatenate([m["points"] for m in self.meshes])
+        moving = np.concatenate([m["about"] for m in self.meshes])
         low, high = everything.min(axis=0), everything.max(axis=0)
         middle = (moving.min(axis=0) + moving.max(axis=0)) / 2
         # The moving shapes are in the middle; of a scene that is far larger, what is about them. What was found fills the view.

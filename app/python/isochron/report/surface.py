@@ -32,10 +32,9 @@ def surface_section(run):
     figure = surface_figure(found)
     uri = figure_uri(figure)
     plt.close(figure)
-    alt = ("Seen from the wall: depth, albedo and standard error of the surface" if found.fit else "Seen from the wall: depth and albedo")
-    words = " by back-projection, which it was begun from" if not found.fit else ", and depth and albedo by back-projection"
-    picture = element("figure", element("img", src=uri, alt=alt + words, class_="paper"), element("figcaption", f"{alt}{words}."),
-                      class_="card wide")
+    of_fit = f"depth, albedo{' and standard error' if found.fit.errors is not None else ''} of the surface, and " if found.fit else ""
+    words = f"Seen from the wall: {of_fit}depth and albedo by back-projection, which it was begun from."
+    picture = element("figure", element("img", src=uri, alt=words, class_="paper"), element("figcaption", words), class_="card wide")
     return section("surface", "The surface", picture)
 
 
