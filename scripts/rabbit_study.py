@@ -17,6 +17,7 @@ its favour: of all whose silhouette is within a tenth of the best, those with th
 import argparse
 import itertools
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -56,8 +57,9 @@ def by_light_cone(capture):
 
 def by_fit(path, limit, seed, folder):
     """Vertices and triangles, or None where there is no signal; and the verdict."""
+    shutil.rmtree(folder, ignore_errors=True)  # nothing of another run may be taken for this one's
     try:
-        program("reconstruct", path, "-o", folder, "--response", RESPONSE, "--seconds", limit, "--seed", seed, "--force")
+        program("reconstruct", path, "-o", folder, "--response", RESPONSE, "--seconds", limit, "--seed", seed)
     except Failure:
         if not (folder / "summary.yaml").exists() or summary(folder)["fit"]["verdict"] != "no_signal":
             raise

@@ -2,6 +2,7 @@
 """The light-cone transform on surfaces whose place is known, errors of the rabbit itself, and the tables and pictures of the study."""
 
 import pathlib
+import shutil
 import sys
 import tempfile
 import unittest
@@ -17,6 +18,7 @@ import rabbit_errors
 import rabbit_study
 from isochron.captures import Capture
 from isochron.mesh_files import read_mesh
+from reproduction.measure import Failure
 from reproduction.tables import write_rows
 
 BIN, BINS, REACH = 0.005, 400, 0.8
@@ -91,6 +93,29 @@ class StudyTest(unittest.TestCase):
                                              surface=lambda ratio, least: (ratio, least)), \
                 unittest.mock.patch.object(rabbit_errors, "errors", lambda *key: dict(zip(("silhouette", "within_80_mm"), surfaces[key]))):
             self.assertEqual(rabbit_study.by_light_cone(None)[0], (2, 0.1))
+
+    def test_fits(self):
+        """With a stand-in for the program."""
+        def program(*words):
+            self.assertEqual(words[:2], ("reconstruct", "c.h5"))
+            out = words[words.index("-o") + 1]
+            self.assertFalse(out.exists())
+            if verdict:
+                (out / "geometry").mkdir(parents=True)
+                (out / "summary.yaml").write_text(f"fit: {{verdict: {verdict}}}\n")
+                shutil.copy(ROOT / "tests/data/field/meshes/bom.ply", out / "geometry/final_surface.ply")
+            if verdict in (None, "no_signal"):
+                raise Failure("status 1")
+
+        with tempfile.TemporaryDirectory() as temporary, unittest.mock.patch.object(rabbit_study, "program", program):
+            for verdict in ("explained", "no_signal", None):
+                with self.subTest(verdict=verdict):
+                    if verdict is None:
+                        with self.assertRaises(Failure):
+                            rabbit_study.by_fit("c.h5", 300, 1, pathlib.Path(temporary) / "run")
+                        continue
+                    found, said = rabbit_study.by_fit("c.h5", 300, 1, pathlib.Path(temporary) / "run")
+                    self.assertEqual((said, found is None), (verdict, verdict == "no_signal"))
 
     def test_pictures(self):
         with tempfile.TemporaryDirectory() as temporary:

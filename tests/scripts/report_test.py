@@ -283,6 +283,9 @@ class ReportTest(unittest.TestCase):
 
     def test_reconstruction_that_lacks_something(self):
         write_reconstruction(self.folder)
+        self.edit("levels/1/summary.yaml", "status: iterations_reached", "status: interrupted")  # where time was over
+        self.assertIn("The fit explains the data", self.page().words)
+        self.edit("levels/1/summary.yaml", "status: interrupted", "status: iterations_reached")
         (self.folder / "geometry/final_surface.ply").unlink()
         page = self.page()
         self.assertIn("Seen from the wall: depth and albedo by back-projection, which it was begun from.", page.words)

@@ -291,7 +291,7 @@ FIT = {"explained": "The fit explains the data", "unexplained": "The fit does no
 
 def fit(run):
     """Whether the counts are explained, with the numbers behind it."""
-    found = run.whole.get("fit") or run.summary.get("fit") if run.ended else None
+    found = None if run.going else run.whole.get("fit") or run.summary.get("fit")
     if not isinstance(found, dict) or found.get("verdict") not in FIT:
         return ""
     return element("p", f"{FIT[found['verdict']]}: deviance {number(found['deviance'], 6)}, to be expected "
