@@ -4,6 +4,7 @@ of depth, counts are the albedo convolved with a kernel that is the same everywh
 import dataclasses
 
 import numpy as np
+from scipy import fft
 
 FALLOFF = 2  # light of a small diffuse surface decreases with r^4 = v^2
 CELLS = 512  # along v and u
@@ -35,7 +36,7 @@ def kernel(shape, steps, step):
     """Of a surface at the origin: where v is the square of the distance across, on a grid that goes round. Its norm is 1."""
     squares = []
     for count, width in zip(shape, steps):
-        cells = np.fft.fftfreq(count, 1 / count)
+        cells = fft.fftfreq(count, 1 / count)
         parts = (np.arange(FINER) + 0.5) / FINER - 0.5
         squares.append(((cells[:, np.newaxis] + parts) * width) ** 2 / step)
     values = np.zeros(shape, np.float32)
@@ -59,11 +60,11 @@ def volumes(capture, delay, reach, ratios):
     shape = tuple(2 * n for n in data.shape)  # what goes round meets nothing
     across, up = capture.points[:, 0, 0], capture.points[0, :, 1]
     steps = [abs(axis[1] - axis[0]) for axis in (across, up)]
-    response = np.fft.rfftn(kernel(shape, steps, step))
-    spectrum = np.fft.rfftn(data, shape)
+    response = fft.rfftn(kernel(shape, steps, step))
+    spectrum = fft.rfftn(data, shape)
     squares = step * places
     for ratio in ratios:
-        found = np.fft.irfftn(spectrum * np.conj(response) / (np.abs(response) ** 2 + 1 / ratio), shape)
+        found = fft.irfftn(spectrum * np.conj(response) / (np.abs(response) ** 2 + 1 / ratio), shape)
         found = found[tuple(slice(n) for n in data.shape)] * 2 * np.sqrt(squares)
         yield Volume(found.astype(np.float32), across, up, squares)
 
