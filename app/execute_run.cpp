@@ -12,6 +12,11 @@ namespace isochron {
 
 int execute_run(const std::string& folder, const CommonOptions& common, bool force,
                 const std::function<RunStatus(const RunOptions&)>& start) {
+  return *execute_run_if_any(folder, common, force, start);
+}
+
+std::optional<int> execute_run_if_any(const std::string& folder, const CommonOptions& common, bool force,
+                                      const std::function<std::optional<RunStatus>(const RunOptions&)>& start) {
   catch_interrupts();
   ProgressDisplay display(common.quiet);
   RunOptions options;
@@ -22,8 +27,9 @@ int execute_run(const std::string& folder, const CommonOptions& common, bool for
   options.warning = warn;
   std::string report;
   options.report = [&](const std::string& text) { report = text; };
-  const RunStatus status = start(options);
+  const std::optional<RunStatus> status = start(options);
   display.end();
+  if (!status) return {};
   if (status == RunStatus::interrupted) {
     spdlog::warn("interrupted; go on with: isochron resume {}", folder);
     return 1;
@@ -35,7 +41,7 @@ int execute_run(const std::string& folder, const CommonOptions& common, bool for
     spdlog::error("{}: the run diverged; see log.csv and summary.yaml there", folder);
     return 1;
   }
-  spdlog::info("{}: {}", folder, name(status));
+  spdlog::info("{}: {}", folder, name(*status));
   return plotted ? 0 : 1;
 }
 

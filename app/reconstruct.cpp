@@ -1,15 +1,10 @@
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <cmath>
-#include <filesystem>
+#include <optional>
 
 #include "app/commands.h"
 #include "app/execute_run.h"
-#include "app/temporary_folder.h"
-#include "core/base/file.h"
-#include "optim/reconstruct/reconstruction.h"
-#include "optim/run/run_folder.h"
+#include "optim/reconstruct/run_reconstruction.h"
 
 namespace isochron {
 namespace {
@@ -20,31 +15,23 @@ struct ReconstructCommand {
   bool force = false;
 };
 
-/// A folder that says that there is nothing to be found, and how much light would be needed.
-int end_without_signal(const Reconstruction& found, const std::string& folder, bool force) {
-  const FolderLock lock = prepare_run_folder(folder, force, warn);
-  write_file_atomically(folder + "/summary.yaml", fmt::format("fit: {{verdict: no_signal, photons_needed: {:.3g}}}\n{}",
-                                                              found.photons_needed, found.files.at("start.yaml")));
-  spdlog::error(
-      "{}: no light of a hidden surface stands out of the background; the smallest surface that could be told apart "
-      "would have to send "
-      "some {:.0f} photons to all points together",
-      folder, found.photons_needed);
-  return 1;
-}
-
-int reconstruct(ReconstructCommand command) {
+int reconstruct(const ReconstructCommand& command) {
   begin_session(command.common);
-  const std::string name = std::filesystem::path(command.spec.capture).stem().string();
-  const std::string folder = command.common.output.empty() ? "runs/" + name : command.common.output;
-  const TemporaryFolder place;
-  const Reconstruction found = begin_reconstruction(command.spec, place.path(), warn);
-  if (!found.has_signal) return end_without_signal(found, folder, command.force);
-  const Experiment experiment = load_experiment(place.path() + "/experiment.yaml");
-  return execute_run(folder, command.common, command.force, [&](RunOptions options) {
-    options.files = found.files;
-    return start_run(experiment, options);
-  });
+  const std::string folder = command.common.output.empty() ? default_folder(command.spec) : command.common.output;
+  double photons_needed = 0;
+  const auto start = [&](const RunOptions& options) {
+    const ReconstructionResult result = run_reconstruction(command.spec, options);
+    photons_needed = result.photons_needed;
+    return result.status;
+  };
+  const std::optional<int> status = execute_run_if_any(folder, command.common, command.force, start);
+  if (status) return *status;
+  spdlog::error(
+      "{}: no light of a hidden surface stands out of the background; the smallest that could be told apart would have "
+      "to send "
+      "some {:.0f} photons to all points together",
+      folder, photons_needed);
+  return 1;
 }
 
 }  // namespace
@@ -62,7 +49,7 @@ void add_reconstruct(CLI::App& app, Action& action) {
       ->type_name("IRF.csv");
   sub->add_option("--seconds", command->spec.seconds,
                   "what the fit may take on two cores: more for less noise (default 300)")
-      ->check(CLI::Range(1.0, 1e6))
+      ->check(CLI::Range(0.1, 1e6))
       ->type_name("N");
   sub->add_option("--seed", command->spec.seed, "seed of the random numbers")->type_name("N");
   sub->add_flag("--force", command->force,

@@ -39,6 +39,8 @@ PYBIND11_MODULE(_core, module) {
   module.def("version", program_version);
   module.def("use_threads", use_threads, "count"_a);
   module.def("used_threads", used_threads);
+  module.def("reconstruct", reconstruct_session, "capture"_a, "response"_a, "folder"_a, "seconds"_a, "seed"_a,
+             "force"_a, "row"_a);
   module.def("resume", resume_session, "folder"_a, "row"_a);
   module.def("back_project", back_project_arrays, "counts"_a, "points"_a, "normals"_a, "laser"_a, "delta_t"_a,
              "t_start"_a, "origins"_a, "response"_a, "used"_a, "false_alarms"_a);

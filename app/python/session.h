@@ -65,6 +65,11 @@ class Session {
   std::string no_target_;  ///< why there is none: a parameter without a target value; empty where there is one
 };
 
+/// Finds the surface behind a capture's counts; its run's folder, or none where there is no signal. `row` as of Session::run.
+std::optional<std::string> reconstruct_session(const std::string& capture, const std::string& response,
+                                               const std::string& folder, double seconds, std::uint64_t seed,
+                                               bool force, const pybind11::object& row);
+
 /// Goes on with the run in a folder.
 void resume_session(const std::string& folder, const pybind11::object& row);
 

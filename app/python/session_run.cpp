@@ -3,7 +3,7 @@
 #include "app/python/session.h"
 #include "app/python/work.h"
 #include "core/base/progress.h"
-#include "optim/run/run.h"
+#include "optim/reconstruct/run_reconstruction.h"
 
 namespace py = pybind11;
 
@@ -59,6 +59,17 @@ std::string Session::run(const std::string& folder, const std::optional<Array>& 
   const std::string output = output_folder(folder, experiment);
   execute(output, force, row, [&](const RunOptions& options) { start_run(experiment, options); });
   return output;
+}
+
+std::optional<std::string> reconstruct_session(const std::string& capture, const std::string& response,
+                                               const std::string& folder, double seconds, std::uint64_t seed,
+                                               bool force, const py::object& row) {
+  const ReconstructionSpec spec{capture, response, seconds, seed};
+  const std::string output = folder.empty() ? default_folder(spec) : folder;
+  bool found = false;
+  execute(output, force, row,
+          [&](const RunOptions& options) { found = run_reconstruction(spec, options).status.has_value(); });
+  return found ? std::optional(output) : std::nullopt;
 }
 
 void resume_session(const std::string& folder, const py::object& row) {

@@ -1,8 +1,8 @@
 """isochron: inverse rendering for time-of-flight cameras.
 
 Experiment renders, differentiates and optimises; read_run, read_image, read_exr and read_capture read what was written, and
-work where the compiled part of the package is missing, too. back_project finds hidden surfaces in captures. isochron.torch makes
-images that PyTorch differentiates.
+work where the compiled part of the package is missing, too. reconstruct finds the surface behind a capture, back_project where
+it may be. isochron.torch makes images that PyTorch differentiates.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from isochron.exr import read as read_exr
 from isochron.exr import write as write_exr
 from isochron.image import Coordinates, Image
 from isochron.parallel import set_threads, threads
+from isochron.reconstruction import reconstruct
 from isochron.runs import Run, read_image, read_run
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
     from isochron.captures import Capture, read_capture, write_capture
 
 __all__ = ["BackProjection", "Capture", "Coordinates", "Evaluation", "Experiment", "Gradient", "Image", "InputError", "Iteration",
-           "Parameter", "Run", "back_project", "read_capture", "read_exr", "read_image", "read_run", "resume", "set_threads", "threads",
-           "write_capture", "write_exr"]
+           "Parameter", "Run", "back_project", "read_capture", "read_exr", "read_image", "read_run", "reconstruct", "resume",
+           "set_threads", "threads", "write_capture", "write_exr"]
 
 
 def __getattr__(name: str) -> Any:

@@ -108,7 +108,7 @@ class Iteration:
 Callback = Callable[[Iteration], Any]
 
 
-def _row(callback: Callback | None) -> Callable[[dict[str, Any]], bool] | None:
+def row_callback(callback: Callback | None) -> Callable[[dict[str, Any]], bool] | None:
     if callback is None:
         return None
     return lambda values: bool(callback(Iteration(**values)))
@@ -298,7 +298,7 @@ class Experiment:
         force: an earlier run in the folder is deleted, not moved aside.
         """
         first = None if start is None else self.theta(start)
-        return read_run(self._session.run("" if folder is None else os.fspath(folder), first, _row(callback), force))
+        return read_run(self._session.run("" if folder is None else os.fspath(folder), first, row_callback(callback), force))
 
     def _flat(self, key: str) -> np.ndarray:
         parts = [getattr(p, key).reshape(-1) for p in self._parameters.values()]
@@ -307,5 +307,5 @@ class Experiment:
 
 def resume(folder: Path, callback: Callback | None = None) -> Run:
     """Goes on from the last checkpoint of a run, to the same result bit for bit, and reads it. callback: as of Experiment.run."""
-    extension().resume(os.fspath(folder), _row(callback))
+    extension().resume(os.fspath(folder), row_callback(callback))
     return read_run(folder)
