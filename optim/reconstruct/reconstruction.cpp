@@ -32,7 +32,7 @@ namespace fs = std::filesystem;
 constexpr double kSamplesPerSecond = 7000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 constexpr int kMostLevels = 3;
-constexpr double kMostVertices = 10000;
+constexpr double kMostVertices = 20000;
 constexpr double kBending =
     3;  // prior's weight at first: three nats for a curvature of 1 over the square of its radius
 constexpr double kMotionSlope = 0.0625;  // expected change of offsets over the distance
