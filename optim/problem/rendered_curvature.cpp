@@ -16,8 +16,8 @@ constexpr std::uint32_t kProductsIteration = kMostIterations + 2u, kMatrixIterat
 /// Their scatter is known to a factor of about 1 +- 1 / sqrt(10).
 constexpr int kGradients = 6;
 
-/// Of a posterior's samples. With the prior in the preconditioner the last twelve of 24 changed scatters of the rabbit's vertices by less than
-/// their own standard error.
+/// Of a posterior's samples. In tests/optim/evidence_test.cpp, 81 unknowns, twelve steps and 24 give the same trace, 39.4, where the whole
+/// matrix has 37.5; six give 36.8.
 constexpr int kSampleSteps = 12;
 
 /// Of the diagonal, which preconditions: each knows an entry to a factor of about 1 +- sqrt(2 / 12).

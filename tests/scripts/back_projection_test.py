@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""isochron.back_project: hidden patches of which the counts are known in closed form, confocal and from spots, by file and by arrays.
+"""isochron.back_project and isochron.reconstruct: hidden patches of which the counts are known in closed form, confocal and from spots, by file and by arrays.
 
 usage: back_projection_test.py FOLDER     of the package with its extension
 """
@@ -93,6 +93,28 @@ class BackProjectionTest(unittest.TestCase):
         dark.counts[:] = 0
         found = isochron.back_project(dark)
         self.assertEqual((found.albedo.shape, found.depth_map.shape, found.vertices.shape), ((0, 0, 0), (0, 0), (0, 3)))
+
+    def test_reconstructions(self):
+        """Of arrays and of files: the same run, at the place of the patch."""
+        some = capture(delay=DELAY_PS * 0.299792458e-3)
+        response = np.array([0, 190, 200, 210]), np.array([0, 0, 1, 0])
+        rows = []
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = pathlib.Path(temporary)
+            run = isochron.reconstruct(some, response, 0.5, rows.append, folder=folder / "arrays")
+            isochron.write_capture(folder / "counts.h5", some.counts, BIN, 0, some.points, [0, 0, 1])
+            np.savetxt(folder / "response.csv", np.transpose(response), delimiter=",", header="offset,value", comments="")
+            again = isochron.reconstruct(folder / "counts.h5", folder / "response.csv", 0.5, folder=folder / "files")
+            vertices, triangles = run.meshes()["surface"]
+            for mine, other in zip((vertices, triangles), again.meshes()["surface"]):
+                np.testing.assert_array_equal(mine, other)
+            with self.assertRaisesRegex(isochron.InputError, "no light"):
+                some.counts[:] = 0
+                isochron.reconstruct(some, folder=folder / "dark")
+            self.assertIn("no_signal", (folder / "dark/summary.yaml").read_text(encoding="ascii"))
+        self.assertLess(np.abs(vertices.mean(axis=0) - HIDDEN).max(), 0.02)
+        self.assertGreater(len(rows), 3)
+        self.assertEqual(run.summary["start"]["method"], "back_projection")
 
     def test_mistakes(self):
         some = capture()
