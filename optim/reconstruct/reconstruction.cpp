@@ -135,6 +135,14 @@ Range distances(const Vec3& from, const std::vector<Vec3>& places) {
   return range;
 }
 
+BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response, const std::string& file) {
+  try {
+    return back_project(capture, response);
+  } catch (const InputError& error) {
+    throw InputError(fmt::format("{}: {}", file, error.what()));
+  }
+}
+
 /// Times, as optical paths, at which light of the mesh may be counted at any point, and a quarter as much before and after, for the
 /// background.
 std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
@@ -278,7 +286,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   const CaptureFile capture = read_capture(spec.capture);
   const DetectorResponse response = response_of(unmeasured.gates, capture);
   const ProgressStage stage("back-projection", 1);
-  const BackProjection volume = back_project(capture, response);
+  const BackProjection volume = back_projected(capture, response, spec.capture);
   const FirstSurface first = first_surface(volume);
   const Mesh start = start_surface(volume, first);
 

@@ -93,12 +93,15 @@ TEST_F(Reconstruct, SaysHowMuchLightIsMissing) {
 
 TEST_F(Reconstruct, SaysInOneLineWhatIsWrong) {
   folder_.write("long.csv", "offset,value\n0,1\n100000,1\n");
+  CaptureFile point = expected_counts(square_wall(4, 0), plate({0, 0, 0.4}, 0.1, 0.1, 0.1), 200, 32 * kPs, 100);
+  write_capture(folder_.file("point.h5"), point);
   folder_.write("words.csv", "offset,value\n0,one\n");
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {command("out", {}, "absent.h5"), "absent.h5"},
       {command("out", {"--response", folder_.file("absent.csv")}), "absent.csv"},
       {command("out", {"--response", folder_.file("words.csv")}), "words.csv"},
-      {command("out", {"--response", folder_.file("long.csv")}), "too few"},
+      {command("out", {"--response", folder_.file("long.csv")}), "plate.h5: the capture's 200 bins are too few"},
+      {command("out", {}, "point.h5"), "point.h5: the capture's sensor points are all at one place"},
       {command("out", {}, "plate.h5", "0"), "--seconds"},
   };
   for (const auto& [arguments, named] : cases) {
