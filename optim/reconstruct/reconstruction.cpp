@@ -97,7 +97,7 @@ output: {{histogram_samples: {primal}}}
       fmt::arg("primal", set.samples), fmt::arg("interior", std::max(2, set.samples / 2)));
 }
 
-std::string scene_text(const ReconstructionSpec& spec) {
+std::string scene_text(const std::string& capture) {
   return fmt::format(
       "# Lengths in metres; start.ply is in the coordinates of the capture.\n"
       "capture: {{file: {}}}\n"
@@ -105,7 +105,7 @@ std::string scene_text(const ReconstructionSpec& spec) {
       "  surface: {{type: diffuse, albedo: 0.5}}\n"
       "shapes:\n"
       "  - {{name: surface, file: start.ply, material: surface}}\n",
-      quoted_path(spec.capture));
+      capture);
 }
 
 std::string ply(const Mesh& mesh, const std::vector<double>& albedo = {}) {
@@ -279,8 +279,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   Settings set;
   Reconstruction result;
   const auto write = [&](const std::string& file, const std::string& text) { write_file_atomically(file, text); };
-  result.files["scene.yaml"] = scene_text(spec);
-  write(place + "/scene.yaml", result.files["scene.yaml"]);
+  write(place + "/scene.yaml", scene_text(quoted_path(spec.capture)));
   write(experiment, experiment_text(spec, name, set));
   const Experiment unmeasured = load_experiment(experiment);
   const CaptureFile capture = read_capture(spec.capture);
@@ -311,6 +310,8 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
          static_cast<double>(start.positions.size()) * std::pow(4.0, set.levels) <= kMostVertices)
     ++set.levels;
   set.window = time_window(start, capture.geometry, response, volume.depth_resolution);
+  // Beside the run's copy of the capture.
+  result.files["scene.yaml"] = scene_text("\"inputs/scene/elsewhere/" + fs::path(spec.capture).filename().string() + "\"");
   result.files["start.ply"] = ply(start);
   write(place + "/start.ply", result.files["start.ply"]);
   write(experiment, experiment_text(spec, name, set));
