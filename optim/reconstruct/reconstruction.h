@@ -3,9 +3,9 @@
 // The start is what back-projection shows (start_surface.h). The fit moves all vertices freely, in levels, and weighs four priors, which
 // the evidence of each level changes for the next:
 // - the surface bends little, and so do its borders (bending.h);
-// - it does not move far from where a level began: what one neighbour moves by differs from what the next one does by a quarter of
+// - it does not move far from where a level began: what one neighbour moves by differs from what the next one does by a sixteenth of
 //   their distance;
-// - albedos differ little from place to place: by 0.05 across the surface. Where one that falls off freely would imitate a border that
+// - albedos differ little from place to place: by 0.1 across the surface. Where one that falls off freely would imitate a border that
 //   is elsewhere, and take the surface's tilt with it;
 // - gain and albedo are known as a product alone: the gain is that of a start with an albedo of a half.
 #pragma once
@@ -19,10 +19,9 @@
 namespace isochron {
 
 struct ReconstructionSpec {
-  std::string capture;  ///< HDF5 file
-  std::string
-      response;  ///< table of how much later than it arrives light is counted, ps; empty: it is counted as it arrives
-  double seconds = 300;  ///< what the fit may take on two cores of 2020: more samples where there is more time
+  std::string capture;   ///< HDF5 file
+  std::string response;  ///< table of how much later than it arrives light is counted, ps; empty: as it arrives
+  double seconds = 300;  ///< for which the fit has samples, on two cores: see fit_settings
   std::uint64_t seed = 1;
 };
 
@@ -33,7 +32,7 @@ struct Reconstruction {
   double photons_needed = 0;
   /// By name, beside what the run writes: scene.yaml, start.ply, back_projection.ply, start.yaml (RunOptions::files).
   std::map<std::string, std::string> files;
-  std::string experiment;  ///< contents of experiment.yaml, which reads the first two; empty without signal
+  std::string experiment;  ///< contents of experiment.yaml, which reads the first two
 };
 
 /// Reads the capture and makes a start. `place` is a folder for what it writes on the way: scene.yaml, start.ply, experiment.yaml.

@@ -13,12 +13,12 @@
 namespace isochron {
 namespace {
 
-constexpr int kSide = 2;               // voxels that make a lateral resolution
-constexpr int kRings = 2;              // voxels beyond what is significant
-constexpr int kSmoothings = 2;         // means over 3 x 3 voxels: about a lateral resolution wide
-constexpr int kRoundings = 6;          // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
-constexpr double kSteepestJoint = 2;   // depth over distance, as of the first surface
-constexpr int kRoom = kRings + kSide;  // voxels about what is significant
+constexpr int kCellLines = 2;         // voxels that make a lateral resolution
+constexpr int kRings = 2;             // voxels beyond what is significant
+constexpr int kSmoothings = 2;        // means over 3 x 3 voxels: about a lateral resolution wide
+constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
+constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
+constexpr int kRoom = kRings + kCellLines;  // voxels about what is significant
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 /// A depth for each line of sight; not a number where there is none.
@@ -165,24 +165,24 @@ std::vector<DepthMap> joined(std::vector<DepthMap> parts, const BackProjection& 
   return grown;
 }
 
-/// Which cells, of kSide x kSide lines, have triangles: those with all corners and no jump between them, no two of which touch at a
+/// Which cells, of kCellLines x kCellLines lines, have triangles: those with all corners and no jump between them, no two of which touch at a
 /// corner alone.
 std::set<std::pair<int, int>> cells(const DepthMap& map, double jump) {
   std::set<std::pair<int, int>> result;
-  for (int u = 0; u + kSide < map.height; u += kSide)
-    for (int a = 0; a + kSide < map.width; a += kSide) {
-      const auto [low, high] =
-          std::minmax({map.at(a, u), map.at(a + kSide, u), map.at(a, u + kSide), map.at(a + kSide, u + kSide)});
-      const bool whole =
-          map.has(a, u) && map.has(a + kSide, u) && map.has(a, u + kSide) && map.has(a + kSide, u + kSide);
+  for (int u = 0; u + kCellLines < map.height; u += kCellLines)
+    for (int a = 0; a + kCellLines < map.width; a += kCellLines) {
+      const auto [low, high] = std::minmax(
+          {map.at(a, u), map.at(a + kCellLines, u), map.at(a, u + kCellLines), map.at(a + kCellLines, u + kCellLines)});
+      const bool whole = map.has(a, u) && map.has(a + kCellLines, u) && map.has(a, u + kCellLines) &&
+                         map.has(a + kCellLines, u + kCellLines);
       if (whole && high - low <= jump) result.emplace(a, u);
     }
   for (bool touching = true; touching;) {
     touching = false;
     for (const auto& [a, u] : result) {
-      for (const int side : {-kSide, kSide})
-        touching = touching || (result.contains({a + side, u + kSide}) && !result.contains({a + side, u}) &&
-                                !result.contains({a, u + kSide}));
+      for (const int side : {-kCellLines, kCellLines})
+        touching = touching || (result.contains({a + side, u + kCellLines}) && !result.contains({a + side, u}) &&
+                                !result.contains({a, u + kCellLines}));
       if (touching) {
         result.erase({a, u});
         break;
@@ -202,7 +202,8 @@ Mesh meshed(const DepthMap& map, double jump) {
     return entry->second;
   };
   for (const auto& [a, u] : cells(map, jump)) {
-    const std::array corners{vertex(a, u), vertex(a, u + kSide), vertex(a + kSide, u + kSide), vertex(a + kSide, u)};
+    const std::array corners{vertex(a, u), vertex(a, u + kCellLines), vertex(a + kCellLines, u + kCellLines),
+                             vertex(a + kCellLines, u)};
     const auto depth = [&](int k) { return mesh.positions[corners[k]].z; };
     // Along the diagonal over which the sheet bends less.
     const int first = std::abs(depth(1) - depth(3)) < std::abs(depth(0) - depth(2)) ? 1 : 0;
@@ -258,7 +259,7 @@ Mesh start_surface(const BackProjection& volume, const FirstSurface& first) {
     const auto count = std::count_if(part.depth.begin(), part.depth.end(), [](double d) { return std::isfinite(d); });
     return static_cast<double>(count) * voxel * voxel < least;
   });
-  const double jump = kSteepestJoint * std::numbers::sqrt2 * kSide * voxel;
+  const double jump = kSteepestJoint * std::numbers::sqrt2 * kCellLines * voxel;
   const double left = volume.across[0] - 0.5 * voxel * (map.width - static_cast<int>(volume.across.size())),
                bottom = volume.up[0] - 0.5 * voxel * (map.height - static_cast<int>(volume.up.size()));
   for (const DepthMap& part : joined(std::move(parts), volume, kSteepestJoint * voxel, jump)) {

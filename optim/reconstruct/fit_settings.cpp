@@ -1,0 +1,154 @@
+#include "optim/reconstruct/fit_settings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "optim/problem/dark_bins.h"
+#include "optim/problem/loss.h"
+#include "optim/problem/problem.h"
+
+namespace isochron {
+namespace {
+
+/// Per histogram. The rabbit of scenes/rabbit, 4096 histograms, takes 289 s of a processor with 512 samples, nearly all of which grows
+/// with them: with so many as this 205 s of two.
+constexpr double kSamplesPerSecond = 10000;
+constexpr int kLeastSamples = 16, kMostSamples = 4096;
+/// The third level takes the rabbit's errors from 0.97 to 0.96 mm: a fourth would be for nothing. Metrics of more vertices take longer
+/// than rendering.
+constexpr int kMostLevels = 3;
+constexpr double kMostVertices = 20000;
+/// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos across the surface.
+constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.1;
+
+struct Range {
+  double least = std::numeric_limits<double>::infinity(), most = 0;
+};
+
+Range distances(const Vec3& from, const std::vector<Vec3>& places) {
+  Range range;
+  for (const Vec3& p : places) {
+    range.least = std::min(range.least, length(p - from));
+    range.most = std::max(range.most, length(p - from));
+  }
+  return range;
+}
+
+/// What the dark bins of each sensor point say; those whose readings do not count are left out.
+std::vector<double> point_levels(const GatedImage& counts, const Readings& readings, int points) {
+  std::vector<double> levels = dark_levels(counts, readings, points);
+  std::erase_if(levels, [](double level) { return !std::isfinite(level); });
+  return levels;
+}
+
+/// Whether they scatter more than Poisson numbers of one mean do, by five standard deviations.
+bool vary(const std::vector<double>& levels, double readings_each) {
+  if (levels.size() < 2) return false;
+  const auto n = static_cast<double>(levels.size());
+  const double mean = std::accumulate(levels.begin(), levels.end(), 0.0) / n;
+  double squares = 0;
+  for (const double level : levels) squares += (level - mean) * (level - mean);
+  // Half of the readings are dark at least, else the level says little.
+  const double expected = 2 * mean / readings_each;
+  return squares / (n - 1) > expected * (1 + 5 * std::sqrt(2 / (n - 1)));
+}
+
+/// Sums over the points, of each gate that counts.
+std::vector<double> by_gate(const GatedImage& image, const Readings& readings) {
+  std::vector<double> sums;
+  for (int g = 0; g < image.gates; ++g) {
+    if (!readings.uses_gate(g)) continue;
+    sums.push_back(0);
+    for (int p = 0; p < image.pixels(); ++p)
+      if (readings.uses_pixel(p)) sums.back() += image.at(p, g);
+  }
+  return sums;
+}
+
+/// The multiple of the light that with a background explains the counts best: weighted least squares of the sums, whose variances are
+/// the counts. What is dark cannot be told from counts alone where a response has a long tail. NaN or below zero: none.
+double multiple_of(const std::vector<double>& light, const std::vector<double>& counts) {
+  double weights = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (std::size_t g = 0; g < light.size(); ++g) {
+    const double w = 1 / std::max(1.0, counts[g]);
+    weights += w;
+    x += w * light[g];
+    y += w * counts[g];
+    xx += w * light[g] * light[g];
+    xy += w * light[g] * counts[g];
+  }
+  return (weights * xy - x * y) / (weights * xx - x * x);
+}
+
+/// Of faces that look away from the wall there are none: the area is that of one side.
+double area_of(const Mesh& mesh) {
+  double area = 0;
+  for (const auto& f : mesh.faces)
+    area +=
+        0.5 * length(cross(mesh.positions[f[1]] - mesh.positions[f[0]], mesh.positions[f[2]] - mesh.positions[f[0]]));
+  return area;
+}
+
+}  // namespace
+
+FitSettings fit_settings(const Mesh& start, double edge_length, int histograms, double seconds) {
+  FitSettings settings;
+  settings.edge_length = edge_length;
+  const double samples = std::clamp(kSamplesPerSecond * seconds / histograms, 1.0 * kLeastSamples, 1.0 * kMostSamples);
+  settings.samples = static_cast<int>(samples) / 2 * 2;
+  while (settings.levels < kMostLevels &&
+         static_cast<double>(start.positions.size()) * std::pow(4.0, settings.levels) <= kMostVertices)
+    ++settings.levels;
+  return settings;
+}
+
+std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
+                                  double depth_resolution) {
+  const std::vector<Vec3>& spots = geometry.confocal ? geometry.sensor : geometry.laser;
+  Range all;
+  for (const Vec3& p : mesh.positions) {
+    const Range to = distances(p, spots), from = distances(p, geometry.sensor);
+    all.least = std::min(all.least, to.least + from.least);
+    all.most = std::max(all.most, to.most + from.most);
+  }
+  if (geometry.accounts_first_and_last)
+    for (const Range& way :
+         {distances(geometry.laser_origin, spots), distances(geometry.sensor_origin, geometry.sensor)}) {
+      all.least += way.least;
+      all.most += way.most;
+    }
+  if (response) {
+    all.least += response->lower();
+    all.most += response->upper();
+  }
+  const double margin = std::max(8 * depth_resolution, 0.25 * (all.most - all.least));
+  return {all.least - margin, all.most + margin};
+}
+
+void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
+             const std::function<void(const std::string&)>& warning) {
+  const Problem problem(load_experiment(experiment), warning);
+  const GatedImage counts = problem.make_target([] {});
+  const Readings& readings = problem.readings();
+  const int points = static_cast<int>(problem.scene().capture->sensor.size());
+  const std::vector<double> levels = point_levels(counts, readings, points);
+  const double readings_each = readings.count(counts) / points;
+  settings.background_per_point = vary(levels, readings_each);
+  std::vector<double> theta = problem.parameters().initial();
+  for (const Parameters::Block& block : problem.parameters().blocks())
+    if (block.name == "background") std::fill_n(theta.begin() + block.begin, block.count, 0.0);
+  const GatedImage light =
+      problem.render(theta, problem.stream(Pass::render), {0, std::max(kLeastSamples, settings.samples / 4)});
+  const double gain = multiple_of(by_gate(light, readings), by_gate(counts, readings));
+  if (gain > 0 && std::isfinite(gain)) settings.gain = gain;
+  // Weights of slopes that are normal with such a standard deviation (optim/README.md).
+  const double edges = 1.5 * static_cast<double>(start.faces.size());
+  const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings));
+  settings.motion = unit / (kMotionSlope * kMotionSlope);
+  const double slope = kAlbedoChange / std::sqrt(area_of(start));
+  settings.albedo = unit / (slope * slope);
+}
+
+}  // namespace isochron

@@ -1,0 +1,38 @@
+// What a reconstruction's experiment says that follows from the capture and its start.
+#pragma once
+#include <array>
+#include <functional>
+#include <string>
+
+#include "core/image/capture_file.h"
+#include "core/scene/mesh.h"
+#include "optim/reconstruct/time_filter.h"
+
+namespace isochron {
+
+/// Lengths in metres. The defaults make a valid experiment of nothing.
+struct FitSettings {
+  int samples = 16;  ///< of images, per histogram
+  int levels = 1;
+  double edge_length = 1;  ///< of the first level
+  double bending = 3;      ///< at first, three times what a sphere, 50, and a disc's border, 11, are worth in nats
+  double motion = 0, albedo = 0;  ///< weights of slopes
+  double gain = 1;
+  bool background_per_point = false;
+  std::array<double, 2> window{0, 1};  ///< optical paths
+};
+
+/// Levels, the first of which has edges as long as that, and samples for a fit of so many seconds on two cores.
+FitSettings fit_settings(const Mesh& start, double edge_length, int histograms, double seconds);
+
+/// Times, as optical paths, at which light of the mesh may be counted at any point, and a quarter as much before and after, for the
+/// background.
+std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
+                                  double depth_resolution);
+
+/// Gain, background and weights of slopes, by the counts and a rendering of the start under a gain of 1: `experiment` is the file of
+/// such a one.
+void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
+             const std::function<void(const std::string&)>& warning);
+
+}  // namespace isochron
