@@ -19,6 +19,7 @@ struct FitSettings {
   double motion = 0, albedo = 0;  ///< weights of slopes
   double gain = 1;
   bool background_per_point = false;
+  double bin = 0;  ///< width; 0: not known yet
   std::array<double, 2> window{0, 1};  ///< optical paths
 };
 

@@ -40,7 +40,7 @@ class Reconstruct : public Program {
 /// The plate's depth, middle and size; counts are those of 1000 photons at each of 100 points, so that depths are known to a fraction
 /// of a millimetre, and what is left is the fit, of few samples here.
 TEST_F(Reconstruct, FindsAPlate) {
-  const Result result = run(command("out", {}, "plate.h5", "20"));
+  const Result result = run(command("out", {}, "plate.h5", "4"));
   ASSERT_EQ(result.status, 0) << result.errors;
   const Mesh mesh = read_mesh(folder_.file("out/geometry/final_surface.ply"));
   double area = 0, depth = 0;
