@@ -12,16 +12,16 @@
 namespace isochron {
 namespace {
 
-/// Per histogram. The rabbit of scenes/rabbit, 4096 histograms, takes 289 s of a processor with 512 samples, nearly all of which grows
-/// with them: with so many as this 205 s of two.
-constexpr double kSamplesPerSecond = 10000;
+/// Per histogram. The rabbit of scenes/rabbit, 4096 histograms, takes 344 s of a processor with 512 samples, nearly all of which grows
+/// with them.
+constexpr double kSamplesPerSecond = 7000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// The third level takes the rabbit's errors from 0.97 to 0.96 mm: a fourth would be for nothing. Metrics of more vertices take longer
 /// than rendering.
 constexpr int kMostLevels = 3;
 constexpr double kMostVertices = 20000;
 /// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos across the surface.
-constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.1;
+constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.03;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;

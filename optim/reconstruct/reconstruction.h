@@ -5,7 +5,7 @@
 // - the surface bends little, and so do its borders (bending.h);
 // - it does not move far from where a level began: what one neighbour moves by differs from what the next one does by a sixteenth of
 //   their distance;
-// - albedos differ little from place to place: by 0.1 across the surface. Where one that falls off freely would imitate a border that
+// - albedos differ little from place to place: by 0.03 across the surface. Where one that falls off freely would imitate a border that
 //   is elsewhere, and take the surface's tilt with it;
 // - gain and albedo are known as a product alone: the gain is that of a start with an albedo of a half.
 #pragma once
