@@ -28,8 +28,7 @@ int reconstruct(const ReconstructCommand& command) {
   if (status) return *status;
   spdlog::error(
       "{}: no light of a hidden surface stands out of the background; the smallest that could be told apart would have "
-      "to send "
-      "some {:.0f} photons to all points together",
+      "to send some {:.0f} photons to all points together",
       folder, photons_needed);
   return 1;
 }
@@ -48,7 +47,7 @@ void add_reconstruct(CLI::App& app, Action& action) {
                   "table of the detector's response: offsets in ps, values; without one light is counted as it arrives")
       ->type_name("IRF.csv");
   sub->add_option("--seconds", command->spec.seconds,
-                  "what the fit may take on two cores: more for less noise (default 300)")
+                  "work of the fit, by what two cores do in that time: more for less noise (default 300)")
       ->check(CLI::Range(0.1, 1e6))
       ->type_name("N");
   sub->add_option("--seed", command->spec.seed, "seed of the random numbers")->type_name("N");

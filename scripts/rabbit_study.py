@@ -27,13 +27,13 @@ import numpy as np
 
 import light_cone
 import rabbit_errors
+from isochron.back_projection import METRES
 from isochron.captures import read_capture
 from isochron.mesh_files import read_mesh
 from reproduction.measure import ROOT, Failure, program, summary
 from reproduction.tables import write_rows
 
 RESPONSE = rabbit_errors.SCENE / "response.csv"
-METRES_PER_PS = 0.299792458e-3
 REACH = 0.7  # metres: beyond the rabbit as seen from the wall's corners
 RATIOS, BRIGHTNESSES = (0.1, 1, 10, 100), (0.1, 0.15, 0.2, 0.25, 0.3)
 METHODS = ("fit", "back_projection", "light_cone")
@@ -46,7 +46,7 @@ def by_light_cone(capture):
     """Vertices and triangles, and the seconds that one setting takes."""
     offsets, values = np.loadtxt(RESPONSE, delimiter=",", skiprows=1).T
     start, seconds, tried = time.monotonic(), None, []
-    for volume in light_cone.volumes(capture, offsets[values.argmax()] * METRES_PER_PS, REACH, RATIOS):
+    for volume in light_cone.volumes(capture, offsets[values.argmax()] * METRES["ps"], REACH, RATIOS):
         surfaces = [light_cone.surface(volume, least) for least in BRIGHTNESSES]
         seconds = seconds or time.monotonic() - start
         tried += [(rabbit_errors.errors(*surface), surface) for surface in surfaces]

@@ -1,5 +1,6 @@
 #pragma once
-#include <cstdlib>
+#include <stdlib.h>
+
 #include <filesystem>
 #include <string>
 
@@ -8,17 +9,17 @@
 namespace isochron {
 
 /// A new folder where the system keeps such, gone with all that is in it when this is. Throws InputError where none can be made.
-class TemporaryFolder {
+class ScratchFolder {
  public:
-  TemporaryFolder() : path_((std::filesystem::temp_directory_path() / "isochron-XXXXXX").string()) {
+  ScratchFolder() : path_((std::filesystem::temp_directory_path() / "isochron-XXXXXX").string()) {
     if (!::mkdtemp(path_.data())) throw InputError(path_ + ": cannot be made");
   }
-  ~TemporaryFolder() {
+  ~ScratchFolder() {
     std::error_code ignored;
     std::filesystem::remove_all(path_, ignored);
   }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
   const std::string& path() const { return path_; }
 
  private:

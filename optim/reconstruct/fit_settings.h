@@ -15,11 +15,12 @@ struct FitSettings {
   int samples = 16;  ///< of images, per histogram
   int levels = 1;
   double edge_length = 1;  ///< of the first level
-  double bending = 3;      ///< at first, three times what a sphere, 50, and a disc's border, 11, are worth in nats
+  double bending =
+      3;  ///< weight at first: three nats per unit of curvature, of which a sphere has 50, a disc's border 11
   double motion = 0, albedo = 0;  ///< weights of slopes
   double gain = 1;
   bool background_per_point = false;
-  double bin = 0;  ///< width; 0: not known yet
+  double bin = 0;                      ///< width; 0: not known yet
   std::array<double, 2> window{0, 1};  ///< optical paths
 };
 

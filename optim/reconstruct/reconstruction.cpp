@@ -104,6 +104,7 @@ DetectorResponse response_of(GateSpec gates, const CaptureFile& capture) {
 }
 
 BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response, const std::string& file) {
+  const ProgressStage stage("back-projection", 1);
   try {
     return back_project(capture, response);
   } catch (const InputError& error) {
@@ -148,7 +149,6 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   write_experiment();
   const CaptureFile capture = read_capture(spec.capture);
   const DetectorResponse response = response_of(load_experiment(experiment).gates, capture);
-  const ProgressStage stage("back-projection", 1);
   const BackProjection volume = back_projected(capture, response, spec.capture);
   const FirstSurface first = first_surface(volume);
   const Mesh start = start_surface(volume, first);

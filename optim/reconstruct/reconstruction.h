@@ -1,13 +1,12 @@
 // From a capture to an experiment whose run finds the hidden surface.
 //
-// The start is what back-projection shows (start_surface.h). The fit moves all vertices freely, in levels, and weighs four priors, which
-// the evidence of each level changes for the next:
-// - the surface bends little, and so do its borders (bending.h);
-// - it does not move far from where a level began: what one neighbour moves by differs from what the next one does by a sixteenth of
-//   their distance;
-// - albedos differ little from place to place: by 0.03 across the surface. Where one that falls off freely would imitate a border that
-//   is elsewhere, and take the surface's tilt with it;
-// - gain and albedo are known as a product alone: the gain is that of a start with an albedo of a half.
+// The start is what back-projection shows (start_surface.h). The fit moves all vertices freely, in levels, under four priors. The
+// weights of the first and the third follow from the evidence of the level before (evidence.h).
+// - The surface bends little, and so do its borders (bending.h).
+// - It does not move far from where a level began: offsets of neighbours differ by a sixteenth of their distance.
+// - Albedos differ little, by 0.03 across the surface. One that falls off freely imitates a border that is elsewhere, and tilts
+//   the surface to do so.
+// - Gain and albedo are known as a product alone: the gain is that of a start with an albedo of a half.
 #pragma once
 #include <cstdint>
 #include <functional>

@@ -6,7 +6,7 @@
 
 #include "core/base/file.h"
 #include "core/base/ranks.h"
-#include "optim/reconstruct/temporary_folder.h"
+#include "core/base/scratch_folder.h"
 #include "optim/run/run_folder.h"
 
 namespace isochron {
@@ -26,7 +26,7 @@ std::string default_folder(const ReconstructionSpec& spec) {
 }
 
 ReconstructionResult run_reconstruction(const ReconstructionSpec& spec, RunOptions options) {
-  const TemporaryFolder place;
+  const ScratchFolder place;
   Reconstruction found = begin_reconstruction(spec, place.path(), options.warning);
   if (!found.has_signal) {
     on_first_rank([&] { write_without_signal(found, options); });

@@ -18,6 +18,9 @@ constexpr int kRings = 2;             // voxels beyond what is significant
 constexpr int kSmoothings = 2;        // means over 3 x 3 voxels: about a lateral resolution wide
 constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
 constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
+/// A half, where the edge of a flat sheet is, takes steep parts, which send less light, for what is beyond: the rabbit's first level then
+/// ends at 1.45 / 4.3 mm (median, 80 %) and a silhouette of 0.79; with this at 1.2 / 3.4 mm and 0.83.
+constexpr double kOutline = 0.35;
 constexpr int kRoom = kRings + kCellLines;  // voxels about what is significant
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
@@ -89,19 +92,21 @@ DepthMap padded(const BackProjection& volume, const std::vector<double>& depth) 
   return map;
 }
 
-/// The pieces that hang together without jumps of more than `jump` from line to line, each alone.
-std::vector<DepthMap> pieces(const DepthMap& map, double jump) {
+/// The pieces of at least so many lines that hang together without jumps of more than `jump` from line to line, each alone.
+std::vector<DepthMap> pieces(const DepthMap& map, double jump, double least_lines) {
   std::vector<DepthMap> result;
   DepthMap left = map;
   for (int start = 0; start < static_cast<int>(map.depth.size()); ++start) {
     if (!std::isfinite(left.depth[start])) continue;
     DepthMap piece = map.changed([](int, int) { return kNone; });
     std::vector<std::pair<int, int>> open{{start % map.width, start / map.width}};
+    int lines = 0;
     piece.depth[start] = left.depth[start];
     left.depth[start] = kNone;
     while (!open.empty()) {
       const auto [a, u] = open.back();
       open.pop_back();
+      ++lines;
       for (const auto& [da, du] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
         if (!left.has(a + da, u + du) || std::abs(left.at(a + da, u + du) - map.at(a, u)) > jump) continue;
         piece.at(a + da, u + du) = left.at(a + da, u + du);
@@ -109,7 +114,7 @@ std::vector<DepthMap> pieces(const DepthMap& map, double jump) {
         open.emplace_back(a + da, u + du);
       }
     }
-    result.push_back(std::move(piece));
+    if (lines >= least_lines) result.push_back(std::move(piece));
   }
   return result;
 }
@@ -125,7 +130,7 @@ double albedo_at(const BackProjection& volume, int a, int u, double depth) {
   return volume.albedo[volume.index(nearest, y, x)];
 }
 
-/// Without lines of less than half of the albedo that light of the piece comes from on average: what lies beyond its outline looks
+/// Without lines of less than kOutline of the albedo that light of the piece comes from on average: what lies beyond its outline looks
 /// as if it had less, as the outline is blurred.
 DepthMap within_outline(const DepthMap& piece, const BackProjection& volume) {
   double sum = 0, squares = 0;
@@ -136,7 +141,7 @@ DepthMap within_outline(const DepthMap& piece, const BackProjection& volume) {
       sum += albedo;
       squares += albedo * albedo;
     }
-  const double least = sum > 0 ? 0.35 * squares / sum : 0;
+  const double least = sum > 0 ? kOutline * squares / sum : 0;
   return piece.changed([&](int a, int u) {
     return piece.has(a, u) && albedo_at(volume, a, u, piece.at(a, u)) >= least ? piece.at(a, u) : kNone;
   });
@@ -148,7 +153,7 @@ bool meet(const DepthMap& one, const DepthMap& other, double jump) {
   return false;
 }
 
-/// With what margins make one part of put together.
+/// The parts with their margins, those together that meet then.
 std::vector<DepthMap> joined(std::vector<DepthMap> parts, const BackProjection& volume, double step, double jump) {
   std::vector<DepthMap> grown;
   for (const DepthMap& part : parts) grown.push_back(part.grown(volume, step));
@@ -250,19 +255,16 @@ Mesh start_surface(const BackProjection& volume, const FirstSurface& first) {
   if (volume.depth.empty() || volume.across.size() < 2) return result;
   const double voxel = volume.across[1] - volume.across[0];
   const DepthMap map = padded(volume, first.depth);
-  const double least = 0.125 * std::numbers::pi * volume.lateral_resolution * volume.lateral_resolution;
+  // Half of a disc as wide as the resolution: a single point looks larger.
+  const double least_lines = 0.125 * std::numbers::pi * std::pow(volume.lateral_resolution / voxel, 2);
+  const double step = kSteepestJoint * voxel;
   std::vector<DepthMap> parts;
-  for (const DepthMap& piece : pieces(map, kSteepestJoint * voxel))
-    for (DepthMap& part : pieces(within_outline(piece, volume), kSteepestJoint * voxel))
-      parts.push_back(std::move(part));
-  std::erase_if(parts, [&](const DepthMap& part) {
-    const auto count = std::count_if(part.depth.begin(), part.depth.end(), [](double d) { return std::isfinite(d); });
-    return static_cast<double>(count) * voxel * voxel < least;
-  });
+  for (const DepthMap& piece : pieces(map, step, least_lines))
+    for (DepthMap& part : pieces(within_outline(piece, volume), step, least_lines)) parts.push_back(std::move(part));
   const double jump = kSteepestJoint * std::numbers::sqrt2 * kCellLines * voxel;
   const double left = volume.across[0] - 0.5 * voxel * (map.width - static_cast<int>(volume.across.size())),
                bottom = volume.up[0] - 0.5 * voxel * (map.height - static_cast<int>(volume.up.size()));
-  for (const DepthMap& part : joined(std::move(parts), volume, kSteepestJoint * voxel, jump)) {
+  for (const DepthMap& part : joined(std::move(parts), volume, step, jump)) {
     Mesh mesh = meshed(part.smooth(), jump);
     round_borders(mesh);
     const int before = static_cast<int>(result.positions.size());

@@ -39,11 +39,12 @@ class Sight:
         self.depth = seen.depth
         self.albedo = None if surface.albedo is None else seen.of(surface.albedo)
         self.lit = np.isfinite(self.depth) if self.albedo is None else self.albedo >= found.least_lit(surface)
-        self.errors = self.undetermined = None
+        self.errors = self.undetermined = self.known = None
         if surface.errors is not None:
             errors = seen.of(surface.errors)
             self.errors = 1000 * errors
             self.undetermined = np.isfinite(self.depth) & found.undetermined(errors)
+            self.known = self.errors[np.isfinite(self.depth) & ~self.undetermined]
 
 
 def pixels_of(found):
@@ -76,7 +77,7 @@ class Row:
             first, last, beyond = scale_of_albedo([self.surface.albedo])
             self.add("albedo", sight.albedo, ALBEDO, (first, last), "albedo, relative", "max" if beyond else "neither")
         if sight.errors is not None:
-            self.add("standard error", sight.errors, ERROR, (0, end_of_errors(found, sight)), "along the normal (mm)", "max")
+            self.add("standard error", sight.errors, ERROR, (0, end_of_errors(found, sight.known)), "along the normal (mm)", "max")
         for axes in self.views.free:
             axes.axis("off")
         return self.views.free
@@ -110,9 +111,8 @@ def draw_picture(axes, picture, colours, scale, corners):
     return ScalarMappable(Normalize(*scale), colours)
 
 
-def end_of_errors(found, sight):
-    """Of their colours: nearly all that is determined lies below it."""
-    known = sight.errors[np.isfinite(sight.depth) & ~sight.undetermined]
+def end_of_errors(found, known):
+    """Of the colours of errors in millimetres, of which those that the data determine are given: nearly all lie below it."""
     return float(np.percentile(known, 99)) if known.size else 1000 * found.resolution
 
 
@@ -138,10 +138,9 @@ def about_fit(found, sight):
     if dark:
         yield "of them dark", f"{dark}, which may be out of view"
     if sight.errors is not None:
-        seen = np.isfinite(sight.depth)
-        known = sight.errors[seen & ~sight.undetermined]
-        yield "standard error", f"{np.median(known):.2g} mm in the median" if known.size else "unknown"
-        yield "not determined", f"{100 * sight.undetermined.sum() / max(1, seen.sum()):.2g} % of what is seen (pale)"
+        seen = np.count_nonzero(np.isfinite(sight.depth))
+        yield "standard error", f"{np.median(sight.known):.2g} mm in the median" if sight.known.size else "unknown"
+        yield "not determined", f"{100 * sight.undetermined.sum() / max(1, seen):.2g} % of what is seen (pale)"
 
 
 def off_the_fit(fit, back_projection):

@@ -2,8 +2,6 @@
 
 import functools
 
-import numpy as np
-
 from isochron.report.markup import Markup, element, join, section
 from isochron.report.png import Scale, figure_uri
 
@@ -41,7 +39,7 @@ def surface_section(run):
 def colours_of(found, surface):
     """Layer -> colours of the vertices [N, 3], 0 to 255; layer -> its scale."""
     from isochron.pictures.scene_views import scale_of_albedo
-    from isochron.pictures.surface_sheet import ALBEDO, ERROR, shades
+    from isochron.pictures.surface_sheet import ALBEDO, ERROR, end_of_errors, shades
 
     layers, bars = {}, {}
     undetermined = None if surface.errors is None else found.undetermined(surface.errors)
@@ -53,8 +51,7 @@ def colours_of(found, surface):
     if surface.albedo is not None:
         add("albedo", surface.albedo, ALBEDO, scale_of_albedo([surface.albedo])[1], f"albedo, relative: {surface.name}")
     if surface.errors is not None:
-        known = 1000 * surface.errors[~undetermined]
-        end = np.percentile(known, 99) if known.size else 1000 * found.resolution
+        end = end_of_errors(found, 1000 * surface.errors[~undetermined])
         add("uncertainty", 1000 * surface.errors, ERROR, end,
             "standard error along the normal (mm), pale where the data do not determine the surface")
     return layers, bars
