@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -116,6 +117,38 @@ TEST(StartSurface, TheMarginFollowsTheData) {
   double deepest = 0;
   for (const Vec3& p : lines.start().positions) deepest = std::max(deepest, p.z);
   EXPECT_GT(deepest, 9.2);
+}
+
+/// Two squares whose margins meet at one line: borders() would see a vertex with two borders.
+TEST(StartSurface, PiecesThatTouchAtACornerDoNotShareIt) {
+  const auto within = [](int i, int first) { return i >= first && i <= first + 6; };
+  const Mesh mesh = Lines([&](int a, int u) {
+                      return (within(a, 4) && within(u, 4)) || (within(a, 14) && within(u, 14)) ? 5.0 : kNone;
+                    }).start();
+  EXPECT_EQ(borders(mesh), 2);
+}
+
+/// A sheet that is torn from one end on: its halves part by a line's length from row to row.
+TEST(StartSurface, ATearEndsWhereTheJumpDoes) {
+  const Mesh mesh = Lines([](int a, int u) { return a <= 15 ? 5.0 : 5.0 + u; }).start();
+  EXPECT_EQ(borders(mesh), 1);
+  for (const auto& f : mesh.faces) {
+    const auto [low, high] = std::minmax({mesh.positions[f[0]].z, mesh.positions[f[1]].z, mesh.positions[f[2]].z});
+    EXPECT_LT(high - low, 2 * std::sqrt(2) * 2 + 1e-9);
+  }
+}
+
+/// A blurred outline: beyond it significant albedo is left, but little.
+TEST(StartSurface, EndsWhereTheAlbedoIsFarBelowThatOfItsLight) {
+  const auto radius = [](double beyond) {
+    Lines lines([](int a, int u) { return from_middle(a, u) <= 11 ? 5.5 : kNone; });
+    for (int u = 0; u <= kSide; ++u)
+      for (int a = 0; a <= kSide; ++a)
+        lines.volume.albedo[lines.volume.index(5, u, a)] = static_cast<float>(from_middle(a, u) <= 6 ? 1 : beyond);
+    return std::sqrt(area(lines.start()) / 3.14159);
+  };
+  EXPECT_NEAR(radius(0.9), 12.5, 0.8);
+  EXPECT_NEAR(radius(0.2), 7.5, 0.8);
 }
 
 TEST(StartSurface, IsEmptyWhereNothingIsSignificant) {
