@@ -157,6 +157,7 @@ Hdf5Reader::Hdf5Reader(const std::string& file) : file_(file) {
         "does not exist (a measurement has to be had first, and scripts/import_capture.py makes such files of it; see "
         "\"Captures\" in experiments/README.md)");
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  std::string name = file;
   if (rank_count() == 1) {
     if (!is_regular_file(file, problem)) fail(problem);
     H5Pset_file_locking(access, false, true);  // locks fail on read-only and on some network file systems
@@ -165,8 +166,9 @@ Hdf5Reader::Hdf5Reader(const std::string& file) : file_(file) {
     if (!contents) fail(problem);
     H5Pset_fapl_core(access, contents->size(), false);
     H5Pset_file_image(access, contents->data(), contents->size());
+    name += ":in memory";  // images of files that exist are refused
   }
-  id_ = H5Fopen(file.c_str(), H5F_ACC_RDONLY, access);
+  id_ = H5Fopen(name.c_str(), H5F_ACC_RDONLY, access);
   if (id_ < 0) fail("cannot be read as HDF5: " + last_error());
 }
 

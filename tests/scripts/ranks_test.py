@@ -64,7 +64,7 @@ def results(folder):
                 found[name] = [{k: v for k, v in row.items() if k != "seconds"} for row in csv.DictReader(lines)]
         elif path.name == "summary.yaml":
             found[name] = yaml.load(path.read_text(), yaml.BaseLoader)
-            for timed in (found[name], *found[name].get("levels", [])):
+            for timed in (found[name], *found[name].get("levels", []), *([found[name]["start"]] if "start" in found[name] else [])):
                 del timed["seconds"]
             del found[name]["last_call"]
     return found
@@ -109,6 +109,17 @@ class RanksTest(unittest.TestCase):
                     said = self.run_program(ranks, *self.arguments(name, shared), "--threads", threads)
                     self.same(expected, shared)
                     self.assertEqual(said.stderr.count("iterations_reached"), 1, said.stderr)  # one rank alone speaks
+
+    def test_reconstructions_have_the_same_bits(self):
+        """Of a capture's file, which one rank alone reads."""
+        self.run_program(0, *self.arguments("letter", self.folder / "letter"), "--quiet")
+        capture = self.folder / "letter/final.h5"
+        for ranks in (0, 2):
+            self.run_program(ranks, "reconstruct", capture, "-o", self.folder / f"found_{ranks}", "--seconds", 1, "--threads", 1,
+                             "--no-plots", "--quiet")
+        expected = results(self.folder / "found_0")
+        self.assertIn("geometry/final_surface.ply", expected)
+        self.same(expected, self.folder / "found_2")
 
     def test_derive_and_gradient_have_the_same_bits(self):
         for name in ("derive", "gradient"):
