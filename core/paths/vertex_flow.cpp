@@ -368,7 +368,9 @@ VertexFlow VertexFlows::at(const Pair& before, const Pair& after, int k) {
 
 void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g, LocalDifferential& out) {
   const Vec3 ray = x1.p - scene.camera.position;
-  add_material_flow(scene, x1, x1.n * (dot(ray, g) / dot(x1.n, ray)), out);
+  const double across = dot(x1.n, ray);
+  if (across == 0) return;  // edge-on: no light of it reaches the pixel
+  add_material_flow(scene, x1, x1.n * (dot(ray, g) / across), out);
 }
 
 void add_following_flow(const PreparedScene& scene, const VertexFlow& flow, const SurfacePoint* before,

@@ -115,7 +115,7 @@ class VertexFlows {
   std::vector<int> triangles_, creases_;  ///< patch by patch; creases are edges
 };
 
-/// Adds g . (velocity of x1 along its pixel ray) to `out`.
+/// Adds g . (velocity of x1 along its pixel ray) to `out`; nothing where the camera sees x1 exactly edge-on.
 void add_pixel_flow(const PreparedScene& scene, const SurfacePoint& x1, const Vec3& g, LocalDifferential& out);
 
 /// Adds g . t_k to `out`: what x, vertex k, does beyond its base velocity, which is the pixel flow for k = 1, else that of

@@ -32,9 +32,13 @@ CLOSER = {
 
 
 class ExperimentsTest(unittest.TestCase):
-    def run_program(self, *arguments):
+    def run_program(self, *arguments, folder):
+        """With a few samples some fits lose their data: which and when is up to the random numbers."""
         done = subprocess.run([PROGRAM, *map(str, arguments), "--quiet", "--no-plots"], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(done.returncode, (0, 1), done.stderr)
+        summary = yaml.safe_load((folder / "summary.yaml").read_text())
+        self.assertEqual(summary["status"], "diverged" if done.returncode else "iterations_reached", done.stderr)
+        return summary
 
     def of(self, experiment):
         return yaml.safe_load(experiment.read_text())
@@ -59,16 +63,14 @@ class ExperimentsTest(unittest.TestCase):
             settings.append(f"optimizer.learning_rate={rate}")
         overrides = [word for setting in settings for word in ("--set", setting)]
         words = ["run", experiment, "--samples", samples, *overrides, "-o"]
-        self.run_program(*words, run)
-        summary = yaml.safe_load((run / "summary.yaml").read_text())
-        self.assertIn(summary["status"], ("iterations_reached", "diverged"))
+        summary = self.run_program(*words, run, folder=run)
         self.assertEqual(summary["iterations"], iterations)
         if experiment.stem in CLOSER:
             self.assertLess(summary["param_rmse_final"], 0.99 * summary["param_rmse_initial"])
 
         killed = run.with_name("killed")
         self.kill_after_first_step([*words, killed], killed)
-        self.run_program("resume", killed)
+        self.run_program("resume", killed, folder=killed)
         self.assertEqual((killed / "final.exr").read_bytes(), (run / "final.exr").read_bytes())
         self.assertEqual(self.log(killed), self.log(run))
 

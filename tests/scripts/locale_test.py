@@ -84,9 +84,9 @@ class LocaleTest(unittest.TestCase):
         if not made:
             self.skipTest("no locale with a decimal comma can be made here")
         (comma, mean), files = self.run_in(NAME)
-        self.assertEqual((comma, f"{float(mean):.8f}"), (",", "0.20433908"))
         (point, expected), of_c = self.run_in("C")
-        self.assertEqual((point, expected), (".", mean))
+        self.assertEqual((comma, point), (",", "."))
+        self.assertEqual(mean, expected)
         for name in files:
             self.assertEqual(files[name], of_c[name], name)
 
