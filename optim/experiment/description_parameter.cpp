@@ -187,6 +187,10 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.value("edge_length", field::positive(spec.remesh.edge_length),
                 "of the first level's triangles; those of each further level have half of it",
                 {.unit = "scene units", .unset = spec.remesh.edge_length == 0, .otherwise = "the mesh as it is"});
+    inner.value("coarse_levels", field::integer(spec.remesh.coarse_levels, 1, kMostLevels),
+                "so many levels have the edges of the first one: a surface that has far to go gets there in triangles "
+                "of even size",
+                {.unset = spec.remesh.coarse_levels == 1});
   };
   keys.map(
       "remesh", remesh,

@@ -39,6 +39,7 @@ struct Selection {
 /// A run in levels: on a mesh, then on the surface that was found in triangles of half the size, and so on.
 struct RemeshSpec {
   int levels = 0;          ///< 0: the mesh stays as it is
+  int coarse_levels = 1;   ///< so many have the first one's edge length, at most all
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
 };
 

@@ -17,4 +17,9 @@ namespace isochron {
 std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
                                      const std::vector<double>& theta);
 
+/// How many of those unknowns that lie at no bound the data determine rather than penalties: all, less tr((H + P)^-1 P) of the parameters that
+/// smoothing or a prior holds. `samples`: of the posterior at theta (RenderedCurvature::samples), one at least.
+double determined_unknowns(const Problem& problem, const GatedImage& target, const std::vector<char>& free,
+                           const std::vector<std::vector<double>>& samples);
+
 }  // namespace isochron

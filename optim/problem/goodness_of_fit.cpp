@@ -144,7 +144,7 @@ class Judge {
   CountDeviance law_;
   std::vector<double> background_factor_;
   double light_factor_ = 0, taken_ = 0;  ///< taken: from the deviance by what was fitted
-  int unknowns_ = 0;
+  double unknowns_ = 0;
 };
 
 /// The model without light: each unknown background is the mean of its readings.
@@ -217,7 +217,7 @@ GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const
   const SplitImage image = background_alone(model, counts, loss.readings, dark.background);
   dark.image = &image;
   result.background = test_deviance(dark, counts, loss);
-  const double k = std::max(1, model.other_unknowns);
+  const double k = std::max(1.0, model.other_unknowns);
   result.light_p_value =
       gamma_tail(result.background.deviance - result.fit.deviance, k, std::sqrt(2 * k), std::sqrt(8 / k));
   return result;

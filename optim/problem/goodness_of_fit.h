@@ -28,7 +28,8 @@ struct CountModel {
   /// Of each pixel: the unknown background that it has, from 0 on; -1: none. Empty: no background is unknown.
   std::vector<int> background_unknown;
   std::vector<char> background_free;  ///< of each unknown background: whether it is off its bounds
-  int other_unknowns = 0;             ///< free ones besides the backgrounds
+  /// Free ones besides the backgrounds. Of those that smoothing holds only what the data determine counts (determined_unknowns).
+  double other_unknowns = 0;
 };
 
 struct DevianceTest {

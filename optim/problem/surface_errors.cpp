@@ -6,9 +6,6 @@
 namespace isochron {
 namespace {
 
-/// An error is known to a factor of about 1 +- 1 / sqrt(2 x this). They share their passes over the Jacobian.
-constexpr int kSamples = 4;
-
 bool has_errors(const ParameterSpec& spec) {
   return spec.type == ParameterType::vertices && spec.bending > 0;
 }
@@ -33,7 +30,7 @@ bool has_surface_errors(const Problem& problem) {
          std::any_of(specs.begin(), specs.end(), has_errors);
 }
 
-std::vector<double> surface_errors(const Problem& problem, const RenderedCurvature& curvature,
+std::vector<double> surface_errors(const Problem& problem, const std::vector<std::vector<double>>& samples,
                                    const std::vector<double>& theta, double scale) {
   const Parameters& parameters = problem.parameters();
   const Scene scene = parameters.apply(theta);
@@ -41,7 +38,6 @@ std::vector<double> surface_errors(const Problem& problem, const RenderedCurvatu
   const DofLayout layout(scene);
   const std::vector<Vec3> normals = vertex_normals(scene);
   std::vector<double> errors(scene.positions.size(), std::nan(""));
-  const std::vector<std::vector<double>> samples = curvature.samples(kSamples);
   for (std::size_t i = 0; i < parameters.blocks().size(); ++i) {
     if (!has_errors(problem.experiment().parameters[i])) continue;
     for (const int v : parameters.vertex_field(parameters.blocks()[i]).vertices) {
@@ -58,7 +54,7 @@ std::vector<double> surface_errors(const Problem& problem, const RenderedCurvatu
         }
         sum += along * along;
       }
-      if (size > 0) errors[v] = std::sqrt(scale * sum / kSamples);
+      if (size > 0) errors[v] = std::sqrt(scale * sum / static_cast<double>(samples.size()));
     }
   }
   return errors;

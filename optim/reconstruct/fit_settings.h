@@ -13,7 +13,7 @@ namespace isochron {
 /// Lengths in metres. The defaults make a valid experiment of nothing.
 struct FitSettings {
   int samples = 16;  ///< of images, per histogram
-  int levels = 1;
+  int levels = 1, coarse_levels = 1;
   double edge_length = 1;  ///< of the first level
   double bending =
       3;  ///< weight at first: three nats per unit of curvature, of which a sphere has 50, a disc's border 11

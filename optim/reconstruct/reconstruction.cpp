@@ -52,7 +52,7 @@ parameters:
     direction: free
     initial: 0
     smoothing: {{bending: {bending}, slopes: {motion:.4g}, evidence: true}}
-    remesh: {{levels: {levels}, edge_length: {edge:.4g}}}
+    remesh: {{levels: {levels}, coarse_levels: {coarse}, edge_length: {edge:.4g}}}
   - name: albedo            # what is known is gain * albedo
     type: albedo
     shape: surface
@@ -71,9 +71,10 @@ output: {{histogram_samples: {primal}}}
 )",
       fmt::arg("name", fs::path(spec.capture).stem().string()), fmt::arg("seed", spec.seed),
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),
-      fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("edge", set.edge_length),
-      fmt::arg("albedo", set.albedo), fmt::arg("gain", set.gain), fmt::arg("low", 0.999 * set.gain),
-      fmt::arg("high", 1.001 * set.gain), fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
+      fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("coarse", set.coarse_levels),
+      fmt::arg("edge", set.edge_length), fmt::arg("albedo", set.albedo), fmt::arg("gain", set.gain),
+      fmt::arg("low", 0.999 * set.gain), fmt::arg("high", 1.001 * set.gain),
+      fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
       fmt::arg("capture", quoted_path(spec.capture)), fmt::arg("first", set.window[0]), fmt::arg("last", set.window[1]),
       fmt::arg("primal", set.samples), fmt::arg("interior", std::max(2, set.samples / 2)));
 }

@@ -45,24 +45,33 @@ int fit_samples(const Problem& problem) {
   return problem.scene().capture ? wanted : std::max(primal, std::min(wanted, kIterations * primal));
 }
 
+std::vector<char> free_unknowns(const Problem& problem, const std::vector<double>& theta) {
+  std::vector<char> free(theta.size(), 0);
+  for (std::size_t b = 0; b < problem.parameters().blocks().size(); ++b) {
+    const Parameters::Block& block = problem.parameters().blocks()[b];
+    if (problem.experiment().parameters[b].type == ParameterType::background) continue;
+    for (int i = block.begin; i < block.begin + block.count; ++i)
+      free[i] = !is_at_bound(problem.parameters(), theta, i);
+  }
+  return free;
+}
+
 GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
-                        const GatedImage& target) {
+                        const GatedImage& target, std::optional<double> determined) {
   const Scene scene = problem.parameters().apply(theta);
   CountModel model;
   model.image = &image;
   const auto background_of = [&](int pixel) { return scene.detector.background_of(scene.capture, pixel); };
   for (int pixel = 0; pixel < target.pixels(); ++pixel)
     model.background.push_back(scene.detector.background[background_of(pixel)]);
-  std::vector<char> free(theta.size());
-  for (std::size_t i = 0; i < theta.size(); ++i) free[i] = !is_at_bound(problem.parameters(), theta, i);
+  const std::vector<char> free = free_unknowns(problem, theta);
+  model.other_unknowns = determined.value_or(static_cast<double>(std::count(free.begin(), free.end(), 1)));
   for (std::size_t b = 0; b < problem.parameters().blocks().size(); ++b) {
+    if (problem.experiment().parameters[b].type != ParameterType::background) continue;
     const Parameters::Block& block = problem.parameters().blocks()[b];
-    const auto begin = free.begin() + block.begin, end = begin + block.count;
-    if (problem.experiment().parameters[b].type != ParameterType::background) {
-      model.other_unknowns += static_cast<int>(std::count(begin, end, 1));
-      continue;
-    }
-    model.background_free.assign(begin, end);
+    model.background_free.clear();
+    for (int i = block.begin; i < block.begin + block.count; ++i)
+      model.background_free.push_back(!is_at_bound(problem.parameters(), theta, i));
     for (int pixel = 0; pixel < target.pixels(); ++pixel)
       model.background_unknown.push_back(block.count == 1 ? 0 : background_of(pixel));
   }
@@ -70,14 +79,14 @@ GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta
 }
 
 GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                 SplitImage& image) {
+                                 SplitImage& image, std::optional<double> determined) {
   constexpr int kMostDoublings = 4;
   const int samples = fit_samples(problem);
   image = render_expected(problem, theta, samples, 0);
-  GoodnessOfFit fit = judge_fit(problem, theta, image, target);
+  GoodnessOfFit fit = judge_fit(problem, theta, image, target, determined);
   for (int i = 0; i < kMostDoublings && problem.scene().capture && fit.fit.image_share > kMostImageShare; ++i) {
     image = mean_of(std::move(image), render_expected(problem, theta, samples << i, i + 1));
-    fit = judge_fit(problem, theta, image, target);
+    fit = judge_fit(problem, theta, image, target, determined);
   }
   return fit;
 }

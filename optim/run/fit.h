@@ -18,9 +18,12 @@ bool has_fit(const Problem& problem, const GatedImage& target);
 /// iterations take.
 int fit_samples(const Problem& problem);
 
-/// `image`: expected counts at theta.
+/// Of each unknown, whether it lies off its bounds and is that of no background.
+std::vector<char> free_unknowns(const Problem& problem, const std::vector<double>& theta);
+
+/// `image`: expected counts at theta. `determined`: of the free unknowns, where penalties hold some (determined_unknowns); else all are.
 GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
-                        const GatedImage& target);
+                        const GatedImage& target, std::optional<double> determined = {});
 
 /// Most of the deviance's variance that noise of the expected counts may make (DevianceTest::image_share): whatever its law, the
 /// spread is then known to some per cent.
@@ -29,7 +32,7 @@ inline constexpr double kMostImageShare = 0.05;
 /// The same for expected counts that are rendered into `image`, with fit_samples(). Captures get more, twice as many each time, where
 /// noise makes too much of the variance, 16 times as many at most.
 GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                 SplitImage& image);
+                                 SplitImage& image, std::optional<double> determined = {});
 
 /// Whether a run has left its data behind: they hold light of which the fit has nothing (GoodnessOfFit::lost), or the fit
 /// neither explains them nor is as good as its start, by three standard errors of the loss.

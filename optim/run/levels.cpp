@@ -35,9 +35,10 @@ struct Level {
   std::string status;
 };
 
-/// Of the first level: what the experiment says, or else what the mesh has.
-double first_edge_length(const ParameterSpec& remeshed, const Mesh& loaded) {
-  return remeshed.remesh.edge_length > 0 ? remeshed.remesh.edge_length : mean_edge_length(loaded);
+/// Of the first level: what the experiment says, or else what the mesh has. Levels count from 1.
+double edge_length_of(int level, const RemeshSpec& remesh, const Mesh& loaded) {
+  const double first = remesh.edge_length > 0 ? remesh.edge_length : mean_edge_length(loaded);
+  return std::ldexp(first, -std::max(0, level - remesh.coarse_levels));
 }
 
 void write_surface(const std::string& file, const Mesh& mesh) {
@@ -64,10 +65,9 @@ class Levels {
     try {
       write_target();
       const Mesh loaded = mesh_of(load_scene(experiment_.scene), remeshed_.shape);
-      const double first = first_edge_length(remeshed_, loaded);
       for (int level = 1;; ++level) {
         const bool ready = file_exists(folder(level) + "/experiment.yaml");
-        if (!ready && !prepare(level, std::ldexp(first, 1 - level))) {
+        if (!ready && !prepare(level, edge_length_of(level, remeshed_.remesh, loaded))) {
           on_first_rank([&] { write_summary(false); });
           break;
         }
@@ -116,7 +116,8 @@ class Levels {
         return false;
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
-      if (!first) follow_evidence(former, theta, level - 1, next.parameters);
+      // As long as a surface has far to go, what it does not explain yet would pass for roughness.
+      if (level > remeshed_.remesh.coarse_levels) follow_evidence(former, theta, level - 1, next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
@@ -129,7 +130,8 @@ class Levels {
     const ProgressStage stage("weighing the smoothing", 1);
     const std::vector<double> factors =
         evidence_factors(former, former.read_target(folder(level) + "/target.exr"), theta);
-    for (std::size_t i = 0; i < next.size(); ++i) (next[i].bending > 0 ? next[i].bending : next[i].slopes) *= factors[i];
+    for (std::size_t i = 0; i < next.size(); ++i)
+      (next[i].bending > 0 ? next[i].bending : next[i].slopes) *= factors[i];
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {
@@ -256,7 +258,7 @@ void require_levels(const Problem& problem) {
   if (!remeshed) return;
   const Mesh loaded = mesh_of(problem.scene(), remeshed->shape);
   try {
-    require_remeshable(loaded, std::ldexp(first_edge_length(*remeshed, loaded), 1 - remeshed->remesh.levels));
+    require_remeshable(loaded, edge_length_of(remeshed->remesh.levels, remeshed->remesh, loaded));
   } catch (const InputError& error) {
     remeshed->fail("remesh", fmt::format("the mesh of '{}' {}", remeshed->shape, error.what()));
   }

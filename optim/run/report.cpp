@@ -136,7 +136,8 @@ std::string files_to_look_at(const std::string& folder, bool plots) {
   line(present({"summary.yaml", "log.csv", "final.exr", "final.h5", "target.exr", "initial.exr"}), "results");
   line(present({"geometry/"}), "meshes");
   if (plots)
-    line(present({"surface.png", "capture.png", "final.png", "target.png", "initial.png", "residual.png", "rmse.png"}), "pictures");
+    line(present({"surface.png", "capture.png", "final.png", "target.png", "initial.png", "residual.png", "rmse.png"}),
+         "pictures");
   line(present({"frames/", "report/"}), "behind the page");
   line(present({"experiment.yaml", "inputs/", "checkpoint.yaml", "checkpoint.previous.yaml"}), "to resume");
   return text.empty() ? text : fmt::format("  {}\n{}", folder, text);

@@ -15,6 +15,7 @@
 #include "optim/experiment/files.h"
 #include "optim/problem/capture_data.h"
 #include "optim/problem/darkness.h"
+#include "optim/problem/evidence.h"
 #include "optim/problem/jacobian.h"
 #include "optim/problem/joint_errors.h"
 #include "optim/problem/loss.h"
@@ -195,7 +196,9 @@ class Run {
                        : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
                                            curvature.gradients(), noise, blocks, names, theta);
     if (!has_surface_errors(problem_)) return {};
-    return surface_errors(problem_, curvature, theta, noise.scale);
+    const std::vector<std::vector<double>> samples = curvature.samples(kErrorSamples);
+    determined_ = determined_unknowns(problem_, target_, free_unknowns(problem_, theta), samples);
+    return surface_errors(problem_, samples, theta, noise.scale);
   }
 
   /// What the final parameters make of the counts, with far less noise than an iteration's image.
@@ -205,7 +208,7 @@ class Run {
     if ((!counts && !histograms) || !problem_.can_render(state_.theta)) return;
     SplitImage expected;
     if (counts)
-      fit_ = judge_rendered_fit(problem_, state_.theta, target_, expected);
+      fit_ = judge_rendered_fit(problem_, state_.theta, target_, expected, determined_);
     else
       expected.image =
           problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
@@ -236,6 +239,7 @@ class Run {
   double target_seconds_ = 0;
   LogRow last_;
   ParameterErrors errors_;
+  std::optional<double> determined_;  ///< of the unknowns, where a prior holds surfaces
   std::optional<GoodnessOfFit> fit_;  ///< of counts
   std::string zero_gradients_;        ///< for the screen
 };

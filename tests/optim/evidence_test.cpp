@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <memory>
+#include <numeric>
 
 #include "optim/problem/rendered_curvature.h"
 #include "optim/problem/surface_errors.h"
@@ -160,19 +161,29 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
   const std::size_t n = theta.size(), m = n - 1;  // without the gain
   const std::vector<double> factor = cholesky(all.data, all.prior, n);
   const double scale = 1e-4;
-  double expected = 0;
-  for (std::size_t i = 2; i < m; i += 3) {
-    std::vector<double> x(m, 0.0);  // L x = e; the variance is x'x
+  double expected = 0, determined = static_cast<double>(m);
+  std::vector<std::vector<double>> inverse;  // of L, column by column
+  for (std::size_t i = 0; i < m; ++i) {
+    std::vector<double>& x = inverse.emplace_back(m, 0.0);  // L x = e; the variance is x'x
     for (std::size_t r = i; r < m; ++r) {
       x[r] = r == i ? 1 : 0;
       for (std::size_t k = i; k < r; ++k) x[r] -= factor[r * m + k] * x[k];
       x[r] /= factor[r * m + r];
-      expected += scale * x[r] * x[r];
+      if (i % 3 == 2) expected += scale * x[r] * x[r];
     }
   }
+  for (std::size_t i = 0; i < m; ++i)
+    for (std::size_t j = 0; j < m; ++j)
+      determined -=
+          all.prior[i * n + j] * std::inner_product(inverse[i].begin(), inverse[i].end(), inverse[j].begin(), 0.0);
   double found = 0;
-  for (const double error : surface_errors(problem, curvature, theta, scale)) found += error * error;
+  const std::vector<std::vector<double>> samples = curvature.samples(kErrorSamples);
+  for (const double error : surface_errors(problem, samples, theta, scale)) found += error * error;
   EXPECT_NEAR(std::sqrt(found / expected), 1, 0.3) << found << " " << expected;
+  // With the gain, which nothing holds, all are free: the trace of what the prior leaves is known to sqrt(2 rank / 4).
+  const double of_all = determined_unknowns(problem, target, std::vector<char>(n, 1), samples);
+  EXPECT_NEAR(of_all - 1, determined, 4 * std::sqrt(static_cast<double>(m) / 2)) << m;
+  EXPECT_LT(determined, 0.5 * static_cast<double>(m));
 }
 
 /// From a weight a hundred times too small, and one as much too large, to the same one, and to about that of the truth's own
