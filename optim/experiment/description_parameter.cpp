@@ -176,7 +176,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
         {.only = of({vertices})});
     inner.value("evidence", field::boolean(spec.evidence),
-                "of counts, in a run in levels: each level but the first multiplies the weight of bending, or without "
+                "of counts, in a run in levels: each finer level multiplies the weight of bending, or without "
                 "bending that of slopes, by what makes the data of the one before most probable");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",

@@ -151,6 +151,16 @@ TEST_F(LevelsTest, TheFirstLevelMayBeRemeshed) {
   EXPECT_FALSE(folder_.has("out/geometry/target_hill.ply")) << "nobody knows it";
 }
 
+TEST_F(LevelsTest, CoarseLevelsKeepTheLengthOfEdges) {
+  write_target();
+  start_run(load_experiment(experiment("flat", "remesh: {levels: 3, coarse_levels: 2, edge_length: 0.4}",
+                                       "{images: hill.exr}")),
+            options());
+  EXPECT_NEAR(mean_edge_length(found("out/levels/1")), 0.4, 0.04);
+  EXPECT_NEAR(mean_edge_length(found("out/levels/2")), 0.4, 0.04);
+  EXPECT_NEAR(mean_edge_length(found("out/levels/3")), 0.2, 0.02);
+}
+
 /// Everything begins where it was found: the same surface, albedos, gain and shift; the image is that of before.
 TEST_F(LevelsTest, EverythingIsCarriedOver) {
   std::string albedos;
@@ -224,6 +234,7 @@ TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   };
   says(of("remesh: {levels: 0}"), "remesh.levels");
   says(of("remesh: {edge_length: 0.1}"), "levels");
+  says(of("remesh: {levels: 3, coarse_levels: 0}"), "remesh.coarse_levels");
   says(of("remesh: {levels: 2, size: 3}"), "remesh.size");
   says(of("remesh: {levels: 2}, selection: [0, 1]"), "selection: is of vertices that remeshing replaces");
   says(of("remesh: {levels: 12, edge_length: 0.01}"), "triangles");
