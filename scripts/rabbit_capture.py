@@ -62,7 +62,7 @@ def parser():
     parser.add_argument("--spot", type=float, nargs=2, action="append", metavar=("X", "Y"),
                         help="a spot of the laser, in metres from the wall's middle; may be repeated; without: confocal")
     parser.add_argument("--bounces", type=int, default=1, help="on the rabbit (default 1)")
-    parser.add_argument("--samples", type=int, default=4096, help="per point, of the expected counts (default 4096)")
+    parser.add_argument("--samples", type=int, default=32768, help="per point, of the expected counts (default 32768)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
     parser.add_argument("--no-noise", action="store_true", help="expected counts in place of Poisson numbers")
     return parser

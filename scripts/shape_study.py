@@ -75,6 +75,9 @@ class Shape:
     bin: float = 16  # picoseconds
     bins: int = 512
 
+    def histograms(self):
+        return self.points**2 * max(1, self.spots) ** 2
+
 
 def shapes():
     blob = [(*horned(), 0.75)]
@@ -125,13 +128,12 @@ def capture(shape, options, path):
         folder = pathlib.Path(temporary)
         (folder / "scene.yaml").write_text(scene(shape, folder), encoding="ascii")
         (folder / "response.csv").write_bytes((rabbit_capture.SCENE / "response.csv").read_bytes())
-        settings = rabbit_capture.EXPERIMENT.format(samples=options.samples, bounces=1).replace("shape: rabbit", "shape: part0")
+        settings = rabbit_capture.EXPERIMENT.format(samples=options.samples // shape.histograms(), bounces=1).replace("shape: rabbit", "shape: part0")
         settings = settings.replace("width: 16, count: 512", f"width: {shape.bin}, count: {shape.bins}")
         (folder / "shape.yaml").write_text(settings, encoding="ascii")
         program("render", folder / "shape.yaml", "-o", folder / "render", "--seed", options.seed)
         light = captures.read_capture(folder / "render/render.h5")
-    histograms = light.counts.size / shape.bins
-    means = light.counts * (options.photons * histograms / light.counts.sum(dtype=float)) + options.background
+    means = light.counts * (options.photons * shape.histograms() / light.counts.sum(dtype=float)) + options.background
     captures.write_capture(path, np.random.default_rng(options.seed).poisson(means), light.delta_t, light.t_start, light.points, NORMAL,
                            light.laser if shape.spots else None, "simulated")
 
@@ -162,7 +164,8 @@ def main():
     parser.add_argument("--shapes", nargs="+", choices=known, default=list(known), help="default: all")
     parser.add_argument("--photons", type=float, default=2000, help="per histogram, on average (default 2000)")
     parser.add_argument("--background", type=float, default=0.5, help="photons per bin beside them (default 0.5)")
-    parser.add_argument("--samples", type=int, default=131072, help="per point, of the expected counts (default 131072)")
+    parser.add_argument("--samples", type=int, default=2**29,
+                        help="of the expected counts in all: their noise has to be far below that of the photons (default 2^29)")
     parser.add_argument("--seconds", type=float, default=300, help="of each reconstruction (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for captures and runs; default: a temporary one")

@@ -17,7 +17,7 @@ class Solution {
   Solution(const Vector& right_side, const Precondition& precondition, const SolutionLimits& limits)
       : precondition_(precondition), limits_(limits), x_(right_side.size(), 0.0), residual_(right_side) {
     direction_ = precondition_(residual_);
-    square_ = dot(residual_, direction_);
+    expected_ = square_ = dot(residual_, direction_);
     ended_ = !(square_ > 0);
   }
   const Vector& x() const { return x_; }
@@ -27,7 +27,7 @@ class Solution {
   /// `product`: that of the matrix with the direction.
   void step(const Vector& product) {
     const double curvature = dot(direction_, product);
-    if (!(curvature > 0)) {  // noise is all that is left
+    if (!(curvature > limits_.least_curvature * expected_)) {  // noise is all that is left
       ended_ = true;
       return;
     }
@@ -39,7 +39,9 @@ class Solution {
     gains_.push_back(length * square_);  // they add up to x'b
     const Vector next = precondition_(residual_);
     const double square = dot(residual_, next);
-    for (std::size_t i = 0; i < x_.size(); ++i) direction_[i] = next[i] + square / square_ * direction_[i];
+    const double kept = square / square_;
+    for (std::size_t i = 0; i < x_.size(); ++i) direction_[i] = next[i] + kept * direction_[i];
+    expected_ = square + kept * kept * expected_;  // the residual is at right angles to the former direction
     square_ = square;
     const auto count = static_cast<int>(gains_.size());
     const double last = std::accumulate(gains_.end() - std::min(limits_.last_steps, count), gains_.end(), 0.0);
@@ -52,7 +54,7 @@ class Solution {
   const Precondition& precondition_;
   const SolutionLimits& limits_;
   Vector x_, residual_, direction_, gains_;
-  double square_ = 0;
+  double square_ = 0, expected_ = 0;  ///< expected: curvature along the direction, by the preconditioner
   bool ended_ = false;
 };
 

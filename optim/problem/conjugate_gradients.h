@@ -10,6 +10,8 @@ struct SolutionLimits {
   int most_steps = 24;
   int last_steps = 4;
   double least_gain = 0.05;
+  /// An equation ends, too, at a direction whose curvature is below this part of what the preconditioner expects.
+  double least_curvature = 0;
 };
 
 using VectorList = std::vector<std::vector<double>>;

@@ -20,6 +20,11 @@ constexpr int kGradients = 6;
 /// matrix has 37.5; six give 36.8.
 constexpr int kSampleSteps = 12;
 
+/// Where nothing changes the readings, as motion within a surface does not, the noise of products is all there is, of either sign; what
+/// preconditions has it squared. Two plates that are off by 0.4 mm in the median had stated errors of 0.6 m without this limit, of 1.1 mm with
+/// it; a blob whose curvatures are above has the same errors with and without.
+constexpr double kLeastCurvature = 0.1;
+
 /// Of the diagonal, which preconditions: each knows an entry to a factor of about 1 +- sqrt(2 / 12).
 constexpr int kProbes = 12;
 
@@ -116,7 +121,7 @@ std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
   const Metric metric(at_first, couplings, std::move(free));
   return solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
                [&](const std::vector<double>& residual) { return metric.solve(residual); },
-               {.most_steps = kSampleSteps});
+               {.most_steps = kSampleSteps, .least_curvature = kLeastCurvature});
 }
 
 std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<std::vector<double>>& vectors) const {
