@@ -79,12 +79,11 @@ GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta
 }
 
 GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                 SplitImage& image, std::optional<double> determined) {
-  constexpr int kMostDoublings = 4;
+                                 SplitImage& image, std::optional<double> determined, int doublings) {
   const int samples = fit_samples(problem);
   image = render_expected(problem, theta, samples, 0);
   GoodnessOfFit fit = judge_fit(problem, theta, image, target, determined);
-  for (int i = 0; i < kMostDoublings && problem.scene().capture && fit.fit.image_share > kMostImageShare; ++i) {
+  for (int i = 0; i < doublings && problem.scene().capture && fit.fit.image_share > kMostImageShare; ++i) {
     image = mean_of(std::move(image), render_expected(problem, theta, samples << i, i + 1));
     fit = judge_fit(problem, theta, image, target, determined);
   }

@@ -30,9 +30,9 @@ GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta
 inline constexpr double kMostImageShare = 0.05;
 
 /// The same for expected counts that are rendered into `image`, with fit_samples(). Captures get more, twice as many each time, where
-/// noise makes too much of the variance, 16 times as many at most.
+/// noise makes too much of the variance, `doublings` times at most.
 GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                 SplitImage& image, std::optional<double> determined = {});
+                                 SplitImage& image, std::optional<double> determined = {}, int doublings = 4);
 
 /// Whether a run has left its data behind: they hold light of which the fit has nothing (GoodnessOfFit::lost), or the fit
 /// neither explains them nor is as good as its start, by three standard errors of the loss.

@@ -43,7 +43,8 @@ struct RunOptions {
   /// Of a run in levels (see levels.h), after each but the last, on all ranks: whether there is to be another. May change the
   /// surface that it begins with. Depends on nothing but its arguments, as a resumed run asks again.
   std::function<bool(const LevelResult&, LevelSurface&)> next_level;
-  /// Whether standard errors of what was found are stated; of a level that others follow they are not.
+  /// Whether standard errors of what was found are stated, and expected counts rendered until their noise does not decide the verdict; of
+  /// a level that others follow they are not.
   bool errors = true;
   std::function<void(const std::string&)> warning;  ///< one line
   std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
