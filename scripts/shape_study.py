@@ -27,7 +27,7 @@ from isochron import captures
 from isochron.mesh_files import read_mesh
 from isochron.pictures.raster import Seen
 from reproduction.measure import ROOT, program, summary
-from reproduction.tables import write_rows
+from reproduction.tables import read_rows, write_rows
 from scenes import mesh
 from scenes.implicit import Blobs, polygonise
 
@@ -158,6 +158,17 @@ def rows(name, shape, options, folder):
         yield name, method, *(f"{value:.3g}" for value in numbers), *verdict
 
 
+def table_of(rows):
+    """For experiments/README.md: reconstruction / back-projection in each cell."""
+    by = {(row["shape"], row["method"]): row for row in rows}
+    lines = ["| shape | median, mm | 80 %, mm | silhouette | seconds | verdict |", "|---|---|---|---|---|---|"]
+    for shape in dict.fromkeys(row["shape"] for row in rows):
+        fit, other = by[shape, "fit"], by[shape, "back_projection"]
+        cells = [f"{fit[key]} / {other[key]}" for key in ("median_mm", "within_80_mm", "silhouette", "seconds")]
+        lines.append(" | ".join(["| " + shape.replace("_", " "), *cells, fit["verdict"]]) + " |")
+    return "\n".join(lines)
+
+
 def main():
     known = shapes()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -170,7 +181,11 @@ def main():
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for captures and runs; default: a temporary one")
     parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
+    parser.add_argument("--table", action="store_true", help="print the table of what was measured before, as a page has it")
     options = parser.parse_args()
+    if options.table:
+        print(table_of(read_rows(options.output / "shapes.csv")))
+        return 0
     table = []
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or pathlib.Path(temporary)

@@ -16,6 +16,7 @@ import numpy as np
 import plot_rabbit_study
 import rabbit_errors
 import rabbit_study
+import shape_study
 from isochron.captures import Capture
 from isochron.mesh_files import read_mesh
 from reproduction.measure import Failure
@@ -130,6 +131,34 @@ class StudyTest(unittest.TestCase):
             self.assertGreater(np.ptp(matplotlib.image.imread(folder / "a.png")[..., :3]), 0.9)
             fits = [row for row in plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv") if row["method"] == "fit"]
             self.assertEqual(plot_rabbit_study.medians(fits, "seconds", "within_80_mm"), [[62, 121], [5, 4]])
+
+
+class ShapesTest(unittest.TestCase):
+    def test_plates_are_turned_as_they_say(self):
+        vertices, triangles = shape_study.plate((0.1, -0.02, 0.5), (0.2, 0.1), 20, 0)
+        np.testing.assert_allclose(np.abs(vertices[:, 2] - 0.5), 0.1 * np.sin(np.radians(20)))
+        np.testing.assert_allclose(vertices.mean(axis=0), (0.1, -0.02, 0.5))
+        vertices, triangles = shape_study.plate((0, 0, 0.5), (0.2, 0.1), -10, 15)
+        for a, b, c in vertices[triangles]:
+            normal = np.cross(b - a, c - a)
+            self.assertLess(normal[2], 0)  # towards the wall
+            self.assertAlmostEqual(0.5 * np.linalg.norm(normal), 0.01)
+
+    def test_all_are_seen_from_the_wall(self):
+        for name, shape in shape_study.shapes().items():
+            with self.subTest(name):
+                depths = shape_study.seen(shape_study.together(shape.parts), shape)
+                there = np.isfinite(depths)
+                self.assertTrue(0.02 < there.mean() < 0.4)
+                self.assertFalse(there[[0, -1]].any() or there[:, [0, -1]].any())
+                self.assertGreater(np.nanmin(depths), 0.5 * shape.side)
+                # Light comes back before the last bin ends.
+                self.assertLess(2 * np.hypot(np.nanmax(depths), shape.side), shape.bin * shape.bins * 0.299792458e-3)
+
+    def test_the_table_has_both_methods(self):
+        rows = [dict(zip(shape_study.COLUMNS, ("plates", method, *numbers, verdict, ""))) for method, numbers, verdict in
+                (("back_projection", ("0.9", "2.2", "0.7", "4"), ""), ("fit", ("0.4", "1", "0.9", "213"), "explained"))]
+        self.assertIn("| plates | 0.4 / 0.9 | 1 / 2.2 | 0.9 / 0.7 | 213 / 4 | explained |", shape_study.table_of(rows))
 
 
 if __name__ == "__main__":
