@@ -1,6 +1,5 @@
 #include "core/base/parallel.h"
 
-#include <malloc.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
@@ -49,11 +48,6 @@ void run(int count, const F& f) {
 
 void set_thread_count(int threads) {
   thread_count = threads;
-}
-
-void keep_freed_memory() {
-  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // the most that the GNU library takes
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
 }
 
 void parallel(int count, const std::function<void(int)>& f) {
