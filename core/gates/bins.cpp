@@ -96,8 +96,8 @@ class Bins final : public GateDescription {
     const auto write = [this] {
       return fmt::format("{{offsets: {}, values: {}}}", yaml_list(offsets_), yaml_list(values_));
     };
-    return {"text file, or {offsets, values}", "rows of an offset and a value of at least 0, offsets rising", read,
-            write};
+    return {"file of numbers, or {offsets, values}", "rows of an offset and a value of at least 0, offsets rising",
+            read, write};
   }
 
   static constexpr int kKeys = 3;

@@ -14,7 +14,7 @@
 
 namespace isochron {
 
-/// Rows of numbers from the text file that a value names, a number for each of these columns. The file may have their names as
+/// Rows of numbers from the file, text or a NumPy array, that a value names, a number for each of these columns. The file may have their names as
 /// its first row.
 using ReadNumbers =
     std::function<std::vector<std::vector<double>>(const YamlValue&, const std::vector<std::string>& columns)>;

@@ -21,7 +21,7 @@ class Tabulated final : public GateDescription {
         values_.push_back(row[1]);
       }
     };
-    const Field table{"text file", "rows of an offset and a value", read, [] { return std::string(); }};
+    const Field table{"file of numbers", "rows of an offset and a value", read, [] { return std::string(); }};
     const bool from_file =
         keys.value("file", table, "in place of `offsets` and `values`", {.unit = "`unit`", .unset = true});
     const Only in_line = from_file ? Only{false, "tables without a file"} : Only{};

@@ -208,7 +208,7 @@ Field ExperimentFolder::file(std::string& variable) const {
 Field ExperimentFolder::values(std::vector<double>& variable) {
   const auto read = [this, &variable](const YamlValue& value) {
     variable.clear();
-    if (value.is_map()) value.fail("is a map", "a number, a list of numbers or a text file");
+    if (value.is_map()) value.fail("is a map", "a number, a list of numbers or a file of numbers");
     if (value.is_number())
       variable = {value.number()};
     else if (value.is_list())
@@ -217,7 +217,7 @@ Field ExperimentFolder::values(std::vector<double>& variable) {
       for (const auto& row : read_numbers(value)) variable.insert(variable.end(), row.begin(), row.end());
     if (variable.empty()) value.fail("holds no number", "at least one");
   };
-  return {"number, list or text file", "one for all, or one for each component", read,
+  return {"number, list or file of numbers", "one for all, or one for each component", read,
           [&variable] { return variable.size() == 1 ? fmt::format("{}", variable[0]) : yaml_list(variable); }};
 }
 

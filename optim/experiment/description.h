@@ -16,9 +16,9 @@ struct ExperimentFolder {
 
   /// An existing file; the variable is its absolute path.
   Field file(std::string& variable) const;
-  /// A number, a list of them, or a text file of them.
+  /// A number, a list of them, or a file of them.
   Field values(std::vector<double>& variable);
-  /// Rows of a text file of numbers, see read_number_file.
+  /// Rows of a file of numbers, see read_number_file.
   std::vector<std::vector<double>> read_numbers(const YamlValue& value, const std::vector<std::string>& columns = {});
 };
 

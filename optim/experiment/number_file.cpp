@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -10,10 +11,30 @@
 #include "core/base/error.h"
 #include "core/base/file.h"
 #include "core/base/text_lines.h"
+#include "core/image/npy.h"
 
 namespace isochron {
+namespace {
+
+std::vector<std::vector<double>> read_array(const std::string& file, std::size_t columns) {
+  const NumberArray array = read_npy(file);
+  if (columns > 0 && (array.shape.size() != 2 || array.shape[1] != columns))
+    throw InputError(
+        fmt::format("{}: an array of [{}] (allowed: [rows, {}])", file, fmt::join(array.shape, ", "), columns));
+  const std::vector<double>& values = array.values;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i])) throw InputError(fmt::format("{}: value {} is not a finite number", file, i));
+  if (columns == 0) return {values};
+  std::vector<std::vector<double>> rows;
+  for (auto row = values.begin(); row != values.end(); row += static_cast<std::ptrdiff_t>(columns))
+    rows.emplace_back(row, row + static_cast<std::ptrdiff_t>(columns));
+  return rows;
+}
+
+}  // namespace
 
 std::vector<std::vector<double>> read_number_file(const std::string& file, const std::vector<std::string>& columns) {
+  if (file.ends_with(".npy")) return read_array(file, columns.size());
   std::string problem;
   const std::optional<std::string> contents = read_regular_file(file, problem);
   if (!contents) throw InputError(fmt::format("{}: {}", file, problem));

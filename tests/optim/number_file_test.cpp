@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/base/error.h"
 #include "tests/optim/temporary_folder.h"
 
@@ -45,6 +47,40 @@ TEST_F(NumberFile, WhatIsNoNumberIsRefusedWithItsPlace) {
   EXPECT_EQ(error("offset,other\n0,1\n", {"offset", "value"}), ":1:1: 'offset' is not a finite number");
   EXPECT_EQ(error("1,2\n1,2,3\n", {"offset", "value"}), ":2:1: 3 numbers in this row (allowed: 2)");
   EXPECT_EQ(error(std::string("\xFE\xFF\0001", 4)), ": is text in UTF-16 (allowed: UTF-8)");
+}
+
+/// Version 1.0 of NumPy's format: a header padded to 64 bytes, then the values.
+std::string array_file(const std::string& shape, const std::vector<double>& values) {
+  std::string header = "{'descr': '<f8', 'fortran_order': False, 'shape': (" + shape + "), }";
+  header.resize(128 - 10 - 1, ' ');
+  std::string contents("\x93NUMPY\x01\x00\x76\x00", 10);
+  contents += header + "\n";
+  return contents.append(reinterpret_cast<const char*>(values.data()), sizeof(double) * values.size());
+}
+
+TEST_F(NumberFile, ArraysKeepTheirBits) {
+  const double third = 1.0 / 3, tiny = 5e-324;
+  const auto read_array = [&](const std::string& shape, const std::vector<double>& values,
+                              const std::vector<std::string>& columns = {}) {
+    folder_.write("a.npy", array_file(shape, values));
+    return read_number_file(folder_.file("a.npy"), columns);
+  };
+  EXPECT_EQ(read_array("2, 2", {1, third, 2, tiny}, {"offset", "value"}), (Rows{{1, third}, {2, tiny}}));
+  EXPECT_EQ(read_array("1, 3", {1, third, tiny}), (Rows{{1, third, tiny}}));
+  EXPECT_EQ(read_array("3,", {1, third, tiny}), (Rows{{1, third, tiny}}));
+  const auto error = [&](const std::string& shape, const std::vector<double>& values,
+                         const std::vector<std::string>& columns = {}) -> std::string {
+    try {
+      read_array(shape, values, columns);
+    } catch (const InputError& problem) {
+      return std::string(problem.what()).substr(folder_.file("a.npy").size());
+    }
+    return "no error";
+  };
+  EXPECT_EQ(error("1, 3", {1, 2, 3}, {"offset", "value"}), ": an array of [1, 3] (allowed: [rows, 2])");
+  EXPECT_EQ(error("2,", {1, 2}, {"offset", "value"}), ": an array of [2] (allowed: [rows, 2])");
+  EXPECT_EQ(error("2,", {1, std::nan("")}), ": value 1 is not a finite number");
+  EXPECT_EQ(error("2, 2", {1, 2, 3}), ": ends before its 2 x 2 elements");
 }
 
 }  // namespace

@@ -78,7 +78,8 @@ def _response(response: Any, unit: str) -> tuple[np.ndarray, np.ndarray] | None:
         raise InputError(f"unit '{unit}': none of {', '.join(METRES)}")
     if isinstance(response, (str, os.PathLike)):
         try:
-            response = np.loadtxt(response, delimiter=",", skiprows=1, ndmin=2).T
+            table = os.fspath(response).endswith(".npy")
+            response = (np.load(response) if table else np.loadtxt(response, delimiter=",", skiprows=1, ndmin=2)).T
         except (OSError, ValueError) as error:
             raise InputError(f"{os.fspath(response)}: cannot be read: {str(error).splitlines()[0]}") from error
     offsets, values = (np.asarray(column, float) for column in response)

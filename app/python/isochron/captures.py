@@ -43,6 +43,23 @@ class Capture:
     laser_normals: np.ndarray | None = None
     """[Lx, Ly, xyz]"""
 
+    def write(self, path: Any) -> None:
+        """As a file that experiments can read, counts with 32 bits. Raises CaptureError."""
+        counts, points = np.asarray(self.counts), _grid(self.points)
+        laser = None if self.laser is None else _grid(self.laser)
+        shape = (*(laser.shape[:2] if laser is not None and counts.ndim > np.ndim(self.points) else ()), *points.shape[:2])
+        if np.prod(shape) == counts[0].size:  # points in no order get an axis more
+            counts = counts.reshape(-1, *shape)
+        normals = np.broadcast_to(self.normals, np.shape(self.points)).reshape(points.shape)
+        of_laser = None if laser is None or self.laser_normals is None else np.reshape(self.laser_normals, laser.shape)
+        write_capture(path, counts, self.delta_t, self.t_start, points, normals, laser, laser_normal=of_laser, origins=self.origins)
+
+
+def _grid(points: Any) -> np.ndarray:
+    """[Sx, Sy, xyz]; points in no order are a grid of one row."""
+    found = np.asarray(points, float)
+    return found[:, np.newaxis] if found.ndim == 2 else found
+
 
 def _find(file: h5py.File, name: str) -> np.ndarray | None:
     """A dataset's values; None where it is missing or empty, which is how tal writes what is unknown."""
@@ -140,13 +157,13 @@ def write_capture(path: Any, counts: np.ndarray, delta_t: float, t_start: float,
                   original_format: str = "arrays", *, laser_normal: Any = None, origins: Any = None) -> None:
     """A measurement that experiments can read. counts [bin, Sx, Sy], of several spots [bin, Lx, Ly, Sx, Sy]; points [Sx, Sy, xyz] in
     metres, as are the bins' width and start (optical path); normal: of the wall, or [Sx, Sy, xyz]; laser is one point,
-    [Lx, Ly, xyz], or None: confocal; laser_normal like `normal`, which it is where it is None; origins of laser and sensor, where
+    [Lx, Ly, xyz], or None: confocal, as where it is `points`; laser_normal like `normal`, which it is where it is None; origins of laser and sensor, where
     times include the ways from and to there. Raises CaptureError."""
     path = pathlib.Path(path)
     spots = points if laser is None else np.asarray(laser, float).reshape(np.shape(laser) if np.ndim(laser) == 3 else (1, 1, 3))
     several = np.ndim(counts) == 5
     expected = (*spots.shape[:2], *points.shape[:2]) if several else points.shape[:2]
-    if np.shape(counts)[1:] != expected or (several and laser is None) or (not several and laser is not None and spots.size != 3):
+    if np.shape(counts)[1:] != expected or (several and laser is None) or (not several and spots.size not in (3, points.size)):
         raise CaptureError(f"{path}: counts of {np.shape(counts)} do not fit {points.shape[:2]} points and {spots.shape[:2]} spots")
     if laser_normal is None:
         wall = np.asarray(normal, float)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import importlib
 import json
 import os
+import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from isochron.dictionary import DictionaryFiles
 from isochron.errors import InputError
 from isochron.image import Coordinates, Image
 from isochron.runs import Run, read_run
@@ -170,6 +173,38 @@ class Experiment:
     """
 
     def __init__(self, path: Path, overrides: Overrides = ()) -> None:
+        self._files: DictionaryFiles | None = None
+        self._read(path, overrides)
+
+    @classmethod
+    def from_dict(cls, description: Mapping[str, Any]) -> Experiment:
+        """Of the keys of an experiment's file. `scene` may be the keys of a scene's file, and its shapes may have `vertices` [N, 3]
+        and `triangles` [M, 3] in place of `file`. Of arrays may be also initial, target, lower and upper of parameters, the target's
+        `images` [gate, row, column, channel] and `mask` [column, row], and `response` and `file` of gates: (offsets, values). A Capture
+        may be the target's `capture` and `file` of the scene's `capture`. Paths are relative to the current folder.
+
+        What arrays hold now is what counts. Images and counts have 32 bits, all else keeps its own. Raises InputError, which names
+        keys, such as scene.shapes[0].vertices.
+        """
+        experiment = cls.__new__(cls)
+        experiment._files = files = DictionaryFiles()
+        try:
+            with files:
+                files.write(description)
+                experiment._read(files.experiment)
+        except BaseException:
+            files.remove()
+            raise
+        return experiment
+
+    def save(self, folder: Path) -> pathlib.Path:
+        """Writes what from_dict was given as files, over those of the same names, and returns the experiment's, folder/experiment.yaml.
+        Raises InputError."""
+        if self._files is None:
+            raise InputError(f"save: the experiment {self.name} has its files already (allowed: one of from_dict)")
+        return self._files.save(folder)
+
+    def _read(self, path: Path, overrides: Overrides = ()) -> None:
         self._session = extension().Session(os.fspath(path), _overrides(overrides))
         self._parameters = {}
         for item in self._session.parameters():
@@ -216,7 +251,8 @@ class Experiment:
     def target(self) -> Image:
         """[gate, row, column, channel]: what optimisations aim at, rendered at the target values or read from a file; as runs
         use it, rounded to 32 bits. Computed when first asked for."""
-        return Image(self._session.target(), self._coordinates)
+        with self._naming():
+            return Image(self._session.target(), self._coordinates)
 
     def theta(self, values: Theta = None) -> np.ndarray:
         """[unknown]: of a dictionary from names to values, of None the initial values, of an array itself."""
@@ -243,7 +279,8 @@ class Experiment:
 
         samples: per pixel, at least 2; default: samples.primal of the experiment.
         """
-        return Image(self._session.render(self.theta(theta), samples, seed, iteration), self._coordinates)
+        with self._naming():
+            return Image(self._session.render(self.theta(theta), samples, seed, iteration), self._coordinates)
 
     def jvp(self, theta: Theta, tangent: Theta, samples: int | None = None, seed: int | None = None,
             iteration: int = 0) -> Image:
@@ -255,7 +292,8 @@ class Experiment:
         if isinstance(tangent, Mapping):
             tangent = self.theta({**{name: 0.0 for name in self._parameters}, **tangent})
         along = np.asarray(tangent, dtype=float).reshape(-1)
-        return Image(self._session.jvp(self.theta(theta), along, samples, seed, iteration), self._coordinates)
+        with self._naming():
+            return Image(self._session.jvp(self.theta(theta), along, samples, seed, iteration), self._coordinates)
 
     def vjp(self, theta: Theta, adjoint: Any, samples: int | None = None, seed: int | None = None,
             iteration: int = 0) -> np.ndarray:
@@ -266,12 +304,14 @@ class Experiment:
             full = np.broadcast_to(np.asarray(adjoint, dtype=float), self._shape)
         except ValueError:
             raise InputError(f"adjoint: shape {np.shape(adjoint)} (allowed: {self._shape}, or what broadcasts to it)") from None
-        return np.asarray(self._session.vjp(self.theta(theta), np.moveaxis(full, 0, 2), samples, seed, iteration))
+        with self._naming():
+            return np.asarray(self._session.vjp(self.theta(theta), np.moveaxis(full, 0, 2), samples, seed, iteration))
 
     def evaluate(self, theta: Theta = None, iteration: int = 0) -> Evaluation:
         """Loss, its gradient and the image: exactly what the experiment's optimiser evaluates in an iteration at theta. The
         same iteration has the same random numbers, so that differences between its thetas are far less noisy than the loss."""
-        found = self._session.evaluate(self.theta(theta), iteration)
+        with self._naming():
+            found = self._session.evaluate(self.theta(theta), iteration)
         found["image"] = Image(found["image"], self._coordinates)
         return Evaluation(**found)
 
@@ -286,7 +326,8 @@ class Experiment:
 
     def gradient(self, theta: Theta = None, samples: int | None = None, seed: int | None = None) -> Gradient:
         """The loss's gradient with standard errors, what `isochron gradient` writes."""
-        return Gradient(**self._session.gradient(self.theta(theta), samples, seed))
+        with self._naming():
+            return Gradient(**self._session.gradient(self.theta(theta), samples, seed))
 
     def run(self, folder: Path | None = None, *, start: Theta = None, callback: Callback | None = None,
             force: bool = False) -> Run:
@@ -298,7 +339,12 @@ class Experiment:
         force: an earlier run in the folder is deleted, not moved aside.
         """
         first = None if start is None else self.theta(start)
-        return read_run(self._session.run("" if folder is None else os.fspath(folder), first, row_callback(callback), force))
+        with self._naming():
+            return read_run(self._session.run("" if folder is None else os.fspath(folder), first, row_callback(callback), force))
+
+    def _naming(self) -> contextlib.AbstractContextManager[Any]:
+        """Within it, errors name what the user gave."""
+        return self._files or contextlib.nullcontext()
 
     def _flat(self, key: str) -> np.ndarray:
         parts = [getattr(p, key).reshape(-1) for p in self._parameters.values()]

@@ -125,6 +125,18 @@ def read_vertex_values(path, name):
     return values[name]
 
 
+def write_ply(path, points, triangles):
+    """A binary file of vertices [N, 3], as doubles, and triangles [M, 3], which `path` names."""
+    coordinates = "".join(f"property double {axis}\n" for axis in "xyz")
+    faces = np.empty(len(triangles), [("size", "u1"), ("corners", "<i4", 3)])
+    faces["size"], faces["corners"] = 3, triangles
+    with open(path, "wb") as file:
+        file.write((f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n{coordinates}"
+                    f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n").encode())
+        np.ascontiguousarray(points, "<f8").tofile(file)
+        faces.tofile(file)
+
+
 def name_in_files(shape):
     """A shape's name as in the names of a run's meshes: without letters that file systems may not have."""
     return re.sub(r"[^A-Za-z0-9_-]", "_", shape)

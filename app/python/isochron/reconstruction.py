@@ -7,8 +7,7 @@ import pathlib
 import tempfile
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from isochron.dictionary import write_table
 from isochron.errors import InputError
 from isochron.experiment import Callback, extension, row_callback
 from isochron.runs import Run, read_run
@@ -20,20 +19,16 @@ if TYPE_CHECKING:
 def _capture_file(capture: str | os.PathLike[str] | Capture, place: pathlib.Path) -> str:
     if isinstance(capture, (str, os.PathLike)):
         return os.fspath(capture)
-    from isochron.captures import write_capture
-
     path = place / "capture.h5"
-    write_capture(path, capture.counts, capture.delta_t, capture.t_start, capture.points, capture.normals, capture.laser,
-                  origins=capture.origins)
+    capture.write(path)
     return os.fspath(path)
 
 
 def _response_file(response: Any, place: pathlib.Path) -> str:
     if response is None or isinstance(response, (str, os.PathLike)):
         return "" if response is None else os.fspath(response)
-    offsets, values = (np.asarray(column, float) for column in response)
-    path = place / "response.csv"
-    np.savetxt(path, np.column_stack([offsets, values]), "%.17g", ",", header="offset,value", comments="")
+    path = place / "response.npy"
+    write_table(path, response)
     return os.fspath(path)
 
 
