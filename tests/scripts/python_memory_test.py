@@ -6,10 +6,10 @@ usage: python_memory_test.py PROGRAM PACKAGES     PACKAGES: the folder that hold
 
 import copy
 import gc
+import io
 import os
 import pathlib
 import pickle
-import re
 import subprocess
 import sys
 import tempfile
@@ -41,7 +41,7 @@ def text_of(vertices, triangles):
 
 
 def board(target):
-    """A capture's experiment; what files have in place of `target`'s and other arrays is filled in by `files`."""
+    """A capture's experiment."""
     scene = {"capture": {"file": target["capture"]},
              "materials": {"paper": {"type": "diffuse", "albedo": 0.5, "two_sided": True}},
              "shapes": [{"name": "board", "vertices": POINTS, "triangles": TRIANGLES, "material": "paper",
@@ -190,7 +190,7 @@ class MemoryTest(unittest.TestCase):
             ((*shape, "vertices"), np.zeros((5, 2)), "scene.shapes[0].vertices: expected [N, 3], got (5, 2)"),
             ((*shape, "vertices"), [[1, 2, 3], [1, 2]], "scene.shapes[0].vertices: expected [N, 3], got rows of different lengths"),
             ((*shape, "vertices"), nan, "scene.shapes[0].vertices: vertex 2 is not finite"),
-            ((*shape, "vertices"), np.zeros((4, 3)), "scene.shapes[0].vertices: has no faces|scene.shapes[0].vertices: .*"),
+            ((*shape, "vertices"), np.zeros((4, 3)), "scene.shapes[0].vertices: has no face with an area"),
             ((*shape, "triangles"), TRIANGLES + 0.0, "scene.shapes[0].triangles: expected integers [M, 3], got elements of type float64"),
             ((*shape, "triangles"), [[0, 1, 4]], "scene.shapes[0].triangles: triangle 0, [0, 1, 4], has a vertex that is not there"),
             ((*shape, "file"), "a.obj", "scene.shapes[0].file: stands beside an array"),
@@ -213,11 +213,9 @@ class MemoryTest(unittest.TestCase):
                 with self.assertRaises(isochron.InputError) as caught:
                     isochron.Experiment.from_dict(changed(path, value)).target  # noqa: B018 reads the mask
                 line = str(caught.exception)
-                pattern = re.escape(words).replace(r"\|", "|").replace(r"\.\*", ".*")
-                self.assertRegex(line, f"^({pattern})")
+                self.assertEqual(line[:len(words)], words)
                 self.assertNotIn(str(self.scratch), line)
                 self.assertNotIn("\n", line)
-        caught = None
         with self.assertRaisesRegex(isochron.InputError, "expected a dictionary"):
             isochron.Experiment.from_dict("board.yaml")
         with self.assertRaisesRegex(isochron.InputError, "save: the experiment board has its files already"):
@@ -255,6 +253,24 @@ raise RuntimeError("the end")
         self.assertIn("the end", done.stderr)
         self.assertTrue((self.folder / "saved/experiment.yaml").exists())
         self.assert_nothing_left()
+
+    def test_images_show_themselves(self):
+        from PIL import Image
+
+        experiment = isochron.Experiment.from_dict(room())
+        image = experiment.render()
+        for name, shown in (("colours", image), ("grey", isochron.Image(image[..., :1], image.coordinates)), ("signed", image - image.mean())):
+            with self.subTest(name), Image.open(io.BytesIO(shown._repr_png_())) as picture:
+                self.assertEqual(picture.format, "PNG")
+                colours = np.asarray(picture.convert("RGB"), int).reshape(-1, 3)
+                self.assertGreater(np.count_nonzero(np.ptp(colours, axis=1) > 20), 1000)  # axes and text are grey
+        self.assertIsNone(image[0]._repr_png_())
+
+    def test_example(self):
+        done = subprocess.run([sys.executable, pathlib.Path(isochron.__file__).resolve().parents[1] / "examples/fit_arrays.py", self.folder / "run"],
+                              capture_output=True, text=True, env={**os.environ, "PYTHONPATH": os.path.abspath(PACKAGES)})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertLess(float(done.stdout.split("error: ")[1].split()[0]), 0.02)  # of 0.2; what noise leaves is 0.0014
 
     def test_captures_in_no_order(self):
         """Of points without a grid, from two spots: counts [bin, spot, point]."""

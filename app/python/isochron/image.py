@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 from typing import Any
 
 import numpy as np
@@ -40,3 +41,26 @@ class Image(np.ndarray):
 
     def __array_wrap__(self, values: np.ndarray, context: Any = None) -> Any:
         return values[()] if values.ndim == 0 else super().__array_wrap__(values, context)
+
+    def _repr_png_(self) -> bytes | None:
+        """How notebooks show it: a cell per gate, as the program's pictures; of what has values below zero red above, blue below it."""
+        if self.coordinates is None or not self.size:
+            return None
+        # Takes long to load.
+        from matplotlib import pyplot
+        from isochron.pictures import sheets
+        from isochron.pictures.reading import Gates
+        from isochron.pictures.scales import scale_of
+
+        stack = np.asarray(self)[..., 0] if self.shape[3] == 1 else np.asarray(self)
+        where = self.coordinates
+        gates = Gates(len(stack), where.centers.tolist(), where.unit, where.quantity or "pixel value")
+        title = f"{gates.count} gates of {self.shape[2]} x {self.shape[1]} pixels"
+        if (stack < 0).any():
+            figure = sheets.draw_signed(title, {"": stack}, gates.quantity, gates)
+        else:
+            figure = sheets.draw_images(title, stack, scale_of(stack), gates)
+        png = io.BytesIO()
+        figure.savefig(png, format="png", dpi=110)
+        pyplot.close(figure)
+        return png.getvalue()

@@ -84,8 +84,13 @@ def about_gates(gates, shown):
     return [line for line in (what, left_out) if line]
 
 
-def plot_images(path, title, stack, scale, gates):
-    """The gated images of one file: grey scenes in false colour, RGB scenes in their own, equally exposed."""
+def plot_images(path, *what):
+    """See draw_images."""
+    save(draw_images(*what), path)
+
+
+def draw_images(title, stack, scale, gates):
+    """A figure of gated images: grey scenes in false colour, RGB scenes in their own, equally exposed."""
     shown = pick_gates(MOST_IMAGES, stack)
     height, width = stack.shape[1:3]
     columns = len(shown) if len(shown) <= 6 else int(np.ceil(np.sqrt(1.4 * len(shown))))
@@ -104,11 +109,16 @@ def plot_images(path, title, stack, scale, gates):
         axes.imshow(picture[g], cmap=cmap, norm=norm, interpolation="nearest")
     extend = "max" if np.nanmax(np.nan_to_num(stack[shown]), initial=0) > scale else "neither"
     sheet.colorbar(ScalarMappable(norm, cmap), gates.quantity, extend)
-    save(sheet.figure, path)
+    return sheet.figure
 
 
-def plot_signed(path, title, rows, quantity, gates):
-    """Images of either sign, red above zero, blue below: a row for each of `rows` (name -> stack), a column per gate.
+def plot_signed(path, *what):
+    """See draw_signed."""
+    save(draw_signed(*what), path)
+
+
+def draw_signed(title, rows, quantity, gates):
+    """A figure of images of either sign, red above zero, blue below: a row for each of `rows` (name -> stack), a column per gate.
 
     Rows that are zero everywhere are named instead of drawn.
     """
@@ -134,7 +144,7 @@ def plot_signed(path, title, rows, quantity, gates):
             if column == 0 and name:
                 axes.set_ylabel(name, fontsize=9)
     sheet.colorbar(ScalarMappable(norm, cmap), quantity, "both" if beyond else "neither")
-    save(sheet.figure, path)
+    return sheet.figure
 
 
 def plot_derivatives(path, title, stacks, parameter, gates):
