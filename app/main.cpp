@@ -19,7 +19,7 @@
 #include "app/progress.h"
 #include "app/start_ranks.h"
 #include "core/base/error.h"
-#include "core/base/parallel.h"
+#include "core/base/large_blocks.h"
 #include "core/base/progress.h"
 #include "core/base/ranks.h"
 #include "core/base/yaml_reader.h"

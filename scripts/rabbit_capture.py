@@ -41,16 +41,22 @@ def scene(options):
     return text
 
 
-def expected(options):
-    """Of one photon per unit of gain, as a capture."""
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = pathlib.Path(temporary)
-        (folder / "scene.yaml").write_text(scene(options), encoding="utf-8")
-        (folder / "response.csv").write_bytes((SCENE / "response.csv").read_bytes())
-        settings = EXPERIMENT.format(samples=options.samples, bounces=options.bounces)
-        (folder / "rabbit.yaml").write_text(settings, encoding="utf-8")
-        program("render", folder / "rabbit.yaml", "-o", folder / "render", "--seed", options.seed)
-        return captures.read_capture(folder / "render/render.h5")
+def expected(folder, scene, settings, seed):
+    """Of one photon per unit of gain, as a capture; the scene's other files are in the folder."""
+    (folder / "scene.yaml").write_text(scene, encoding="utf-8")
+    (folder / "response.csv").write_bytes((SCENE / "response.csv").read_bytes())
+    (folder / "experiment.yaml").write_text(settings, encoding="utf-8")
+    program("render", folder / "experiment.yaml", "-o", folder / "render", "--seed", seed)
+    return captures.read_capture(folder / "render/render.h5")
+
+
+def write(path, light, counts, laser):
+    captures.write_capture(path, counts, light.delta_t, light.t_start, light.points, [0, 0, 1], laser, "simulated")
+
+
+def means(light, photons, background):
+    """So many photons per histogram on average, and per bin beside them."""
+    return light.counts * (photons / light.counts.sum(axis=0, dtype=float).mean()) + background
 
 
 def parser():
@@ -70,13 +76,13 @@ def parser():
 
 def main():
     options = parser().parse_args()
-    capture = expected(options)
-    # Averages over points, spots taken together.
-    light = capture.counts.sum(axis=0, dtype=float).mean()
-    means = capture.counts * (options.counts / light) + options.background
-    counts = means if options.no_noise else np.random.default_rng(options.seed).poisson(means)
-    captures.write_capture(options.output, counts, capture.delta_t, capture.t_start, capture.points, [0, 0, 1],
-                           None if not options.spot else capture.laser, "simulated")
+    with tempfile.TemporaryDirectory() as temporary:
+        settings = EXPERIMENT.format(samples=options.samples, bounces=options.bounces)
+        light = expected(pathlib.Path(temporary), scene(options), settings, options.seed)
+    counts = means(light, options.counts, options.background)
+    if not options.no_noise:
+        counts = np.random.default_rng(options.seed).poisson(counts)
+    write(options.output, light, counts, light.laser if options.spot else None)
     return 0
 
 

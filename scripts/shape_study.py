@@ -23,7 +23,6 @@ import numpy as np
 
 import rabbit_capture
 import rabbit_errors
-from isochron import captures
 from isochron.mesh_files import read_mesh
 from isochron.pictures.raster import Seen
 from reproduction.measure import ROOT, program, summary
@@ -32,7 +31,6 @@ from scenes import mesh
 from scenes.implicit import Blobs, polygonise
 
 COLUMNS = "shape", "method", "median_mm", "within_80_mm", "silhouette", "seconds", "verdict", "deviance_over_floor"
-NORMAL = [0, 0, 1]
 
 
 def blobs(parts, low, high, cell=0.006):
@@ -93,7 +91,7 @@ def shapes():
 
 
 def seen(surface, shape):
-    """Depths on a grid of lines at right angles to the wall, which is 250 of them wide and a half wider than the wall."""
+    """Depths on 301 x 301 lines at right angles to the wall, over a fifth more than its width."""
     along = np.linspace(-0.6 * shape.side, 0.6 * shape.side, 301)
     return Seen(*surface, along, along).depth
 
@@ -124,18 +122,13 @@ def scene(shape, folder):
 
 def capture(shape, options, path):
     """Writes the counts of a detector, as rabbit_capture.py does."""
+    settings = rabbit_capture.EXPERIMENT.format(samples=options.samples // shape.histograms(), bounces=1).replace("shape: rabbit", "shape: part0")
+    settings = settings.replace("width: 16, count: 512", f"width: {shape.bin}, count: {shape.bins}")
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
-        (folder / "scene.yaml").write_text(scene(shape, folder), encoding="ascii")
-        (folder / "response.csv").write_bytes((rabbit_capture.SCENE / "response.csv").read_bytes())
-        settings = rabbit_capture.EXPERIMENT.format(samples=options.samples // shape.histograms(), bounces=1).replace("shape: rabbit", "shape: part0")
-        settings = settings.replace("width: 16, count: 512", f"width: {shape.bin}, count: {shape.bins}")
-        (folder / "shape.yaml").write_text(settings, encoding="ascii")
-        program("render", folder / "shape.yaml", "-o", folder / "render", "--seed", options.seed)
-        light = captures.read_capture(folder / "render/render.h5")
-    means = light.counts * (options.photons * shape.histograms() / light.counts.sum(dtype=float)) + options.background
-    captures.write_capture(path, np.random.default_rng(options.seed).poisson(means), light.delta_t, light.t_start, light.points, NORMAL,
-                           light.laser if shape.spots else None, "simulated")
+        light = rabbit_capture.expected(folder, scene(shape, folder), settings, options.seed)
+    counts = np.random.default_rng(options.seed).poisson(rabbit_capture.means(light, options.photons, options.background))
+    rabbit_capture.write(path, light, counts, light.laser if shape.spots else None)
 
 
 def rows(name, shape, options, folder):

@@ -1,5 +1,5 @@
-// Memory of large arrays, images above all, in huge pages: the kernel clears 2 MiB at a time in place of 4 KiB. A gradient of 16384 histograms
-// of 512 bins takes half the time of what it takes with small ones.
+#include "core/base/large_blocks.h"
+
 #include <malloc.h>
 #include <sys/mman.h>
 
@@ -7,11 +7,11 @@
 #include <cstdlib>
 #include <new>
 
-#include "core/base/parallel.h"
-
 namespace isochron {
 namespace {
 
+/// The kernel clears 2 MiB at a time in place of 4 KiB. A gradient of 16384 histograms of 512 bins takes half the processor's time of what
+/// it takes with small pages.
 constexpr std::size_t kHugePage = std::size_t{2} << 20, kLarge = 2 * kHugePage;
 
 void* allocate(std::size_t size) {

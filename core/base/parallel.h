@@ -8,10 +8,6 @@ namespace isochron {
 /// `parallel`, which then go on with those that they began with.
 void set_thread_count(int threads);
 
-/// From now on, memory that one pass frees stays with the process for the next: fresh pages can cost more than what they
-/// are filled with. For programs to call first.
-void keep_freed_memory();
-
 /// f(0) ... f(count - 1), in any order, on as many threads as set. Counts as progress (progress.h). Throws Interrupted once
 /// a stop is requested, and what f throws, after all threads have left f.
 void parallel(int count, const std::function<void(int)>& f);

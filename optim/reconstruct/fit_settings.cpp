@@ -19,7 +19,7 @@ constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// Borders move by a part of their way in each level, as slopes hold offsets to its start. Silhouettes after one, two, four and six coarse
 /// levels: of two plates 0.85, 0.88 and 0.91 (not six), of the rabbit 0.84, 0.86, 0.87 and 0.875, where p rises from 3e-9 to 3e-7. A second
 /// finer one changes the rabbit's errors by a hundredth. Metrics of more vertices take longer than rendering.
-constexpr int kCoarseLevels = 6, kFinerLevels = 1;
+constexpr int kCoarseLevels = 6;
 constexpr double kMostVertices = 20000;
 /// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos across the surface.
 constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.03;
@@ -100,8 +100,7 @@ FitSettings fit_settings(const Mesh& start, double edge_length, int histograms, 
   const double samples = std::clamp(kSamplesPerSecond * seconds / histograms, 1.0 * kLeastSamples, 1.0 * kMostSamples);
   settings.samples = static_cast<int>(samples) / 2 * 2;
   settings.levels = settings.coarse_levels = kCoarseLevels;
-  for (int finer = 1; finer <= kFinerLevels; ++finer)
-    if (static_cast<double>(start.positions.size()) * std::pow(4.0, finer) <= kMostVertices) ++settings.levels;
+  if (4 * static_cast<double>(start.positions.size()) <= kMostVertices) ++settings.levels;  // a finer one
   return settings;
 }
 

@@ -166,9 +166,10 @@ std::vector<DepthMap> lit(std::vector<DepthMap> parts, const BackProjection& vol
   std::vector<double> lights;
   for (const DepthMap& part : parts) lights.push_back(light_of(part, volume));
   const double least = kLeastLight * std::accumulate(lights.begin(), lights.end(), 0.0);
-  std::size_t number = 0;
-  std::erase_if(parts, [&](const DepthMap&) { return lights[number++] < least; });
-  return parts;
+  std::vector<DepthMap> result;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    if (lights[i] >= least) result.push_back(std::move(parts[i]));
+  return result;
 }
 
 bool meet(const DepthMap& one, const DepthMap& other, double jump) {

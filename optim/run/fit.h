@@ -29,10 +29,14 @@ GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta
 /// spread is then known to some per cent.
 inline constexpr double kMostImageShare = 0.05;
 
+/// Each renders as many samples as all before.
+inline constexpr int kMostDoublings = 4;
+
 /// The same for expected counts that are rendered into `image`, with fit_samples(). Captures get more, twice as many each time, where
 /// noise makes too much of the variance, `doublings` times at most.
 GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                 SplitImage& image, std::optional<double> determined = {}, int doublings = 4);
+                                 SplitImage& image, std::optional<double> determined = {},
+                                 int doublings = kMostDoublings);
 
 /// Whether a run has left its data behind: they hold light of which the fit has nothing (GoodnessOfFit::lost), or the fit
 /// neither explains them nor is as good as its start, by three standard errors of the loss.

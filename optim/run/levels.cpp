@@ -35,7 +35,7 @@ struct Level {
   std::string status;
 };
 
-/// Of the first level: what the experiment says, or else what the mesh has. Levels count from 1.
+/// Of the first level, 1, what the experiment says, or else what the mesh has; of those after the coarse ones half of the one before.
 double edge_length_of(int level, const RemeshSpec& remesh, const Mesh& loaded) {
   const double first = remesh.edge_length > 0 ? remesh.edge_length : mean_edge_length(loaded);
   return std::ldexp(first, -std::max(0, level - remesh.coarse_levels));

@@ -208,8 +208,8 @@ class Run {
     if ((!counts && !histograms) || !problem_.can_render(state_.theta)) return;
     SplitImage expected;
     if (counts)
-      fit_ = options_.errors ? judge_rendered_fit(problem_, state_.theta, target_, expected, determined_)
-                             : judge_rendered_fit(problem_, state_.theta, target_, expected, {}, 0);
+      fit_ = judge_rendered_fit(problem_, state_.theta, target_, expected, determined_,
+                                options_.errors ? kMostDoublings : 0);
     else
       expected.image =
           problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),

@@ -151,6 +151,22 @@ TEST(StartSurface, EndsWhereTheAlbedoIsFarBelowThatOfItsLight) {
   EXPECT_NEAR(radius(0.2), 7.5, 0.8);
 }
 
+/// Beside a disc a small one far away: 9 lines of 149, and (5.5^2 + 15^2 + 15^2)^2 / (25.5^2 + 25^2 + 25^2)^2 = 1 / 16 of the light of each.
+TEST(StartSurface, PartsWithHardlyAnyLightAreLeftOut) {
+  const auto deepest = [](float albedo) {
+    const auto far = [](int a, int u) { return std::hypot(a - 25, u - 25) < 1.5; };
+    Lines lines([&](int a, int u) { return far(a, u) ? 25.5 : from_middle(a, u) <= 7 ? 5.5 : kNone; });
+    for (int u = 0; u <= kSide; ++u)
+      for (int a = 0; a <= kSide; ++a)
+        lines.volume.albedo[lines.volume.index(far(a, u) ? 25 : 5, u, a)] = far(a, u) ? albedo : 1;
+    double z = 0;
+    for (const Vec3& p : lines.start().positions) z = std::max(z, p.z);
+    return z;
+  };
+  EXPECT_NEAR(deepest(4), 25.5, 0.5) << "15 parts in a thousand";
+  EXPECT_NEAR(deepest(1), 5.5, 0.5) << "4 parts in a thousand";
+}
+
 TEST(StartSurface, IsEmptyWhereNothingIsSignificant) {
   EXPECT_TRUE(Lines([](int, int) { return kNone; }).start().faces.empty());
   EXPECT_TRUE(Lines([](int a, int u) { return a == 9 && u == 9 ? 5.0 : kNone; }).start().faces.empty()) << "a speck";

@@ -27,6 +27,26 @@ std::array<double, 2> image_point(const CameraModel& camera, const Vec3& p) {
           0.5 * camera.height + dot(camera.image_gradient(camera.forward, 1), off)};
 }
 
+/// Exactly in the triangle's plane, whatever the rounding: all heights are the same number, and the normal is an axis.
+TEST(VertexFlows, PointsSeenEdgeOnDoNotFlowAlongTheirPixel) {
+  Scene scene;
+  scene.camera = {{0, 0.7, 3}, {0, 0.7, 0}, {0, 1, 0}, 40, 16, 16};
+  Mesh mesh;
+  mesh.positions = {{-1, 0.7, -1}, {1, 0.7, -1}, {0, 0.7, 1}};
+  mesh.faces = {{0, 1, 2}};
+  add_shape(scene, "plate", mesh, diffuse(Rgb(0.5)));
+  add_shape(scene, "lamp", mesh, diffuse(Rgb(0.5)), Rgb(1));
+  const TangentBasis basis = make_basis(scene, {translate(scene, "plate", {0, 1, 0})});
+  const PreparedScene prepared(scene, &basis, {});
+  SurfacePoint x1{{0.1, 0.7, 0}, prepared.normal(0), 0};
+  LocalDifferential out;
+  add_pixel_flow(prepared, x1, {1, 2, 3}, out);
+  EXPECT_TRUE(out.empty());
+  x1.p.y = 0.6;
+  add_pixel_flow(prepared, x1, {1, 2, 3}, out);
+  EXPECT_EQ(out.vertices.size(), 3u);
+}
+
 /// ln of the differential of a path camera - x1 - x2 whose first vertex flows as the header of VertexFlows
 /// says, from the definition by central differences: contribution times Jacobian of the flow in the image.
 TEST(VertexFlows, DifferentialOfX1IsThatOfTheFlow) {

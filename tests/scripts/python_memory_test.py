@@ -82,10 +82,7 @@ def room():
 
 class MemoryTest(unittest.TestCase):
     def setUp(self):
-        ignored = warnings.catch_warnings()
-        ignored.__enter__()
-        self.addCleanup(ignored.__exit__, None, None, None)
-        warnings.simplefilter("ignore")  # so few samples that gates are dark
+        self.enterContext(warnings.catch_warnings(action="ignore"))  # so few samples that gates are dark
         holder = tempfile.TemporaryDirectory()
         self.addCleanup(holder.cleanup)
         self.folder = pathlib.Path(holder.name)

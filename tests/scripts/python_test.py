@@ -98,10 +98,7 @@ seed: 3
 
 class PythonTest(unittest.TestCase):
     def setUp(self):
-        ignored = warnings.catch_warnings()
-        ignored.__enter__()
-        self.addCleanup(ignored.__exit__, None, None, None)
-        warnings.simplefilter("ignore")  # so few samples that gates are dark
+        self.enterContext(warnings.catch_warnings(action="ignore"))  # so few samples that gates are dark
 
     @classmethod
     def setUpClass(cls):

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/large_blocks.h"
 #include "core/base/parallel.h"
 #include "core/render/renderer.h"
 #include "tests/benchmark/rays.h"

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/base/parallel.h"
+#include "core/base/large_blocks.h"
 #include "core/render/renderer.h"
 #include "core/render/scene_cache.h"
 #include "tests/benchmark/measure/arguments.h"
