@@ -22,7 +22,7 @@ shapes:
 lights:
   - {name: flash, type: point, position: [0, 2, 0], intensity: 1}
 """
-EXPERIMENT = """version: "0.2.0"
+EXPERIMENT = """version: "0.3.0"
 name: NAME
 scene: "inputs/scene/scene.yaml"
 gates: {kind: gaussian, centers: [5, 6, 7], sigma: 0.1, unit: scene}
