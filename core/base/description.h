@@ -168,7 +168,7 @@ class Keys {
   virtual void named(const std::string& name, const std::vector<std::string>& names, const DescribeNamed& describe,
                      const std::string& meaning, const KeyOptions& options = {}) = 0;
   using Kind = KindName;
-  /// A word that says of which kind the map is, and the keys of that kind: describe(keys, kind) names those of any kind.
+  /// A tag that selects the map's variant, and the variant's keys: describe(keys, kind) names those of any variant.
   /// `chosen` is the present one, choose(kind) sets another.
   virtual void kinds(const std::string& name, const std::vector<Kind>& kinds, const std::string& chosen,
                      const std::function<void(const std::string&)>& choose, const DescribeNamed& describe,

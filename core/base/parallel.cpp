@@ -15,8 +15,8 @@ namespace {
 
 std::atomic<int> thread_count = 0;
 
-/// Kept from call to call, each of which would else hire its threads anew. Callers share it, so that another number of
-/// threads does not end the one that another thread works in.
+/// Kept from call to call, as creating an arena per call would restart its threads. Callers share it, so that another number
+/// of threads does not end the one that another thread works in.
 std::shared_ptr<tbb::task_arena> arena() {
   static std::shared_ptr<tbb::task_arena> kept;
   static int threads_of_kept = 0;

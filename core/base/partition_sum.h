@@ -27,7 +27,7 @@ inline int partition_count(double samples, std::size_t values) {
 }
 
 /// CPU seconds of each partition of a pass as ranks last ran it, the same on all of them: by these they share its next run.
-/// The clock decides who does what, never what comes of it.
+/// Timing affects scheduling only, never results.
 using PartitionCosts = std::vector<double>;
 
 /// The partitions 0 ... count - 1 of a pass, shared among ranks.

@@ -21,16 +21,16 @@ void require(bool in_step) {
 }
 
 /// While it lives, rank 0 works without the others.
-struct Alone {
-  Alone() { ++alone; }
-  ~Alone() { --alone; }
+struct OnlyFirstRank {
+  OnlyFirstRank() { ++alone; }
+  ~OnlyFirstRank() { --alone; }
 };
 
 /// What came of f on rank 0: its text behind one of these.
 constexpr char kDone = 'd', kInputError = 'i', kFailed = 'f';
 
 std::string outcome(const std::function<std::string()>& f) {
-  const Alone guard;
+  const OnlyFirstRank guard;
   try {
     return kDone + f();
   } catch (const InputError& error) {
@@ -98,7 +98,7 @@ std::string from_first_rank(const std::function<std::string()>& f) {
   if (!shared() || all_ranks->count() == 1) return f();
   if (stop_requested()) {  // the others may have left
     require(first_rank());
-    const Alone guard;
+    const OnlyFirstRank guard;
     return f();
   }
   std::string result;

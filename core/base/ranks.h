@@ -139,9 +139,9 @@ T sum_over_ranks(const T& own) {
   return sum;
 }
 
-/// Completes what was made for a rank's part of things alone: pack(packer, thing) and unpack(unpacker, thing) of each.
+/// Each rank has made its part of things; gathers the parts of all: pack(packer, thing) and unpack(unpacker, thing) of each.
 template <class Pack, class Unpack>
-void complete(const RankParts& parts, Pack&& pack, Unpack&& unpack) {
+void all_gather_parts(const RankParts& parts, Pack&& pack, Unpack&& unpack) {
   if (rank_count() == 1) return;
   Packer own;
   for (int i = parts.own().begin; i < parts.own().end; ++i) pack(own, i);
@@ -154,8 +154,8 @@ void complete(const RankParts& parts, Pack&& pack, Unpack&& unpack) {
 }
 /// The same for one or more vectors of plain values, or of vectors of them.
 template <class... Item>
-void complete(const RankParts& parts, std::vector<Item>&... items) {
-  complete(
+void all_gather_parts(const RankParts& parts, std::vector<Item>&... items) {
+  all_gather_parts(
       parts, [&](Packer& packer, int i) { (packer.put(items[i]), ...); },
       [&](Unpacker& unpacker, int i) { (unpacker.get(items[i]), ...); });
 }

@@ -33,7 +33,7 @@ class Sink {
   virtual void note_path(const Path&) {}
   /// The next contributions belong to a boundary segment at an edge of the triangle, on paths of so many bounces.
   virtual void note_boundary(int /*bounces*/, int /*triangle*/) {}
-  /// What was added since the last call came from x in (0, 1) of this histogram of the guiding, see BoundaryGuide.
+  /// Attributes the contributions since the last call to position x in (0, 1) of guide histogram `table`, see BoundaryGuide.
   virtual void note_guide(int /*table*/, double /*x*/) {}
 
   /// The differential that the next contributions share; lives until they are added.

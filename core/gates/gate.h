@@ -24,8 +24,8 @@ struct CoupledPair {
 enum class GateKind { steady, gaussian, boxcar, truncated_gaussian, tabulated, bin, modulated };
 
 /// Which part of dW a pair is drawn from. A side of the other part is absent from the pair, so that each part is the same
-/// for every way of sampling and can be left out by itself; where a jump and a slope balance each other, as at the jump of a
-/// sawtooth, either comes alone.
+/// for every way of sampling and can be left out by itself. A jump that would be coupled with a slope, as at the jump of a
+/// sawtooth, is split: each is sampled in its own term.
 enum class PairPart {
   smooth,  ///< the continuous part: W', reported under `interior`
   dirac    ///< the jumps of the gate, reported under `path_length`

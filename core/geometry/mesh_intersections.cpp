@@ -109,7 +109,7 @@ void MeshIntersections::find_hits(const Scene& scene, const std::vector<char>& m
           const bool only_piercing = other == s && !all_edges && !scene.shapes[s].deforms;
           ClusterEdges edges(clusters_.box_of_cluster(i).grown(static_cast<float>(touching_)), i, only_piercing);
           if (edges.box.overlaps(clusters_.box(clusters_.root(other))))
-            meet(scene, edges, clusters_.root(other), found[chunk]);
+            test_cluster(scene, edges, clusters_.root(other), found[chunk]);
         }
     });
     for (const auto& each : found) hits_.insert(hits_.end(), each.begin(), each.end());
@@ -131,13 +131,13 @@ void MeshIntersections::fill(const Scene& scene, ClusterEdges& edges) const {
   }
 }
 
-void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
-                             std::vector<EdgeHit>& hits) const {
+void MeshIntersections::test_cluster(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
+                                     std::vector<EdgeHit>& hits) const {
   const FloatBox& of_node = clusters_.box(node);
   // Of large edges among small triangles each goes down by itself.
   if (!node.is_cluster() && edges.box.size() <= of_node.size()) {
     for (const auto& child : TriangleClusters::children(node))
-      if (edges.box.overlaps(clusters_.box(child))) meet(scene, edges, child, hits);
+      if (edges.box.overlaps(clusters_.box(child))) test_cluster(scene, edges, child, hits);
     return;
   }
   if (node.is_cluster() && !clusters_.cluster(node.first).may_meet(edges.box)) return;
@@ -148,25 +148,25 @@ void MeshIntersections::meet(const Scene& scene, ClusterEdges& edges, const Tria
     for (unsigned bits = boxes.overlapping(of_node) & used; bits != 0; bits &= bits - 1) {
       const int i = first + std::countr_zero(bits);
       if (node.is_cluster())
-        meet(scene, *edges.edge[i], edges.each[i], clusters_.cluster(node.first), hits);
+        test_edge_against_cluster(scene, *edges.edge[i], edges.each[i], clusters_.cluster(node.first), hits);
       else
-        meet(scene, *edges.edge[i], edges.each[i], node, hits);
+        test_edge_against_node(scene, *edges.edge[i], edges.each[i], node, hits);
     }
   }
 }
 
-void MeshIntersections::meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
-                             const TriangleClusters::Node& node, std::vector<EdgeHit>& hits) const {
+void MeshIntersections::test_edge_against_node(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
+                                               const TriangleClusters::Node& node, std::vector<EdgeHit>& hits) const {
   if (node.is_cluster()) {
-    meet(scene, edge, box, clusters_.cluster(node.first), hits);
+    test_edge_against_cluster(scene, edge, box, clusters_.cluster(node.first), hits);
     return;
   }
   for (const auto& child : TriangleClusters::children(node))
-    if (box.overlaps(clusters_.box(child))) meet(scene, edge, box, child, hits);
+    if (box.overlaps(clusters_.box(child))) test_edge_against_node(scene, edge, box, child, hits);
 }
 
-void MeshIntersections::meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
-                             const TriangleCluster& cluster, std::vector<EdgeHit>& hits) const {
+void MeshIntersections::test_edge_against_cluster(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
+                                                  const TriangleCluster& cluster, std::vector<EdgeHit>& hits) const {
   for (unsigned bits = cluster.may_cross(box, edge.vertex); bits != 0; bits &= bits - 1)
     try_edge(scene, edge, cluster.triangle[std::countr_zero(bits)], hits);
 }

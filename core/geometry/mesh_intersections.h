@@ -21,8 +21,8 @@ class MeshIntersections {
   /// Searches everywhere. `touching`: within this distance of its end an edge goes through nothing; at least 2^-20 of the
   /// largest coordinate.
   MeshIntersections(const Scene& at_first, double touching);
-  /// `scene` has the topology of the one at first. A shape that does not deform goes through itself where it did at first.
-  /// The result is the same whatever there was in between.
+  /// `scene` has the topology of the initial one. Self-intersections of rigid shapes are found once, in the initial scene.
+  /// The result does not depend on earlier updates.
   void update(const Scene& scene, double touching);
   const std::vector<MeshIntersection>& segments() const { return segments_; }
 
@@ -45,13 +45,13 @@ class MeshIntersections {
   /// For each shape, those that its edges are to be tried against.
   std::vector<std::vector<int>> partners(const Scene& scene, const std::vector<char>& moved, bool all_edges) const;
   void fill(const Scene& scene, ClusterEdges& edges) const;
-  /// All of them, or one, against the triangles below the node, or of a cluster. Its box overlaps theirs.
-  void meet(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
-            std::vector<EdgeHit>& hits) const;
-  void meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box, const TriangleClusters::Node& node,
-            std::vector<EdgeHit>& hits) const;
-  void meet(const Scene& scene, const ClusterEdge& edge, const FloatBox& box, const TriangleCluster& cluster,
-            std::vector<EdgeHit>& hits) const;
+  // A cluster's edges, or one of them, against the triangles below a node or of another cluster. Their boxes overlap.
+  void test_cluster(const Scene& scene, ClusterEdges& edges, const TriangleClusters::Node& node,
+                    std::vector<EdgeHit>& hits) const;
+  void test_edge_against_node(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
+                              const TriangleClusters::Node& node, std::vector<EdgeHit>& hits) const;
+  void test_edge_against_cluster(const Scene& scene, const ClusterEdge& edge, const FloatBox& box,
+                                 const TriangleCluster& cluster, std::vector<EdgeHit>& hits) const;
   void try_edge(const Scene& scene, const ClusterEdge& edge, int triangle, std::vector<EdgeHit>& hits) const;
   void join(const Scene& scene);
 

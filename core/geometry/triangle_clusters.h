@@ -52,8 +52,8 @@ struct EightBoxes {
       high[axis][lane] = box.high[axis];
     }
   }
-  /// Sets the lanes of boxes that overlap the given one to -1, others to 0. (How such a vector is returned by value depends on
-  /// the processor that one compiles for.)
+  /// Sets the lanes of boxes that overlap the given one to -1, others to 0. An out-parameter, as returning 32-byte vectors by
+  /// value has no stable ABI without AVX.
   void find_overlapping(const FloatBox& box, Ints& lanes) const {
     lanes = (low[0] <= box.high[0]) & (high[0] >= box.low[0]);
     for (int axis = 1; axis < 3; ++axis) lanes &= (low[axis] <= box.high[axis]) & (high[axis] >= box.low[axis]);
@@ -71,7 +71,7 @@ struct EightBoxes {
   }
 };
 
-/// Triangles of one shape that lay close together at first, with their boxes; unused lanes have empty ones.
+/// Triangles of one shape that lie close together in the initial scene, with their boxes; unused lanes have empty ones.
 struct TriangleCluster : EightBoxes {
   Ints vertex[3];
   std::array<int, kWidth> triangle;

@@ -1,5 +1,5 @@
 // What lights a scene: which emitter a path goes to, and how far any is. Emitters are triangles of shapes with `emission`, and
-// lights without an extent (light_in_place_of_triangle); points on them are PreparedScene::point_on_emitter's.
+// lights without an extent (index_of_light); points on them are PreparedScene::point_on_emitter's.
 #pragma once
 #include <vector>
 

@@ -64,9 +64,9 @@ struct Path {
   }
   const SurfacePoint& back() const { return vertex.back(); }
   int size() const { return static_cast<int>(vertex.size()); }
-  /// Whether light from y to the last vertex, which vertex 0 sees, takes the way back that it is seen along, as that of a
-  /// confocal capture does: what one of the two sees the other sees.
-  bool retraces(const SurfacePoint& y) const {
+  /// Whether light from y to the last vertex, which vertex 0 sees, comes along the segment that it is seen through (confocal
+  /// capture, flash at the camera): the two are visible together.
+  bool is_confocal_return(const SurfacePoint& y) const {
     return vertex.size() == 2 && vertex[0].triangle == -1 && is_light(y.triangle) && y.p == vertex[0].p;
   }
 };

@@ -47,8 +47,8 @@ void add_texture(const PreparedScene& scene, const SurfacePoint& x, LocalDiffere
       out.scalars.push_back({scene.layout.texture(v), -1, b[i] / value});
 }
 
-/// What a vertex's material point adds up beyond what its base flow says: from neighbours that follow it, from x1 itself.
-struct Extra {
+/// Gradients that other vertices' flows pass to this material point: from neighbours that follow it, from x1 itself.
+struct InheritedGradient {
   Vec3 position, length;
   double area = 0;  ///< counts d ln (area of its triangle)
 };
@@ -57,29 +57,30 @@ Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
   return g - x.n * dot(g, x.n);
 }
 
-/// Lets x_k follow its neighbours (theory section 8): takes the gradients there and hands its part of them to what it
-/// follows; `density` is d ln (sampling measure) / dx in the plane of x_k. Returns what its base flow loses by it.
-Extra let_follow(const VertexFlow& flow, const SurfacePoint& x, const Accumulated& g, const Vec3& density,
-                 Extra* before, Extra* own, Extra* after) {
-  Extra lost;
-  const auto hand = [&](const Following& f, Extra* to) {
+/// Lets x_k follow its neighbours (theory section 8): passes its part of the gradients there on to what it follows.
+/// `density` is d ln (sampling measure) / dx in the plane of x_k. Returns what is removed from its base flow.
+InheritedGradient redirect_to_neighbours(const VertexFlow& flow, const SurfacePoint& x, const Accumulated& g,
+                                         const Vec3& density, InheritedGradient* before, InheritedGradient* own,
+                                         InheritedGradient* after) {
+  InheritedGradient removed;
+  const auto hand = [&](const Following& f, InheritedGradient* to) {
     if (!(f.weight > 0)) return;
     const Vec3 position = in_plane(x, (g.position + density) * f.weight + f.gradient);
     const Vec3 along = in_plane(x, g.length * f.weight);
     to->position += position;
     to->length += along;
-    lost.position += position;
-    lost.length += along;
-    lost.area += f.weight;
+    removed.position += position;
+    removed.length += along;
+    removed.area += f.weight;
   };
   hand(flow.before, before);
   hand(flow.after, after);
   hand(flow.own, own);
-  return lost;
+  return removed;
 }
 
 /// Carries the gradients of a light without an extent, the end of a path, to what can move there. `w`: unit, to the path's last
-/// vertex but one. `channel`: see let_flow.
+/// vertex but one. `channel`: see distribute_to_mesh_vertices.
 void to_light(const PreparedScene& scene, const SurfacePoint& y, const Accumulated& g, const Vec3& w, bool length_only,
               int channel, LocalDifferential& out) {
   const int i = light_number(y.triangle);
@@ -114,11 +115,11 @@ void to_triangle(const PreparedScene& scene, const SurfacePoint& x, const Accumu
 
 /// Carries the gradients at the path's vertices, of one channel or of all (-1), through their flows to the vertices of the
 /// mesh.
-void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std::vector<Accumulated>& g,
-              bool length_only, int channel, LocalDifferential& out) {
-  thread_local std::vector<Extra> extra;
+void distribute_to_mesh_vertices(const PreparedScene& scene, const SurfacePoint* x, int count,
+                                 std::vector<Accumulated>& g, bool length_only, int channel, LocalDifferential& out) {
+  thread_local std::vector<InheritedGradient> extra;
   extra.assign(count, {});
-  // Each material point counts its area but that of x1, which the pixel of a camera holds.
+  // Every vertex except a camera path's x1 contributes d ln(area): x1 is fixed to its pixel.
   const bool held = !scene.captures();
   const int last_on_surface = is_light(x[count - 1].triangle) ? count - 2 : count - 1;
   for (int k = held ? 2 : 1; k <= last_on_surface; ++k) extra[k].area = 1;
@@ -135,35 +136,36 @@ void let_flow(const PreparedScene& scene, const SurfacePoint* x, int count, std:
     return scene.textured(x[k].triangle) && !length_only ? scene.texture_gradient(x[k]) / scene.texture(x[k]) : Vec3();
   };
   VertexFlows::Pair before, after;
-  Extra lost_by_pixel;
+  InheritedGradient removed_by_pixel;
   for (int k = 1; k <= last_on_surface; ++k) {
     const int rank = scene.flow_rank(k);
     after = k < last_on_surface ? scene.flows.pair(scene, x[k], x[k + 1], rank) : VertexFlows::Pair{};
     const VertexFlow flow = VertexFlows::at(before, after, rank);
     before = after;
     if (!flow.follows()) continue;
-    const Extra lost = let_follow(flow, x[k], g[k], (rank == 1 ? log_density() : Vec3()) + log_texture(k),
-                                  &extra[k - 1], &extra[k], k + 1 < count ? &extra[k + 1] : nullptr);
+    const InheritedGradient removed =
+        redirect_to_neighbours(flow, x[k], g[k], (rank == 1 ? log_density() : Vec3()) + log_texture(k), &extra[k - 1],
+                               &extra[k], k + 1 < count ? &extra[k + 1] : nullptr);
     if (rank == 1) {
-      lost_by_pixel = lost;
+      removed_by_pixel = removed;
       extra[k].area = flow.own.weight;
     } else {
-      extra[k].position -= lost.position;
-      extra[k].length -= lost.length;
-      extra[k].area -= lost.area;
+      extra[k].position -= removed.position;
+      extra[k].length -= removed.length;
+      extra[k].area -= removed.area;
     }
   }
 
   if (held) {
     // The pixel flow: along the ray, as far as the surface moves along its normal.
     const Vec3 texture = last_on_surface >= 1 ? log_texture(1) : Vec3();
-    Vec3 through_ray = g[1].position + texture - lost_by_pixel.position;
-    if (lost_by_pixel.area > 0) {
-      through_ray += log_density() * lost_by_pixel.area;
-      g[1].normal += ray * (lost_by_pixel.area / height);
+    Vec3 through_ray = g[1].position + texture - removed_by_pixel.position;
+    if (removed_by_pixel.area > 0) {
+      through_ray += log_density() * removed_by_pixel.area;
+      g[1].normal += ray * (removed_by_pixel.area / height);
     }
     g[1].position = x[1].n * (dot(ray, through_ray) / height) - texture;
-    g[1].length = x[1].n * (dot(ray, g[1].length - lost_by_pixel.length) / height);
+    g[1].length = x[1].n * (dot(ray, g[1].length - removed_by_pixel.length) / height);
   }
   for (int k = 1; k <= last_on_surface; ++k) {
     g[k].position += extra[k].position;
@@ -256,7 +258,7 @@ void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoin
   };
   if (!coloured) {
     end_at_light(g[count - 1], -1);
-    let_flow(scene, x, count, g, length_only, -1, out);
+    distribute_to_mesh_vertices(scene, x, count, g, length_only, -1, out);
     return;
   }
   for (int c = 0; c < 3; ++c) {
@@ -266,7 +268,7 @@ void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoin
       if (c == 0) own[c][k].length = g[k].length;  // once for all channels
     }
     end_at_light(own[c][count - 1], c);
-    let_flow(scene, x, count, own[c], length_only, c, out);
+    distribute_to_mesh_vertices(scene, x, count, own[c], length_only, c, out);
   }
 }
 

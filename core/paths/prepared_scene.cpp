@@ -173,7 +173,8 @@ void PreparedScene::update_hidden() {
     hidden_order_.clear();
     for (const int i : spatial_order(centers)) hidden_order_.push_back(triangles[i]);
   }
-  std::vector<Vec3> corners;  // of a box about the sensor points: what all of them are behind of, none sees
+  // Of a box about the sensor points: a face that has all these corners behind it is invisible to every sensor point.
+  std::vector<Vec3> corners;
   if (captures()) {
     Bounds box;
     for (const WallPoint& s : scene.capture->sensor) box.add(s.p);
@@ -194,23 +195,24 @@ void PreparedScene::update_hidden() {
     areas.push_back(records_[t].area);
   }
   hidden = HiddenGeometry(std::move(triangles), areas);
-  hidden_is_all = hidden_order_.size() == records_.size();
-  if (revision_ == 1) hidden_suffices = hidden_is_all && captures() && area_suits_first_vertices();
+  all_visible_is_area_sampled = hidden_order_.size() == records_.size();
+  if (revision_ == 1)
+    area_sampling_alone = all_visible_is_area_sampled && captures() && area_sampling_beats_cosine_sampling();
   const auto changes = [](const std::vector<std::uint8_t>& which) {
     return std::ranges::count(which, 0) < std::ssize(which);
   };
-  gradients_are_hidden = first_gradients_are_hidden = !hidden.empty() && !differentiable.every_path &&
-                                                      !changes(differentiable.light) &&
-                                                      !changes(differentiable.emission);
-  for (int t = 0; first_gradients_are_hidden && t < static_cast<int>(records_.size()); ++t) {
+  only_area_sampled_has_gradient = only_area_sampled_x1_has_gradient = !hidden.empty() && !differentiable.every_path &&
+                                                                       !changes(differentiable.light) &&
+                                                                       !changes(differentiable.emission);
+  for (int t = 0; only_area_sampled_x1_has_gradient && t < static_cast<int>(records_.size()); ++t) {
     // An emitter that moves is at the end of paths, too, which next-event estimation finds.
     if (!records_[t].has_gradient || (records_[t].hidden && !emits(t)) || records_[t].area == 0) continue;
-    gradients_are_hidden = false;
-    first_gradients_are_hidden = captures() && !emits(t) && !seen(t);
+    only_area_sampled_has_gradient = false;
+    only_area_sampled_x1_has_gradient = captures() && !emits(t) && !seen(t);
   }
 }
 
-bool PreparedScene::area_suits_first_vertices() const {
+bool PreparedScene::area_sampling_beats_cosine_sampling() const {
   constexpr int kPoints = 1024;
   constexpr Stream kTrialStream{0x68696464656eu, 0, 0};  // what it decides about has other numbers
   double sum = 0, squares = 0;
@@ -276,7 +278,7 @@ void PreparedScene::update_emitters() {
     Bounds box;
     box.add(lights[i].position);
     spots.add(box);
-    triangles.push_back(light_in_place_of_triangle(static_cast<int>(i)));
+    triangles.push_back(index_of_light(static_cast<int>(i)));
     power.push_back(lights[i].power());
     if (!captures()) boxes.push_back(box);
   }

@@ -57,12 +57,13 @@ class PreparedScene {
   /// Lights without an extent: the scene's, or the spots of a capture's laser.
   std::vector<PointLight> lights;
   HiddenGeometry hidden;
-  /// Whether hidden geometry sampling can draw every point that a sensor point sees.
-  bool hidden_is_all = false;
-  /// And whether it does so better by itself than along with the wall's reflection; decided by the scene at first.
-  bool hidden_suffices = false;
-  /// Whether it finds every vertex, or every first vertex of a capture's paths, that gives its path a derivative.
-  bool gradients_are_hidden = false, first_gradients_are_hidden = false;
+  /// Whether area sampling can draw every point that a sensor point sees.
+  bool all_visible_is_area_sampled = false;
+  /// Whether area sampling alone has lower variance than mixed with cosine sampling of the wall. Decided once, from the initial
+  /// scene.
+  bool area_sampling_alone = false;
+  /// Whether every vertex, or every first vertex x1 of a capture's paths, that gives its path a derivative is area-sampled.
+  bool only_area_sampled_has_gradient = false, only_area_sampled_x1_has_gradient = false;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -89,17 +90,17 @@ class PreparedScene {
     if (!captures()) return camera.image_area_per_solid_angle(w);
     return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
   }
-  /// Density per area of a path's next vertex on `triangle`, which the one before sees: hidden geometry sampling of that share,
-  /// or another way, of density `pdf`, takes it, whichever finds it the more often.
+  /// Density per area of a path's next vertex on `triangle`, which the one before sees: area sampling with probability `share`,
+  /// or else another way, of density `pdf`, whichever has the larger density (maximum heuristic).
   double next_vertex_pdf(int triangle, double share, double pdf) const {
     return std::max(hidden_pdf(triangle, share), (1 - share) * pdf);
   }
-  /// Whether it is hidden geometry sampling.
+  /// Whether it is area sampling.
   bool hidden_takes(int triangle, double share, double pdf) const {
     return hidden_pdf(triangle, share) >= (1 - share) * pdf;
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
-  int spot_of(int pixel) const { return light_in_place_of_triangle(scene.capture->spot_index(pixel)); }
+  int spot_of(int pixel) const { return index_of_light(scene.capture->spot_index(pixel)); }
   /// Length that every path of a pixel has besides the way from its sensor point to the laser's spot: from the laser to the
   /// spot and from the sensor point to the detector, and a time offset of its own (one that all share shifts the gates).
   /// 0 of a camera.
@@ -314,9 +315,9 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_hidden();
-  /// Whether what the wall makes of unit radiance from points drawn by area on hidden geometry has, over their density, no larger
-  /// mean square than from points drawn by the wall's reflection, each of which counts as one.
-  bool area_suits_first_vertices() const;
+  /// Whether points drawn by area on the area-sampled shapes have weights (the wall's reflection over their density) of no larger
+  /// mean square than points drawn by the wall's cosine, whose weights are 1.
+  bool area_sampling_beats_cosine_sampling() const;
   double texture_at(const SurfacePoint& x) const {
     const auto b = barycentrics(x);
     const auto& v = records_[x.triangle].vertex;

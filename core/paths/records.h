@@ -17,8 +17,8 @@ struct SurfacePoint {
   int triangle = -1;
 };
 
-/// What takes the place of the triangle in a SurfacePoint on light number i, which has no extent, and the number back from it.
-inline int light_in_place_of_triangle(int i) {
+/// Encodes point light i as a negative triangle index of a SurfacePoint; light_number decodes it.
+inline int index_of_light(int i) {
   return -2 - i;
 }
 inline bool is_light(int triangle) {

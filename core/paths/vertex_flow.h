@@ -72,7 +72,7 @@ class VertexFlows {
 
   /// Whether there may be a neighbour of x_k = p, k > 1, that it follows.
   bool possible_at(const Vec3& p) const { return follows_bodies_ && near_.holds(p); }
-  /// Holds all that moves, and every vertex but x1 that may follow or be followed.
+  /// Bounding box of moving geometry and of all points (x2, x3, ...) that may follow it or be followed.
   const Bounds& near() const { return near_; }
 
  private:
@@ -85,7 +85,7 @@ class VertexFlows {
   /// Sets `follows_bodies_` and what depends on it.
   void find_near_bodies(const PreparedScene& scene, double bodies);
   void update_bodies(const PreparedScene& scene);
-  /// Whether a part of it that stands still reaches into `camera_near_`.
+  /// Whether the shape has a static triangle inside `camera_near_`.
   bool has_still_triangle_in_reach(const PreparedScene& scene, std::size_t shape) const;
   void find_patches(const PreparedScene& scene, std::vector<char> near_bodies);
   /// Whether an edge of a body near others is no longer what it was.

@@ -7,13 +7,13 @@
 namespace isochron {
 namespace {
 
-/// Outside of these, relative to the path length, one technique is far better in every scene measured: gates that together
-/// cover less than `from`, which standard sampling hits so rarely that it looks too quiet in a trial, and gates wider than
-/// `to`.
-struct Doubtful {
-  double from, to;
+/// Widths of gates, relative to the path length, between which a trial decides. Outside one technique is far better in every
+/// scene measured. Gates that together cover less than the lower one are hit by standard sampling so rarely that it looks too
+/// quiet in a trial.
+struct TrialWidths {
+  double below_is_ellipsoidal, above_is_standard;
 };
-constexpr Doubtful kImage{0.002, 0.1}, kInterior{0.008, 0.2};
+constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr double kShares[] = {0, 0.3, 1};
 constexpr int kSamples[] = {16, 8, 4};  ///< per pixel and batch at most, of each share: for about the same work
@@ -27,14 +27,14 @@ constexpr double kTrialPart = 0.1;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
 /// Trials of fewer paths than this overrule the width of the gates only where they differ by this factor.
-constexpr double kSureOfPaths = 100000, kSure = 1.5;
+constexpr double kConfidentTrialPaths = 100000, kShortTrialPenalty = 1.5;
 /// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
 /// can lose where it is not the best is more than what it can win.
-constexpr double kClearlyBetter[] = {0.75, 0.5};
-/// How often to use the techniques of ellipsoidal connections: each alike, or mostly the camera's own pairs, which share
-/// low-discrepancy points over the whole image; none never, as a trial may miss what is rare. The latter must look a tenth
-/// better than the former.
-constexpr ConnectionRates kAlike{1, 1, 1}, kMostlyCamera{0.3, 2, 0.1};
+constexpr double kMaxCostRatioOfCombination[] = {0.75, 0.5};
+/// How often to use the techniques of ellipsoidal connections: all equally, or mostly the camera's own pairs, which share
+/// low-discrepancy points over the whole image. No rate is zero, as a trial may miss what is rare. The second must look a tenth
+/// better than the first.
+constexpr ConnectionRates kUniformRates{1, 1, 1}, kCameraPairRates{0.3, 2, 0.1};
 constexpr double kClearlyFaster = 0.9;
 /// Per pixel and batch: a batch's points cover the whole image, so that its blocks vary together, and only more batches say
 /// more about the variance.
@@ -45,7 +45,7 @@ constexpr double kConnectionsWork = 4;
 /// low-discrepancy numbers, which trials do without, gain more for its pixels (cube, width 2 %: 1.7 times; box, 0.5 and 1 %:
 /// nothing). For gradients neither is favoured: where standard sampling is twice as good (the tree's fourteen gates) trials
 /// see 1.2 to 4 times.
-constexpr double kClearlyHits[] = {1.1, 1};
+constexpr double kCostHandicapOfStandard[] = {1.1, 1};
 
 double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;
@@ -64,7 +64,7 @@ Scene reduced(const Scene& scene, double pixels) {
   return small;
 }
 
-/// One column: all columns of the basis with random signs.
+/// One direction: the sum of all columns of the basis with random signs.
 TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
   std::vector<double> sign;
   Rng rng(stream, 0, 0);
@@ -123,7 +123,7 @@ ConnectionRates measure_rates(const Scene& scene, const GateSet& gates, Estimato
                               double budget, double& work) {
   const double samples = 2 * kRateBatches * kRateSamples * kConnectionsWork;
   const double affordable = (budget - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size())) / samples;
-  if (affordable < std::min<double>(kFewestPixels, pixels_of(scene))) return kAlike;
+  if (affordable < std::min<double>(kFewestPixels, pixels_of(scene))) return kUniformRates;
   const Scene small = reduced(scene, std::min<double>(kPixels, affordable));
   const auto cost = [&](const ConnectionRates& rates) {
     options.mix = SamplingMix{1, 1, rates, rates};
@@ -135,8 +135,8 @@ ConnectionRates measure_rates(const Scene& scene, const GateSet& gates, Estimato
     work += renderer.work();
     return variance.sum() * renderer.work();
   };
-  const double alike = cost(kAlike);
-  return alike > 0 && cost(kMostlyCamera) < kClearlyFaster * alike ? kMostlyCamera : kAlike;
+  const double uniform = cost(kUniformRates);
+  return uniform > 0 && cost(kCameraPairRates) < kClearlyFaster * uniform ? kCameraPairRates : kUniformRates;
 }
 
 /// What one trial has to say.
@@ -194,10 +194,10 @@ struct Trial {
       if (!(cost[i] > 0)) cost[i] = INFINITY;
     }
     const bool gradients = purpose == Purpose::gradients;
-    const double sure = paths < kSureOfPaths ? kSure : 1;
-    cost[by_width == 1 ? 2 : 0] /= sure;
-    const int alone = cost[0] <= kClearlyHits[gradients] * cost[2] ? 0 : 2;
-    return kShares[cost[1] < kClearlyBetter[gradients] * cost[alone] ? 1 : alone];
+    const double penalty = paths < kConfidentTrialPaths ? kShortTrialPenalty : 1;
+    cost[by_width == 1 ? 2 : 0] /= penalty;
+    const int alone = cost[0] <= kCostHandicapOfStandard[gradients] * cost[2] ? 0 : 2;
+    return kShares[cost[1] < kMaxCostRatioOfCombination[gradients] * cost[alone] ? 1 : alone];
   }
 };
 
@@ -216,10 +216,10 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   plain.mix.reset();
   const SamplingMix by_width = sampling_mix(plain, gates, scene);
   SamplingMix best;
-  const auto choose = [&](const Doubtful& widths, double otherwise, double samples, const TangentBasis* column,
+  const auto choose = [&](const TrialWidths& widths, double otherwise, double samples, const TangentBasis* column,
                           const Term* term) {
-    if (coverage < widths.from) return 1.0;
-    if (width > widths.to) return 0.0;
+    if (coverage < widths.below_is_ellipsoidal) return 1.0;
+    if (width > widths.above_is_standard) return 0.0;
     return Trial{scene, gates, options, purpose, samples}.choose(otherwise, column, term, stream, work);
   };
   best.image = choose(kImage, by_width.image, job.image, nullptr, nullptr);

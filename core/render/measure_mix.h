@@ -11,8 +11,8 @@ namespace isochron {
 /// pixel.
 enum class Purpose { images, gradients };
 
-/// What is decided about: samples per pixel, all in all, of images and of two terms of their derivative. Infinite: so many
-/// that a trial's work does not count; zero: the width of the gates decides.
+/// Samples per pixel that will be spent with the chosen mix, on images and on two terms of their derivative. Zero: no trial,
+/// the width of the gates decides; infinite: no limit on the trial.
 struct Job {
   double image = std::numeric_limits<double>::infinity();
   double interior = std::numeric_limits<double>::infinity();

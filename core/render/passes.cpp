@@ -30,7 +30,7 @@ std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis*
 Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator,
                const TangentBasis* tangent, SceneCache* cache)
     : ready(ready_scene(source, tangent, {estimator.follow_radius, estimator.follow}, cache)),
-      // What is counted later by t meets a gate of length l + t. Offsets of single pixels are in their paths' lengths.
+      // A detector delay of t equals gates shifted by -t. Offsets of single pixels are in their paths' lengths.
       gates(source.detector.time_offset.size() > 1 || source.detector.time_offset[0] == 0
                 ? gate_set
                 : gate_set.shifted(-source.detector.time_offset[0])),
@@ -42,7 +42,7 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
       cache_(cache) {
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
   // (measured on the cube and the box, 0.1 % to 10 %).
-  if (options.antithetic) pair_gain_ = 1 + 0.1 / gates.relative_width();
+  if (options.antithetic) pair_coupling_gain_ = 1 + 0.1 / gates.relative_width();
 }
 
 int Passes::partitions_for(SampleRange range, std::size_t values) const {
@@ -99,7 +99,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   const ConnectionRates& used = worker.rates = share == 1 ? rates : ConnectionRates{};
   worker.ellipsoidal_share = share;
-  worker.antithetic_factor = pair_gain_;
+  worker.pair_coupling_gain = pair_coupling_gain_;
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -215,7 +215,7 @@ void Passes::learn() const {
     records[partition] = std::move(sink.records);
     count(worker);
   });
-  complete(shared.parts, records, costs, shared.costs);
+  all_gather_parts(shared.parts, records, costs, shared.costs);
   shared.keep_costs();
   std::vector<GuideRecord> all;
   Guide::Each<double> cost{};

@@ -56,8 +56,7 @@ class Passes {
 
   /// Whether the term can be other than zero, so that a pass over it is worth while.
   bool has(Term term) const;
-  /// Whether every sample of images or of the term adds to its own pixel alone, and has no numbers in common with those of
-  /// others.
+  /// Whether every sample of images or of the term adds to its own pixel only, and pixels are statistically independent.
   bool stays_in_pixels() const { return mix.image == 0 || scene.captures(); }
   bool stays_in_pixels(Term term) const { return (term == Term::interior && mix.interior == 0) || scene.captures(); }
 
@@ -126,7 +125,7 @@ class Passes {
   const BoundaryEdges& edges() const { return *ready->edges; }
 
   SceneCache* const cache_;
-  double pair_gain_ = 1;
+  double pair_coupling_gain_ = 1;
   mutable std::atomic<long long> rays_{0}, arcs_{0};
   mutable std::once_flag learned_;
   mutable std::optional<BoundaryGuide> guide_;  ///< of the visibility term alone

@@ -41,7 +41,7 @@ struct Renderer::Impl : Passes {
         }
       });
     };
-    complete(
+    all_gather_parts(
         shared.parts,
         [&](Packer& packer, int partition) {
           packer.put(shared.costs[partition]);
@@ -209,7 +209,7 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
       });
     return own;
   });
-  if (parts) complete(shared.parts, by_partition);
+  if (parts) all_gather_parts(shared.parts, by_partition);
   sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
   // Whatever the number of partitions, each part is of the same pixels, see part_of.
   const int pixels = impl_->scene.pixels();

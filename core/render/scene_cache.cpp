@@ -10,7 +10,7 @@ std::shared_ptr<ReadyScene> SceneCache::take(const Scene& scene, const TangentBa
   std::unique_ptr<ReadyScene> ready;
   {
     const std::lock_guard lock(mutex_);
-    // One for images and one for derivatives is all that users go on asking for.
+    // At most two prepared scenes: with and without derivatives.
     constexpr int kKinds = 2;
     auto found =
         std::find_if(idle_.begin(), idle_.end(), [&](const auto& each) { return each->scene.same_columns(basis); });

@@ -39,8 +39,8 @@ class BoundaryEdges {
   ~BoundaryEdges();
   BoundaryEdges(const BoundaryEdges&) = delete;
   BoundaryEdges& operator=(const BoundaryEdges&) = delete;
-  /// Makes anew what PreparedScene::update has changed since; `scene` is the same object. The result is the same whatever there
-  /// was in between.
+  /// Rebuilds the edges of shapes that PreparedScene::update has changed since the last call; `scene` is the same object. The
+  /// result does not depend on earlier updates.
   void update(const PreparedScene& scene, bool wedge);
 
   /// Which edge, and where on it. The edge itself is prefetched.

@@ -15,9 +15,9 @@ constexpr double kDefensiveShare = 0.25;
 constexpr int kMostBins = 512;
 /// A histogram has a bin for as many records as this, and fewer than these teach a tile nothing of its own.
 constexpr int kRecordsPerBin = 4, kFewRecords = 32;
-/// How often a technique is used follows from the sum of its squares, which is known as well as if so many records of
-/// equal squares made it up. Its logarithm is shrunk by half at this effective sample size.
-constexpr double kFewEqual = 8;
+/// Effective sample size, (sum of squares s)^2 / (sum of s^2), at which the logarithm of a learned rate is shrunk half-way to
+/// uniform.
+constexpr double kHalfTrustSampleSize = 8;
 /// How many times as often as without guiding a technique may be used.
 constexpr double kMostRate = 8, kLeastRate = 1.0 / 8;
 
@@ -104,7 +104,7 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
       const double guided = r.square / warps_[r.table].density(r.x);
       square += guided, fourth += guided * guided;
     }
-    if (fourth > 0) trust[t] = square * square / (square * square + kFewEqual * fourth);
+    if (fourth > 0) trust[t] = square * square / (square * square + kHalfTrustSampleSize * fourth);
     wanted[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
     unguided_cost += cost[t];
     wanted_cost += wanted[t] * cost[t];

@@ -39,12 +39,13 @@ class Warp {
 struct GuideRecord {
   int table;
   double x;       ///< in (0, 1): the boundary point's place in the unguided distribution
-  double square;  ///< summed over pixels, gates, columns and colours
+  double square;  ///< summed over pixels, gates, unknowns and colours
 };
 
 class BoundaryGuide {
  public:
-  /// from_camera comes last, since it has several histograms.
+  /// Those of sample_points.h that search for boundaries, in the order of their histograms: from_camera has several, so it
+  /// comes last.
   enum Technique { primary, pixel_border, from_edge, from_light, from_camera };
   static constexpr int kTechniques = 5;
 

@@ -11,7 +11,7 @@
 namespace isochron {
 
 /// A choice in proportion to weights; where there are both, moving and static edges get equal shares. Edges come in groups of
-/// neighbours, so that those whose edges stay what they are need not be made anew.
+/// neighbours, so that unchanged groups are reused.
 class EdgeChoice {
  public:
   void resize(std::size_t groups) { groups_.resize(groups); }

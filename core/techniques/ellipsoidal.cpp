@@ -26,7 +26,7 @@ double connection_weight(const Worker& worker, const Path& path, int pixel, cons
   const double sum = d.surface + d.emitter;
   if (!(sum > 0)) return 0;
   // No other technique finds lengths at a jump.
-  const double share = worker.ellipsoidal_share, gain = target.pair ? worker.antithetic_factor : 1;
+  const double share = worker.ellipsoidal_share, gain = target.pair ? worker.pair_coupling_gain : 1;
   const double ours =
       target.jump[side] || share == 1 ? 1 : worker.techniques.ellipsoidal_weight(path, pixel, share, gain);
   return ours / share * (d.*technique / sum);
@@ -127,7 +127,7 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
         surface_arc_point(ellipsoids[i], triangle, t, y, along, pixel, factor, arcs.side[i]);
   });
   for_each_seen(choices, [&](int i, const ArcPoint& q, double inverse_probability) {
-    if (!path.retraces(y) && !worker_.visible(q.point, y)) return;
+    if (!path.is_confocal_return(y) && !worker_.visible(q.point, y)) return;
     worker_.path.push(scene_, y);
     deliver(target, i, q, inverse_probability, &ArcDensities::surface);
     worker_.path.pop();

@@ -1,7 +1,7 @@
 // Which gate a connection's length is drawn for, and how many samples a pixel gets. Images: every gate and every pixel
-// alike. Gradients of a loss: gates in proportion to what their image counts in it, |dLoss/dImage|, of the pixel that
-// the connection serves, or of the whole image for connections of the camera itself, which may land on any pixel;
-// pixels in proportion to what their gates count for together.
+// equally. Gradients of a loss: gates with probability proportional to the sum of |dLoss/dImage| over the pixel that the
+// connection serves, or over the whole image for connections of the camera itself, which may land on any pixel. Pixels get
+// samples in proportion to that sum over their gates.
 #pragma once
 #include <optional>
 #include <vector>

@@ -38,9 +38,8 @@ class PointSet {
         set_(static_cast<std::uint32_t>(range.begin)),
         together_(numbers == Numbers::low_discrepancy) {}
 
-  /// sample(rng) for the points from number `from` up to `to` of a set that goes on from part to part. Both may be
-  /// fractions: all of a set's parts are then shifted by the same random number, so that each has to - from samples
-  /// on average. Of these, only those of `part`.
+  /// sample(rng) for points [from, to) of one shared sequence, of these only those of `part`. Fractional bounds are rounded by
+  /// one random offset common to all calls, so that there are to - from samples on average.
   template <class F>
   void visit(double from, double to, SamplePart part, F&& sample) const {
     const bool whole = from == std::floor(from) && to == std::floor(to);

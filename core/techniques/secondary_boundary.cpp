@@ -72,9 +72,8 @@ void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
   const double x = guide_.warp(table).sample(rng.fine_uniform());
   g.y = edges_.sample_secondary(x);
   const int count = static_cast<int>(scene_.lights.size());
-  const int light = scene_.captures()
-                        ? scene_.spot_of(pixel)
-                        : light_in_place_of_triangle(std::min(static_cast<int>(rng.uniform() * count), count - 1));
+  const int light = scene_.captures() ? scene_.spot_of(pixel)
+                                      : index_of_light(std::min(static_cast<int>(rng.uniform() * count), count - 1));
   g.light = scene_.point_of_light(light);
   const Vec3 d = g.light.p - g.y.y;
   g.r_s = length(d);
@@ -223,8 +222,9 @@ double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint&
   const Vec3 eye = scene_.sensor_point(pixel).p;
   const double received = scene_.importance(pixel, normalize(x1.p - eye)) * solid_angle_to_area(eye, x1);
   // Segments from an edge serve all pixels of a camera, but one of a capture.
-  const double found = scene_.captures() ? scene_.next_vertex_pdf(x1.triangle, worker_.hidden_share_at_wall(), received)
-                                         : worker_.pick.rate(pixel) * received / scene_.pixels();
+  const double found = scene_.captures()
+                           ? scene_.next_vertex_pdf(x1.triangle, worker_.first_step_probability(), received)
+                           : worker_.pick.rate(pixel) * received / scene_.pixels();
   const double by_camera = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) /
                            edge_warp().density(g.y.x()) * found * walk.towards_light;
   const double by_edge = direction_pdf(g) * solid_angle_to_area(g.y.y, g.camera_end) * walk.towards_camera;
@@ -245,9 +245,9 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double sc
     const SurfacePoint x = walk_.back();
     const Vec3 to_camera = eye.p - x.p;
     const double distance = length(to_camera);
-    // Light that takes the way back that it is seen along has one boundary, which is found from the camera's side.
-    const bool retraces = bounce == 1 && is_light(g.light.triangle) && g.light.p == eye.p;
-    if (const int pixel = captures ? of_pixel : scene_.camera.project(x.p); pixel >= 0 && !retraces) {
+    // Light that returns along the segment it is seen through (confocal capture) has one boundary, found from the camera's side.
+    const bool is_confocal_return = bounce == 1 && is_light(g.light.triangle) && g.light.p == eye.p;
+    if (const int pixel = captures ? of_pixel : scene_.camera.project(x.p); pixel >= 0 && !is_confocal_return) {
       const Vec3 w_o = to_camera / distance;
       const Rgb f = bsdf_value(scene_, x, {x.n, from, w_o, dot(x.n, from), dot(x.n, w_o), dot(from, w_o)});
       // Zero for a face seen edge-on, which has no flow along the pixel's ray either.

@@ -92,7 +92,7 @@ class SecondaryBoundary {
   /// Density per solid angle of w from the edge: wedge and aimed together. `g.light` is known.
   double direction_pdf(const Segment& g) const;
 
-  /// Whether the ray from the edge point along w may end on a triangle that moves, or where a vertex follows what does.
+  /// Conservative test: may the ray from the edge point along w end on moving geometry, or on a point that follows it?
   bool may_meet_flowing(const Segment& g, const Vec3& w) const {
     return scene_.flowing_bounds.meets_ray(g.offset_ray_origin(scene_.caster.offset()), w);
   }

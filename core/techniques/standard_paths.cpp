@@ -15,7 +15,7 @@ GateWeights standard_weights(const Worker& worker, const Path& path, int pixel, 
     return (1 - worker.techniques.ellipsoidal_weight(path, pixel, share, gain)) / (1 - share);
   };
   const double of_value = weight(1);
-  return {of_value, pairs ? weight(worker.antithetic_factor) : of_value};
+  return {of_value, pairs ? weight(worker.pair_coupling_gain) : of_value};
 }
 
 StandardPaths::StandardPaths(Worker& worker, bool pairs)
@@ -51,11 +51,11 @@ void StandardPaths::finish() {
 
 void StandardPaths::Slot::run_at_wall(int pixel, double scale, Rng& rng) {
   pixel_ = pixel;
-  scale_ = scale * worker_.start_path(pixel, rng, worker_.hidden_share_of_paths());
+  scale_ = scale * worker_.start_path(pixel, rng, worker_.standard_first_step_probability());
   if (scale_ == 0) return;
   std::swap(path_, worker_.path);
   walk_standard(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()}, rng,
-                Visitor{*this}, worker_.hidden_share_of_walks());
+                Visitor{*this}, worker_.walk_step_probability());
 }
 
 void StandardPaths::Slot::start(int pixel, double scale, const Rng& rng) {
@@ -71,7 +71,7 @@ StandardPaths::Slot::Walk StandardPaths::Slot::begin(int pixel, double scale, Rn
   pixel_ = pixel;
   scale_ = scale;
   Walk walk(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()},
-            Visitor{*this}, worker_.hidden_share_of_walks());
+            Visitor{*this}, worker_.walk_step_probability());
   walk.begin_at_camera(pixel, rng);
   return walk;
 }

@@ -75,9 +75,9 @@ class StandardWalk {
       if (const Rgb f = bsdf_value(scene, x, s); !f.is_black()) {
         const double to_area = cos_y / (s.distance_i * s.distance_i);
         const double pdf_walk = has_extent ? step_pdf(bsdf.pdf(s) * to_area, y.triangle, hidden) : 0;
-        const bool retraces = path_.retraces(y);
+        const bool is_confocal_return = path_.is_confocal_return(y);
         path_.push(scene, y, s.distance_i);
-        if (visitor_.wants() && (retraces || worker_.visible(x, y)))
+        if (visitor_.wants() && (is_confocal_return || worker_.visible(x, y)))
           visitor_.take(throughput_ * f * scene.emitted(y, -s.w_i) *
                         (std::abs(s.cos_i) * to_area / (scene.emitter_pdf(light_) + pdf_walk)));
         path_.pop();
@@ -126,7 +126,8 @@ class StandardWalk {
  private:
   /// Of the next step: if it is the last that can lead to what changes, all, for else the path adds nothing to derivatives.
   double hidden_share() const {
-    return bounce_ + 1 == max_bounces_ && worker_.scene.gradients_are_hidden ? std::ceil(hidden_share_) : hidden_share_;
+    return bounce_ + 1 == max_bounces_ && worker_.scene.only_area_sampled_has_gradient ? std::ceil(hidden_share_)
+                                                                                       : hidden_share_;
   }
   /// Density per area of a step's end, which the vertex before sees, with hidden geometry sampling of that share.
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {

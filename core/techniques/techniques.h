@@ -46,9 +46,9 @@ class Techniques {
     return d;
   }
 
-  /// Share of the path that ellipsoidal connections take when they are `share` of the samples and count for
-  /// `gain` times their density; standard sampling takes the rest.
-  double ellipsoidal_weight(const Path& path, int pixel, double share, double gain) const {
+  /// Weight of the path under ellipsoidal connections when they are `share` of the samples and their density is
+  /// multiplied by `pair_coupling_gain`; standard sampling has the rest.
+  double ellipsoidal_weight(const Path& path, int pixel, double share, double pair_coupling_gain) const {
     const int last = path.size() - 1;
     const SurfacePoint& y = path.vertex[last];
     const double length = path.length[last], pdf_y = scene_.emitter_pdf(y.triangle);
@@ -77,7 +77,8 @@ class Techniques {
             pdf_y * (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
             (2 * kPi * kCurves * area_rate);
     }
-    return gain * share * ellipsoidal / (gain * share * ellipsoidal + (1 - share) * standard);
+    const double ours = pair_coupling_gain * share * ellipsoidal;
+    return ours / (ours + (1 - share) * standard);
   }
 
  private:

@@ -1,5 +1,5 @@
-// What one partition of the work carries from sample to sample, the vertices that paths are built of, and how complete
-// paths reach the sink. What takes random numbers on every bounce is inline, so that their state stays in registers.
+// The scratch state of one partition of the work, the vertices that paths are built of, and how complete paths reach the
+// sink. What takes random numbers on every bounce is inline, so that their state stays in registers.
 #pragma once
 #include <algorithm>
 #include <optional>
@@ -24,7 +24,7 @@ struct Worker {
   const GatePick& pick;
   double ellipsoidal_share = 0;  ///< of the samples; the others are standard
   ConnectionRates rates = {};    ///< of ellipsoidal connections
-  double antithetic_factor = 1;  ///< on the density of pairs in multiple importance sampling
+  double pair_coupling_gain = 1;  ///< factor on the density of coupled pairs in multiple importance sampling
   Techniques techniques;
   Sink& sink;
   const bool differential_sink;  ///< sink.differential()
@@ -74,26 +74,29 @@ struct Worker {
   /// Starts `sensor_path` with what a pixel looks from: the camera, or the sensor point of a capture.
   void start_at_sensor(Path& sensor_path, int pixel) const;
   /// Starts `path` with that and a surface point x1 that it sees: of a camera through a random point of the pixel, of a capture
-  /// by the reflection of the wall or by hidden geometry sampling, whichever finds it the more often. Returns what the pixel
-  /// makes of radiance from x1, over density; 0: there is no x1. `hidden`: hidden geometry sampling's share in the latter.
+  /// by the reflection of the wall or by area sampling, whichever has the larger density there (maximum heuristic). Returns what
+  /// the pixel makes of radiance from x1, over density; 0: there is no x1. `hidden`: probability of area sampling.
   double start_path(int pixel, Rng& rng, double hidden);
-  double start_path(int pixel, Rng& rng) { return start_path(pixel, rng, hidden_share_at_wall()); }
+  double start_path(int pixel, Rng& rng) { return start_path(pixel, rng, first_step_probability()); }
 
-  /// The part of a capture's first vertices that hidden geometry sampling finds.
-  double hidden_share_at_wall() const {
+  // Probabilities that a step is drawn by area (theory section 9), so far as there are area-sampled shapes.
+
+  /// Of the first step from a capture's wall.
+  double first_step_probability() const {
     if (scene.hidden.empty()) return 0;
     const double share = differential_sink ? kHiddenShareOfDerivatives : kHiddenShareOfImages;
-    return options.hidden.value_or(scene.hidden_suffices ? 1 : share);
+    return options.hidden.value_or(scene.area_sampling_alone ? 1 : share);
   }
-  /// Of a capture's paths that contribute themselves, not by what covers them: if their one bounce must be on what changes, all.
-  double hidden_share_of_paths() const {
-    const bool all = differential_sink && options.max_bounces == 1 && scene.first_gradients_are_hidden;
-    return all ? 1 : hidden_share_at_wall();
+  /// The same for paths that contribute themselves, not by a boundary at their end: 1 where their only bounce must be on what
+  /// changes.
+  double standard_first_step_probability() const {
+    const bool all = differential_sink && options.max_bounces == 1 && scene.only_area_sampled_x1_has_gradient;
+    return all ? 1 : first_step_probability();
   }
-  /// EstimatorOptions::hidden where it is of use: for derivatives, to which paths that miss hidden geometry add nothing, and
-  /// where there is something else to miss it for.
-  double hidden_share_of_walks() const {
-    const bool of_use = differential_sink && !scene.hidden.empty() && !scene.hidden_is_all;
+  /// Of later steps: EstimatorOptions::hidden where it is of use. That is for derivatives, to which paths that miss these shapes
+  /// add nothing, and where there are other shapes.
+  double walk_step_probability() const {
+    const bool of_use = differential_sink && !scene.hidden.empty() && !scene.all_visible_is_area_sampled;
     return of_use ? options.hidden.value_or(scene.captures() ? kHiddenShareOfDerivatives : 0) : 0;
   }
 

@@ -12,12 +12,12 @@ namespace {
 constexpr double kReferenceShare = 0.25;
 constexpr std::uint64_t kReferenceSeed = 0x7265666572656e63u;  // changes the experiment's
 constexpr int kReferenceRepeats = 32;
-constexpr int kRungs = 4;
+constexpr int kLevels = 4;
 constexpr int kFewestRepeats = 4, kRepeats = 10, kMostRepeats = 400;
 /// Unknowns that are measured where the time grows with their number.
 constexpr int kMostComponents = 6;
 
-/// Rungs of one height have the same random numbers in all methods, and others than those of another height:
+/// Levels of one height have the same random numbers in all methods, and others than those of another height:
 /// methods that come down to the same settings then have the same errors.
 std::uint32_t first_iteration(double factor) {
   static_assert(kMostRepeats < 1 << 12);
@@ -52,32 +52,32 @@ double best_of(const Chart& chart) {
   return best;
 }
 
-ChartMethod climb(MethodRun& run, const Method& method, const std::vector<double>& theta, const GatedImage& target,
-                  double core_seconds, const Poll& poll) {
+ChartMethod measure_levels(MethodRun& run, const Method& method, const std::vector<double>& theta,
+                           const GatedImage& target, double core_seconds, const Poll& poll) {
   const int unknowns = run.problem().parameters().size();
   if (method.gradient != Method::Gradient::adjoint) run.set_components(spread_components(unknowns, kMostComponents));
   const SampleTrial trial = try_samples(run, theta, target, kRepeats, core_seconds, poll);
-  int rungs = kRungs;
-  while (rungs > 1 && trial.last_within(core_seconds / rungs, kRepeats) < rungs - 1) --rungs;
-  const double of_rung = core_seconds / rungs;
-  const int top = trial.last_within(of_rung, kRepeats);
+  int levels = kLevels;
+  while (levels > 1 && trial.last_within(core_seconds / levels, kRepeats) < levels - 1) --levels;
+  const double of_level = core_seconds / levels;
+  const int top = trial.last_within(of_level, kRepeats);
   ChartMethod result;
   result.name = method.name;
   result.components = static_cast<int>(run.components().size());
-  for (int step = top - rungs + 1; step <= top; ++step) {
-    Rung rung;
-    rung.factor = trial.factor(step);
-    run.set_factor(rung.factor);
-    std::uint32_t iteration = first_iteration(rung.factor);
+  for (int step = top - levels + 1; step <= top; ++step) {
+    SampleLevel level;
+    level.factor = trial.factor(step);
+    run.set_factor(level.factor);
+    std::uint32_t iteration = first_iteration(level.factor);
     double spent = 0;
     do {
       MethodRun::Estimate estimate = run.gradient(theta, target, iteration++, poll);
       spent += estimate.core_seconds;
-      rung.repeats.push_back(std::move(estimate.gradient));
-      rung.core_seconds = spent / static_cast<double>(rung.repeats.size());
-    } while (rung.repeats.size() < kFewestRepeats ||
-             (rung.repeats.size() < kMostRepeats && spent + rung.core_seconds < of_rung));
-    result.rungs.push_back(std::move(rung));
+      level.repeats.push_back(std::move(estimate.gradient));
+      level.core_seconds = spent / static_cast<double>(level.repeats.size());
+    } while (level.repeats.size() < kFewestRepeats ||
+             (level.repeats.size() < kMostRepeats && spent + level.core_seconds < of_level));
+    result.levels.push_back(std::move(level));
   }
   return result;
 }
@@ -142,12 +142,12 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
       continue;
     }
     options.progress(methods[m].name);
-    ChartMethod row = climb(runs[m], methods[m], theta, target, each, options.poll);
+    ChartMethod row = measure_levels(runs[m], methods[m], theta, target, each, options.poll);
     const std::vector<int> components = spread_components(chart.unknowns, row.components);
     const double scale = static_cast<double>(chart.unknowns) / row.components;
     // A squared loss has a gradient whose mean does not depend on the number of samples.
-    row.error = method_error(row.rungs, select(chart.reference.repeats, components), chart.reference.norm2.value, scale,
-                             experiment.loss.kind == LossKind::squared);
+    row.error = method_error(row.levels, select(chart.reference.repeats, components), chart.reference.norm2.value,
+                             scale, experiment.loss.kind == LossKind::squared);
     row.to_error = core_seconds_to(options.error, row.error);
     chart.methods.push_back(std::move(row));
     stage.advance();
@@ -169,12 +169,12 @@ std::string chart_csv(const Chart& chart) {
   for (const ChartMethod& method : chart.methods) {
     const double scale = static_cast<double>(chart.unknowns) / method.components;
     const Repeats reference = select(chart.reference.repeats, spread_components(chart.unknowns, method.components));
-    for (const Rung& rung : method.rungs) {
-      const Measured variance = total_variance(rung.repeats);
-      const SquaredNorm bias2 = method_error({rung}, reference, norm2, scale, false).bias2;
+    for (const SampleLevel& level : method.levels) {
+      const Measured variance = total_variance(level.repeats);
+      const SquaredNorm bias2 = method_error({level}, reference, norm2, scale, false).bias2;
       const double relative = variance.value * scale / norm2;
-      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", method.name, rung.factor, rung.repeats.size(),
-                          rung.core_seconds, std::sqrt(std::max(0.0, relative + bias2.value)), relative,
+      text += fmt::format("{},{},{},{},{},{},{},{},{},{},{}\n", method.name, level.factor, level.repeats.size(),
+                          level.core_seconds, std::sqrt(std::max(0.0, relative + bias2.value)), relative,
                           variance.standard_error * scale / norm2, bias2.value, bias2.standard_error, method.components,
                           chart.unknowns);
     }

@@ -1,7 +1,7 @@
 // The work-precision chart: what each way to the loss gradient costs on one experiment, at one point.
 //
-// Every method climbs a ladder of sample counts, each rung twice the one below (the experiment's samples times a power of
-// two), with as many independent repeats as the rung's share of the time allows. Methods that come down to the same
+// Every method climbs a ladder of sample counts, each level twice the one below (the experiment's samples times a power of
+// two), with as many independent repeats as the level's share of the time allows. Methods that come down to the same
 // estimator, as `auto` may to another one, are measured once. All see one target image, and are compared with one reference:
 // `auto` with other random numbers and far more samples. Costs are CPU seconds of the process, all threads; the renderings of
 // the target and the trial by which `auto` chooses are not counted.
@@ -43,7 +43,7 @@ Reference make_reference(const Experiment& experiment, const std::vector<double>
 struct ChartMethod {
   std::string name;
   int components = 0;  ///< unknowns that were measured
-  std::vector<Rung> rungs;
+  std::vector<SampleLevel> levels;
   MethodError error;
   Measured to_error;  ///< core-seconds to ChartOptions::error, infinite: never
 };
@@ -61,7 +61,7 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
                  const ChartOptions& options);
 
 /// `method,factor,repeats,core_seconds,error,variance,variance_error,bias2,bias2_error,components,unknowns`,
-/// a row per rung. core_seconds: of one repeat. All relative to the gradient's norm; error is the root of
+/// a row per level. core_seconds: of one repeat. All relative to the gradient's norm; error is the root of
 /// variance + bias^2. The first row is the reference: the whole of it.
 std::string chart_csv(const Chart& chart);
 /// `method,core_seconds,standard_error,ratio,rate,slope,bias2,bias2_error,bias_significant`: what chart_table

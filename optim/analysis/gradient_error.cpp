@@ -9,7 +9,7 @@
 namespace isochron {
 namespace {
 
-constexpr std::size_t kUpperRungs = 3;
+constexpr std::size_t kUpperLevels = 3;
 
 /// Of a group, for the noise's own size: enough for some percent, and quick for many unknowns; fewer tell
 /// nothing.
@@ -104,15 +104,15 @@ SquaredNorm squared_norm(std::span<const WeightedRepeats> groups) {
   return result;
 }
 
-MethodError method_error(const std::vector<Rung>& rungs, const Repeats& reference, double norm2, double scale,
+MethodError method_error(const std::vector<SampleLevel>& levels, const Repeats& reference, double norm2, double scale,
                          bool bias_from_all) {
   MethodError result;
   std::vector<double> log_time, log_deviation;
-  const std::size_t upper = std::min(kUpperRungs, rungs.size());
-  for (std::size_t r = 0; r < rungs.size(); ++r) {
-    const Measured variance = total_variance(rungs[r].repeats);
-    const double time = rungs[r].core_seconds;
-    if (r + upper >= rungs.size()) {
+  const std::size_t upper = std::min(kUpperLevels, levels.size());
+  for (std::size_t r = 0; r < levels.size(); ++r) {
+    const Measured variance = total_variance(levels[r].repeats);
+    const double time = levels[r].core_seconds;
+    if (r + upper >= levels.size()) {
       const double share = scale / norm2 * time / static_cast<double>(upper);
       result.rate.value += share * variance.value;
       result.rate.standard_error = std::hypot(result.rate.standard_error, share * variance.standard_error);
@@ -123,14 +123,14 @@ MethodError method_error(const std::vector<Rung>& rungs, const Repeats& referenc
   }
   result.slope = log_time.size() > 1 ? slope_of(log_time, log_deviation) : std::numeric_limits<double>::quiet_NaN();
 
-  // All samples alike: a rung counts by its repeats times their samples.
+  // All samples alike: a level counts by its repeats times their samples.
   double samples = 0;
-  const std::size_t first = bias_from_all ? 0 : rungs.size() - 1;
-  for (std::size_t r = first; r < rungs.size(); ++r)
-    samples += rungs[r].factor * static_cast<double>(rungs[r].repeats.size());
+  const std::size_t first = bias_from_all ? 0 : levels.size() - 1;
+  for (std::size_t r = first; r < levels.size(); ++r)
+    samples += levels[r].factor * static_cast<double>(levels[r].repeats.size());
   std::vector<WeightedRepeats> groups{{&reference, -1}};
-  for (std::size_t r = first; r < rungs.size(); ++r)
-    groups.push_back({&rungs[r].repeats, rungs[r].factor * static_cast<double>(rungs[r].repeats.size()) / samples});
+  for (std::size_t r = first; r < levels.size(); ++r)
+    groups.push_back({&levels[r].repeats, levels[r].factor * static_cast<double>(levels[r].repeats.size()) / samples});
   result.bias2 = squared_norm(groups);
   for (double* x : {&result.bias2.value, &result.bias2.standard_error, &result.bias2.error_if_zero})
     *x *= scale / norm2;

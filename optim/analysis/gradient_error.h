@@ -36,26 +36,26 @@ Measured total_variance(const Repeats& repeats);
 std::vector<double> mean(const Repeats& repeats);
 
 /// A method at one number of samples.
-struct Rung {
+struct SampleLevel {
   double factor = 1;        ///< samples, in units of the experiment's
   double core_seconds = 0;  ///< of one repeat, on average
   Repeats repeats;
 };
 
-/// What a method's rungs say together. All relative: variances and squares over the reference's squared norm.
+/// What a method's levels say together. All relative: variances and squares over the reference's squared norm.
 struct MethodError {
-  /// Variance x core-seconds, a constant by the law variance ~ 1 / time; the mean over the upper three rungs.
+  /// Variance x core-seconds, a constant by the law variance ~ 1 / time; the mean over the upper three levels.
   /// On lower ones products of two noises (of image and derivative) and fixed costs may still add to it: the
   /// slope is steeper then, and the rate of long estimates lower than this.
   Measured rate;
-  double slope = 0;   ///< of log(standard deviation) over log(core-seconds), all rungs; -1/2 by the law
+  double slope = 0;   ///< of log(standard deviation) over log(core-seconds), all levels; -1/2 by the law
   SquaredNorm bias2;  ///< squared bias, unbiased: may be negative
 };
 
 /// `scale` multiplies all squares: unknowns over the components in the repeats, where only some were measured.
-/// `bias_from_all`: the bias is taken not to depend on the samples, so that all rungs tell it (else the
+/// `bias_from_all`: the bias is taken not to depend on the samples, so that all levels tell it (else the
 /// uppermost alone).
-MethodError method_error(const std::vector<Rung>& rungs, const Repeats& reference, double norm2, double scale,
+MethodError method_error(const std::vector<SampleLevel>& levels, const Repeats& reference, double norm2, double scale,
                          bool bias_from_all);
 
 /// Whether a squared bias is more than 3 times the error it would have if there were none. Without a bias and

@@ -164,8 +164,8 @@ void Parameters::turn(const Motion& rotation, const CarriedPoint& pivot, const s
   p = pivot.position + rotate(p - pivot.position, rotation.direction, radians);
   if (!tangent) return;
   for (Moved& earlier : *tangent) earlier.velocity = rotate(earlier.velocity, rotation.direction, radians);
-  // p = c + R (p_before - c): what moves the pivot c moves p by (1 - R) dc. What carries a pivot acts on all that turns
-  // about it, so that its column is there.
+  // p = c + R (p_before - c): what moves the pivot c moves p by (1 - R) dc. The unknowns that carry a pivot act on all
+  // points that turn about it, so that they are among the earlier ones.
   for (const Moved& of_pivot : pivot.velocity) {
     const Vec3 velocity = of_pivot.velocity - rotate(of_pivot.velocity, rotation.direction, radians);
     const auto same = std::find_if(tangent->begin(), tangent->end(),

@@ -175,7 +175,7 @@ class Problem {
   /// The name of a light at the camera that parameters move away from it; empty where there is none.
   std::string light_that_leaves_the_camera() const;
 
-  /// What automatic sampling has settled on.
+  /// What `sampling: auto` has chosen in its trials.
   struct Settled {
     std::array<std::optional<EstimatorOptions>, 2> estimator;  ///< per purpose
     std::optional<EstimatorOptions> image_estimator;
@@ -196,8 +196,8 @@ class Problem {
   int evaluations_;  ///< of the loss gradient
   mutable Settled settled_;
   using Choice = std::tuple<std::array<int, 4>, std::uint64_t, int>;
-  Choice choice_;                         ///< that settled_ belongs to
-  std::map<Choice, Settled> remembered_;  ///< of other choices
+  Choice choice_;                         ///< samples, seed and evaluations that settled_ belongs to
+  std::map<Choice, Settled> remembered_;  ///< earlier values of settled_, by choice
 };
 
 Pass pass_of(Term term);

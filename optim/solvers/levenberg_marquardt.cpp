@@ -27,7 +27,7 @@ class CondensedLoss : public ceres::CostFunction {
         start_(start),
         iteration_(iteration),
         loss_at_start_(now.loss),
-        unit_(most_fall(now)) {
+        unit_(max_expected_decrease(now)) {
     set_num_residuals(static_cast<int>(start.size()) + 1);
     mutable_parameter_block_sizes()->push_back(static_cast<int>(start.size()));
   }
@@ -103,7 +103,7 @@ class LevenbergMarquardt : public Optimizer {
           (theta[i] == objective.upper()[i] && now.gradient[i] <= 0))
         fixed.push_back(static_cast<int>(i));
     rejected_ = false;
-    if (!(most_fall(now) > 0) || fixed.size() == theta.size()) return theta;
+    if (!(max_expected_decrease(now) > 0) || fixed.size() == theta.size()) return theta;
     const QuadraticModel model = quadratic_model(now);
     auto* loss = new CondensedLoss(objective, now, model, theta, iteration);
     ceres::Problem problem;

@@ -7,7 +7,7 @@
 
 namespace isochron {
 
-double most_fall(const Evaluation& at) {
+double max_expected_decrease(const Evaluation& at) {
   const double error = std::isfinite(at.loss_noise) ? 2 * at.loss_noise : 0;
   return std::max(0.0, at.loss) + error;
 }
@@ -34,7 +34,7 @@ QuadraticModel quadratic_model(const Evaluation& at) {
                               width.asDiagonal();
 
   QuadraticModel model;
-  const double unit = 2 * most_fall(at);
+  const double unit = 2 * max_expected_decrease(at);
   model.scale = (curvature.diagonal() / unit).cwiseSqrt();
   const Eigen::VectorXd inverse = model.scale.cwiseInverse();
   curvature = inverse.asDiagonal() * curvature * inverse.asDiagonal() / unit;

@@ -114,20 +114,21 @@ TEST(GradientError, FalseAlarmsOfABiasAreRare) {
   }
 }
 
-/// Rungs of an estimator of two unknowns with total variance rate / t + excess / t^2 and a bias.
-std::vector<Rung> ladder(Normal& normal, const std::vector<double>& truth, double rate, double excess, double bias) {
-  std::vector<Rung> rungs;
+/// Levels of an estimator of two unknowns with total variance rate / t + excess / t^2 and a bias.
+std::vector<SampleLevel> ladder(Normal& normal, const std::vector<double>& truth, double rate, double excess,
+                                double bias) {
+  std::vector<SampleLevel> levels;
   for (int r = 0; r < 5; ++r) {
-    Rung rung;
-    rung.factor = std::ldexp(1.0, r);
-    rung.core_seconds = 0.1 * rung.factor;
-    const double variance = rate / rung.core_seconds + excess / (rung.core_seconds * rung.core_seconds);
+    SampleLevel level;
+    level.factor = std::ldexp(1.0, r);
+    level.core_seconds = 0.1 * level.factor;
+    const double variance = rate / level.core_seconds + excess / (level.core_seconds * level.core_seconds);
     std::vector<double> center = truth;
     center[0] += bias;
-    rung.repeats = normal_repeats(normal, 12 << (4 - r), center, 0, std::sqrt(variance / 2));
-    rungs.push_back(std::move(rung));
+    level.repeats = normal_repeats(normal, 12 << (4 - r), center, 0, std::sqrt(variance / 2));
+    levels.push_back(std::move(level));
   }
-  return rungs;
+  return levels;
 }
 
 TEST(GradientError, BiasAndVarianceApart) {
@@ -139,9 +140,9 @@ TEST(GradientError, BiasAndVarianceApart) {
     constexpr int kTrials = 300;
     const double true_rate = 0.1 / 25;
     for (int trial = 0; trial < kTrials; ++trial) {
-      const std::vector<Rung> rungs = ladder(normal, truth, 0.1, 0, bias);
+      const std::vector<SampleLevel> levels = ladder(normal, truth, 0.1, 0, bias);
       const Repeats reference = normal_repeats(normal, 32, truth, 0, 0.2);
-      const MethodError error = method_error(rungs, reference, 25, 1, true);
+      const MethodError error = method_error(levels, reference, 25, 1, true);
       rate.add(error.rate.value);
       excess.add(std::pow(error.rate.standard_error, 2) - std::pow(error.rate.value - true_rate, 2));
       bias2.add(error.bias2.value);
@@ -168,7 +169,7 @@ TEST(GradientError, ExcessAtFewSamplesMakesTheSlopeSteeper) {
   const Repeats reference = normal_repeats(normal, 32, {3, -4}, 0, 0.2);
   const MethodError error = method_error(ladder(normal, {3, -4}, 0.1, 0.1, 0), reference, 25, 1, true);
   EXPECT_LT(error.slope, -0.7);
-  // Of the upper three rungs: 0.1 + 0.1 x the mean of 1/0.4, 1/0.8, 1/1.6.
+  // Of the upper three levels: 0.1 + 0.1 x the mean of 1/0.4, 1/0.8, 1/1.6.
   EXPECT_NEAR(error.rate.value, (0.1 + 0.1 * 4.375 / 3) / 25, 4.5 * error.rate.standard_error);
   EXPECT_LT(error.rate.standard_error, 0.25 * error.rate.value);
 }
@@ -177,10 +178,10 @@ TEST(GradientError, AFewOfManyUnknowns) {
   // A quarter of the unknowns, all alike, and the scale that stands for the others.
   Normal normal(5);
   const std::vector<double> all(16, 1.0), few(4, 1.0);
-  std::vector<Rung> rungs(1);
-  rungs[0].core_seconds = 2;
-  rungs[0].repeats = normal_repeats(normal, 400, {1.5, 1.5, 1.5, 1.5}, 0, 0.5);
-  const MethodError error = method_error(rungs, normal_repeats(normal, 32, few, 0, 0.01), 16, 4, true);
+  std::vector<SampleLevel> levels(1);
+  levels[0].core_seconds = 2;
+  levels[0].repeats = normal_repeats(normal, 400, {1.5, 1.5, 1.5, 1.5}, 0, 0.5);
+  const MethodError error = method_error(levels, normal_repeats(normal, 32, few, 0, 0.01), 16, 4, true);
   EXPECT_NEAR(error.rate.value, 2 * 16 * 0.25 / 16, 4.5 * error.rate.standard_error);
   EXPECT_NEAR(error.bias2.value, 16 * 0.25 / 16, 4.5 * error.bias2.standard_error);
   EXPECT_LT(error.bias2.standard_error, 0.05);

@@ -166,7 +166,7 @@ void expect_right(const CaptureCase& c) {
     for (int i = 0; i < 3; ++i) p.p += c.scene.positions[c.scene.triangles[k].vertex[i]] * c.b[k][i];
     x.push_back(p);
   }
-  x.push_back(prepared.point_of_light(light_in_place_of_triangle(0)));
+  x.push_back(prepared.point_of_light(index_of_light(0)));
   const std::vector<double> values = values_of(c.scene);
   std::vector<Jet> dofs(values.begin(), values.end());
   for (const bool length_only : {false, true}) {

@@ -131,7 +131,7 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
   ASSERT_GT(f.sink.found.size(), 1000u);
   int shared = 0;
   for (const PathSink::Found& found : f.sink.found) {
-    f.worker.antithetic_factor = 7;
+    f.worker.pair_coupling_gain = 7;
     f.worker.rates = {};
     for (const double share : {0.3, 0.9}) {
       f.worker.ellipsoidal_share = share;

@@ -40,7 +40,7 @@ struct Capture {
   int sensor_index(int pixel) const { return pixel % static_cast<int>(sensor.size()); }
   /// Which of the laser's spots; confocal: the sensor point's number.
   int spot_index(int pixel) const { return confocal() ? pixel : pixel / static_cast<int>(sensor.size()); }
-  /// What counts in the length of its paths beside the way from s to l.
+  /// Constant length added to all its paths: from the laser to its spot l, and from the sensor point s to the detector.
   double extra_length(int pixel) const {
     return origin ? length(origin->laser - spot_of(pixel).p) + length(origin->sensor - sensor_of(pixel).p) : 0;
   }
