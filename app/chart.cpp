@@ -87,12 +87,12 @@ void add_chart(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand("chart", "Chart the error of the loss gradient against time, for every method");
   add_experiment_options(*sub, command->common);
   sub->add_option("--seconds", command->seconds,
-                  "time for all of it on idle cores, about; a quarter goes to the reference, the target is not "
+                  "about the whole time on idle cores; a quarter is for the reference, the target is not "
                   "counted")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("N");
-  sub->add_option("--error", command->error_percent, "relative error that the table asks for, in percent")
+  sub->add_option("--error", command->error_percent, "relative error whose time the table gives, in percent")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("PERCENT");

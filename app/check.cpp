@@ -121,7 +121,7 @@ int check(const CheckCommand& command) {
     fmt::print("Too few samples may miss rare events and so their error: repeat with more, and another seed\n");
   if (blind > 0)
     fmt::print(
-        "{} of {}: no sample of the finite difference met what changes, so it says nothing of the derivative: repeat "
+        "{} of {}: no sample of the finite difference met what changes, so it cannot judge the derivative: repeat "
         "with more samples, or a larger gradient.step\n",
         blind, comparisons);
   if (empty > 0) {
@@ -148,8 +148,8 @@ void add_check(CLI::App& app, Action& action) {
   add_experiment_options(*sub, command->common);
   add_parameter_option(*sub, command->parameter);
   sub->footer(
-      "Every term takes the same number of samples: --samples, else the largest of the experiment.\n"
-      "gradient.step is the largest of the three steps; without it, one that suits scene, gates and value.\n"
+      "Every term takes the same number of samples: --samples, or the largest number of the experiment.\n"
+      "gradient.step is the largest of the three steps; by default it follows from scene, gates and value.\n"
       "Examples:\n"
       "  isochron check cube.yaml --samples 64\n"
       "  isochron check cube.yaml --parameter height --at height=0.1 -o check\n"

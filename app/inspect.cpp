@@ -133,7 +133,7 @@ void print_advice(const Problem& problem, const Inspection& inspection) {
         "more\n",
         100 * beyond);
   for (const std::string& what : advice.reduction.undecided)
-    fmt::print("Too few samples to tell {}; kept, --seconds gives more\n", what);
+    fmt::print("Too few samples to decide about {}: kept. --seconds gives more\n", what);
   fmt::print(
       "Samples (primal, interior, visibility, path_length) and CPU seconds of a gradient of equal "
       "variance:\n");
@@ -189,12 +189,12 @@ void add_inspect(CLI::App& app, Action& action) {
   CLI::App* sub = app.add_subcommand(
       "inspect", "Measure how much of the model a scene needs: bounces, terms, sampling, numbers of samples");
   add_experiment_options(*sub, command->common);
-  sub->add_option("--seconds", command->seconds, "CPU seconds to spend, of all cores together, about; default 60")
+  sub->add_option("--seconds", command->seconds, "about how many CPU seconds to spend, summed over cores; default 60")
       ->check(CLI::Range(0.1, 1e6))
       ->type_name("N");
   sub->add_flag("--apply", command->apply, "write the advice into the experiment file");
   sub->footer(
-      "Advises the least that keeps the gradient of the loss within 1 % of the full model's, two standard "
+      "Advises the smallest model whose gradient of the loss is within 1 % of the full model's, two standard "
       "errors\n"
       "included, and the numbers of samples that reach the present variance in the least time.\n"
       "Examples:\n"

@@ -27,8 +27,8 @@ int reconstruct(const ReconstructCommand& command) {
   const std::optional<int> status = execute_run_if_any(folder, command.common, command.force, start);
   if (status) return *status;
   spdlog::error(
-      "{}: no light of a hidden surface stands out of the background; the smallest that could be told apart would have "
-      "to send some {:.0f} photons to all points together",
+      "{}: no light of a hidden surface stands out of the background; the weakest detectable surface would "
+      "send some {:.0f} photons to all points together",
       folder, photons_needed);
   return 1;
 }
@@ -38,16 +38,16 @@ int reconstruct(const ReconstructCommand& command) {
 void add_reconstruct(CLI::App& app, Action& action) {
   auto command = std::make_shared<ReconstructCommand>();
   CLI::App* sub = app.add_subcommand("reconstruct", "Find the hidden surface behind a capture's photon counts");
-  sub->add_option("capture", command->spec.capture, "photon counts of a wall's points")
+  sub->add_option("capture", command->spec.capture, "HDF5 file of photon counts at points of a wall")
       ->required()
       ->type_name("CAPTURE.h5");
   sub->add_option("-o,--output", command->common.output, "output folder; default runs/NAME-OF-THE-FILE")
       ->type_name("DIR");
   sub->add_option("--response", command->spec.response,
-                  "table of the detector's response: offsets in ps, values; without one light is counted as it arrives")
+                  "table of the detector's response: offsets in ps, values; default: light is counted when it arrives")
       ->type_name("IRF.csv");
   sub->add_option("--seconds", command->spec.seconds,
-                  "work of the fit, by what two cores do in that time: more for less noise (default 300)")
+                  "work of the fit, as much as two cores do in that time; more gives less noise (default 300)")
       ->check(CLI::Range(0.1, 1e6))
       ->type_name("N");
   sub->add_option("--seed", command->spec.seed, "seed of the random numbers")->type_name("N");

@@ -29,11 +29,11 @@ int report(const ReportCommand& command) {
 void add_report(CLI::App& app, Action& action) {
   auto command = std::make_shared<ReportCommand>();
   CLI::App* sub = app.add_subcommand("report", "Write a page about a run, or a comparison of several");
-  sub->add_option("folders", command->folders, "folders of runs, also of one that is still going")
+  sub->add_option("folders", command->folders, "folders of runs, finished or not")
       ->required()
       ->type_name("DIR...");
   sub->add_option("-o,--output", command->output,
-                  "the page; default DIR/report.html, of several runs comparison.html in the current folder")
+                  "the page; default DIR/report.html, for several runs comparison.html in the current folder")
       ->type_name("FILE");
   sub->add_flag("--no-derivatives", command->no_derivatives,
                 "render no derivative images at the final parameters (about two seconds, once)");

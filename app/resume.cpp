@@ -13,7 +13,7 @@ int resume(const CommonOptions& options) {
 
 void add_resume(CLI::App& app, Action& action) {
   auto options = std::make_shared<CommonOptions>();
-  CLI::App* sub = app.add_subcommand("resume", "Go on from a run's last checkpoint, to the same result bit for bit");
+  CLI::App* sub = app.add_subcommand("resume", "Continue from a run's last checkpoint, to the same result bit for bit");
   sub->add_option("folder", options->file, "folder of the run")->required()->type_name("DIR");
   add_session_options(*sub, *options);
   sub->footer(

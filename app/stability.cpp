@@ -72,7 +72,7 @@ void add_stability(CLI::App& app, Action& action) {
   add_experiment_options(*sub, command->common);
   sub->get_option("--at")->group("");
   sub->add_option("--seconds", command->seconds,
-                  "time for the whole map on idle cores, about; every gradient of a width takes the same time")
+                  "about the time for the whole map on idle cores; every gradient of a width takes the same time")
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("N");

@@ -17,10 +17,10 @@ class Bins final : public GateDescription {
       if (keys.value(name, field, meaning, {.unit = unit, .unset = given_ == 0, .otherwise = of_file})) ++given_;
     };
     key("start", field::number(start_), "where the first bin begins; may be negative", "`unit`");
-    key("width", field::positive(width_), "of a bin: each begins where the one before ends", "`unit`");
+    key("width", field::positive(width_), "of a bin; each begins where the one before ends", "`unit`");
     key("count", field::integer(count_, 1, kMostGates), "how many", "");
     keys.value("response", response(read_numbers),
-               "how much later than it arrived light is counted, piecewise linear; scaled to an integral of 1",
+               "the detector's: how much later than it arrives light is counted; piecewise linear, scaled to an integral of 1",
                {.unit = "`unit`", .unset = offsets_.empty(), .otherwise = "none: at once"});
   }
   void check(const YamlValue& gates) const override {

@@ -130,6 +130,6 @@ void GateShape::couple_quantiles(const std::vector<Piece>& plus, const std::vect
 }
 
 extern const GateKindEntry kTabulated;
-const GateKindEntry kTabulated{"tabulated", "lines between the rows of a table", make_gate<Tabulated>};
+const GateKindEntry kTabulated{"tabulated", "piecewise linear between the rows of a table", make_gate<Tabulated>};
 
 }  // namespace isochron

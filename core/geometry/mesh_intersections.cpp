@@ -23,7 +23,7 @@ struct MeshIntersections::ClusterEdges {
       : box(around), cluster(of_cluster), only_piercing(piercing_alone) {}
   const FloatBox box;  ///< holds those of all
   const int cluster;
-  const bool only_piercing;  ///< not those that went through nothing of their own shape at first
+  const bool only_piercing;  ///< only those that pierce their own shape in the initial scene
   int count = -1;            ///< not filled yet
   std::array<const ClusterEdge*, 3 * EightBoxes::kWidth> edge;
   std::array<FloatBox, 3 * EightBoxes::kWidth> each;

@@ -58,7 +58,7 @@ class MeshIntersections {
   TriangleClusters clusters_;
   std::vector<ClusterEdge> edges_;          ///< cluster by cluster
   std::vector<int> first_edge_;             ///< of each cluster, and the end
-  std::vector<char> through_own_shape_;     ///< of each edge: in the scene at first
+  std::vector<char> through_own_shape_;     ///< of each edge: in the initial scene
   std::vector<char> shape_pierces_itself_;  ///< one of its edges does
   std::vector<Vec3> positions_;             ///< at the last update
   double touching_;

@@ -14,7 +14,7 @@ namespace isochron {
 
 /// How the hierarchy of boxes follows the scene when vertices move.
 enum class CasterUpdate {
-  rebuild,  ///< made anew: the fastest rays
+  rebuild,  ///< the fastest rays
   refit  ///< boxes of shapes that moved are adapted in a thirtieth of the time, others stay; rays take a tenth longer
 };
 
@@ -50,8 +50,8 @@ class RayCaster {
     return ray.tfar < 0;
   }
 
-  /// Vertices have moved, those of the marked shapes; topology is that of the scene at first. What is found does not depend on
-  /// what the scene was in between.
+  /// Vertices have moved, those of the marked shapes; topology is that of the initial scene. Results do not depend on earlier
+  /// updates.
   void update(const Scene& scene, const std::vector<char>& moved_shapes);
 
   /// How far a ray's start is moved off the surface it leaves, so that rounding to single precision does not put it

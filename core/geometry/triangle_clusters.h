@@ -91,7 +91,7 @@ class TriangleClusters {
  public:
   /// Clusters are chosen by where triangles are in this scene; `fit` makes the boxes.
   explicit TriangleClusters(const Scene& at_first);
-  /// Makes a shape's boxes anew: those of its triangles, rounded to the nearest floats.
+  /// Rebuilds a shape's boxes: those of its triangles, rounded to the nearest floats.
   void fit(const Scene& scene, int shape);
 
   int count() const { return static_cast<int>(clusters_.size()); }

@@ -1,5 +1,5 @@
-// Hidden geometry sampling: a point of a path is drawn uniformly by area on the shapes that parameters change or that the user
-// names (Shape::hidden), which a ray in a random direction may rarely meet.
+// Area-sampled shapes (hidden geometry sampling): a point of a path is drawn uniformly by area on the shapes that parameters
+// change or that the user names (Shape::hidden), which a ray in a random direction may rarely meet.
 #pragma once
 #include <vector>
 

@@ -19,7 +19,7 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
   constexpr double kNarrow = 0.02;
   if (gates.shape().is_unbounded() || options.sampling == Sampling::standard) return {0, 0};
   if (options.sampling == Sampling::ellipsoidal) return {1, 1};
-  if (scene.capture) return {0, 0};  // hidden geometry sampling serves all gates at once
+  if (scene.capture) return {0, 0};  // area sampling serves all gates at once
   if (options.mix) return *options.mix;
   return gates.relative_coverage() < kNarrow ? SamplingMix{1, 1} : SamplingMix{0, 0};
 }

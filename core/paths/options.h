@@ -52,12 +52,13 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// In [0, 1): while a path by standard sampling has not met hidden shapes (Shape::hidden), the probability that its next
-  /// vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the reflection of a capture's wall; none:
-  /// the default, see Worker. Of camera's paths and of what follows x1 in captures, derivatives alone.
+  /// In [0, 1): as long as a path by standard sampling has met no area-sampled shape (Shape::hidden), the probability that its
+  /// next vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the cosine of a capture's wall. None: the
+  /// default, see Worker. For paths of cameras, and after x1 in captures, it applies to derivatives only.
   std::optional<double> hidden = {};
-  /// How far path vertices follow what is close to them and moves otherwise, see VertexFlows; 0: not at all. Any values
-  /// give the same derivative, with other variances, divided otherwise between the interior and the visibility term.
+  /// Contact-aware reparameterisation: within which distance path vertices follow what is close to them and moves differently,
+  /// see VertexFlows; 0: not at all. All values give the same derivative, with other variances, divided differently between
+  /// the interior and the visibility term.
   double follow = 1;         ///< all but what the camera sees: in radii of the smaller body
   double follow_radius = 4;  ///< what the camera sees: in widths of a pixel
   /// Samples per pixel, on average, from which each renderer learns once how to guide the visibility term; 0: unguided.

@@ -24,7 +24,7 @@
 
 namespace isochron {
 
-/// It can be kept from one value of the parameters to the next: `update` makes anew what depends on what has changed.
+/// It can be kept from one value of the parameters to the next: `update` rebuilds what depends on what has changed.
 class PreparedScene {
  public:
   PreparedScene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow = {},
@@ -32,7 +32,7 @@ class PreparedScene {
   PreparedScene(const PreparedScene&) = delete;
   PreparedScene& operator=(const PreparedScene&) = delete;
 
-  /// For `source`, which has the topology of the scene at first. The result is the same whatever there was in between.
+  /// For `source`, which has the topology of the initial scene. The result does not depend on earlier updates.
   void update(const Scene& source, const TangentBasis* basis, const FollowOptions& follow);
   /// Whether each degree of freedom has as many entries in the basis as in that of the last update.
   bool same_columns(const TangentBasis* basis) const;
@@ -167,7 +167,7 @@ class PreparedScene {
     return i < differentiable.light.size() && differentiable.light[i];
   }
   bool is_hidden(int triangle) const { return records_[triangle].hidden; }
-  /// Of hidden geometry sampling of that share, per area.
+  /// Density per area of area sampling with probability `share`.
   double hidden_pdf(int triangle, double share) const { return is_hidden(triangle) ? share * hidden.pdf() : 0; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
@@ -202,7 +202,7 @@ class PreparedScene {
     const TriangleRecord& r = records_[triangle];
     return {r.origin + (r.edge[0] * (1 - u2) + r.edge[1] * u2) * std::sqrt(u1), r.normal, triangle};
   }
-  /// A point of hidden geometry, of density hidden.pdf().
+  /// A point on the area-sampled shapes, of density hidden.pdf().
   SurfacePoint sample_hidden(double u0, double u1) const {
     const int t = hidden.pick(u0);
     return uniform_point(t, u0, u1);

@@ -17,14 +17,14 @@ NextAround next_around(const Vec3& axis, std::span<const Vec3> inward, int i) {
   };
   const double own = angle_of(i);
   std::tuple<bool, double, int> next{true, std::numeric_limits<double>::infinity(),
-                                     -1};  // whether the turn begins anew
+                                     -1};  // whether it is a turn further
   for (int k = 0; k < static_cast<int>(inward.size()); ++k) {
     const double angle = angle_of(k);
     const bool before = std::tie(angle, k) < std::tie(own, i);
     if (k != i) next = std::min(next, {before, angle, k});
   }
-  const auto& [anew, angle, number] = next;
-  return {number, angle - own + (anew ? 2 * kPi : 0)};
+  const auto& [wrapped, angle, number] = next;
+  return {number, angle - own + (wrapped ? 2 * kPi : 0)};
 }
 
 }  // namespace isochron

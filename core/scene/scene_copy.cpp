@@ -20,10 +20,10 @@ std::string path_of(const std::string& scene_file, const std::string& text) {
   return (fs::path(scene_file).parent_path() / text).lexically_normal().string();
 }
 
-std::string written_anew(const YAML::Node& scene, const char* why) {
+std::string rewritten(const YAML::Node& scene, const char* why) {
   YAML::Emitter text;
   text << scene;
-  return fmt::format("# Written anew, as {}.\n{}\n", why, text.c_str());
+  return fmt::format("# Rewritten, as {}.\n{}\n", why, text.c_str());
 }
 
 bool lies_below(const fs::path& relative) {
@@ -73,7 +73,7 @@ std::vector<FileCopy> copy_of_scene(const std::string& file) {
   };
   for (YAML::Node shape : scene["shapes"]) copy_file_of(shape);
   if (scene["capture"] && scene["capture"]["file"]) copy_file_of(scene["capture"]);
-  if (changed) copies[0].contents = written_anew(scene, "its files have moved");
+  if (changed) copies[0].contents = rewritten(scene, "its files have moved");
   return copies;
 }
 
@@ -90,7 +90,7 @@ std::string scene_with_mesh(const std::string& file, const std::string& shape, c
   }
   if (YAML::Node capture = scene["capture"]; capture && capture["file"])
     capture["file"] = relative(path_of(file, capture["file"].Scalar()));
-  return written_anew(scene, "a mesh is another one");
+  return rewritten(scene, "a mesh is another one");
 }
 
 }  // namespace isochron

@@ -19,8 +19,8 @@ FileCopy copy_of_file(const std::string& original, const std::string& name);
 std::string free_name(const std::string& name, const std::vector<FileCopy>& taken);
 
 /// A scene file, first, and the meshes it names: together they can be put into any folder. Meshes below the scene's folder
-/// keep their place; others go into a folder `elsewhere`, and only then the scene file is changed: it is written anew, without
-/// comments, with all values as they stand there. Throws InputError when a file cannot be read; a scene that load_scene
+/// keep their place; others go into a folder `elsewhere`. Only then the scene file is changed: it is rewritten, without
+/// comments, with the same values. Throws InputError when a file cannot be read; a scene that load_scene
 /// accepts has no other errors.
 std::vector<FileCopy> copy_of_scene(const std::string& file);
 

@@ -86,7 +86,7 @@ class BoundaryEdges {
   /// The weights of an edge of the scene, which becomes edges_[i].
   void update_edge(const PreparedScene& scene, std::size_t i, bool wedge);
   void add_mesh_intersections(const PreparedScene& scene, bool wedge);
-  /// Makes the edges of a shape anew that have changed; false where none has.
+  /// Rebuilds the changed edges of a shape; false if there are none.
   bool update_shape(const PreparedScene& scene, int shape, bool all, bool wedge);
   void set_group(std::size_t group, int first, int count);
   Pick pick(const EdgeChoice& choice, double u) const;

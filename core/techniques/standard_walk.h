@@ -22,8 +22,8 @@ struct LengthRange {
 template <class Visitor>
 class StandardWalk {
  public:
-  /// `pixel`: whose light a capture's path ends at. `hidden_share`: of the steps of a path that has not met hidden geometry,
-  /// those that hidden geometry sampling takes; in [0, 1).
+  /// `pixel`: whose light a capture's path ends at. `hidden_share`: the probability, in [0, 1), that a step is drawn by area,
+  /// as long as the path has met no area-sampled shape.
   StandardWalk(Worker& worker, Path& path, int pixel, int max_bounces, LengthRange reach, Visitor visitor,
                double hidden_share = 0)
       : worker_(worker),
@@ -129,11 +129,11 @@ class StandardWalk {
     return bounce_ + 1 == max_bounces_ && worker_.scene.only_area_sampled_has_gradient ? std::ceil(hidden_share_)
                                                                                        : hidden_share_;
   }
-  /// Density per area of a step's end, which the vertex before sees, with hidden geometry sampling of that share.
+  /// Density per area of a step's end, which the vertex before sees, with area sampling of probability `hidden`.
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
     return hidden == 0 ? pdf_bsdf : worker_.scene.next_vertex_pdf(triangle, hidden, pdf_bsdf);
   }
-  /// Takes the step by hidden geometry sampling; intersect() goes on. False where the walk ends.
+  /// Takes the step by area sampling; intersect() goes on. False if the walk ends.
   bool step_to_hidden(const SurfacePoint& x, Rng& rng) {
     const PreparedScene& scene = worker_.scene;
     double u0 = rng.fine_uniform();
@@ -187,9 +187,9 @@ class StandardWalk {
   const bool light_is_given_;
   int hit_triangle_ = -1;  ///< of the last ray; -1: none
   double pdf_ = 0;         ///< of the last ray's direction by BSDF sampling, per solid angle
-  double hidden_share_;    ///< of the steps to come
+  double hidden_share_;    ///< of the next steps
   double hidden_ = 0;      ///< of the last step
-  bool by_area_ = false;   ///< the last step was taken by hidden geometry sampling
+  bool by_area_ = false;   ///< the last step was taken by area sampling
 };
 
 /// A whole walk. Leaves the path as it was.

@@ -20,7 +20,7 @@ Stream stream_of(const Problem& problem, Pass pass, int index) {
   return inspection_stream(problem, pass, kFirstIndex + index);
 }
 
-/// CPU seconds of one evaluation as the optimiser has it, with everything that is made anew: first the
+/// CPU seconds of one evaluation as the optimiser has it, with everything that is rebuilt: first the
 /// overhead, then the passes.
 using Times = std::array<double, 1 + kPasses>;
 

@@ -11,19 +11,19 @@ inline constexpr auto kChoices<LengthUnit> = std::to_array<Choice<LengthUnit>>(
 
 template <>
 inline constexpr auto kChoices<Sampling> = std::to_array<Choice<Sampling>>(
-    {{Sampling::automatic, "auto", "whichever suits the gates' width, or both combined"},
+    {{Sampling::automatic, "auto", "the better of the two for the gates' width, or both combined"},
      {Sampling::standard, "standard", "paths of any length"},
      {Sampling::ellipsoidal, "ellipsoidal", "paths of the lengths that the gates let through"}});
 
 template <>
 inline constexpr auto kChoices<ArcPick> = std::to_array<Choice<ArcPick>>(
-    {{ArcPick::contribution, "contribution", "in proportion to what each arc would carry if nothing stood in the way"},
+    {{ArcPick::contribution, "contribution", "with probability proportional to each arc's unshadowed contribution"},
      {ArcPick::uniform, "uniform", "the paper's way, noisier"}});
 
 template <>
 inline constexpr auto kChoices<Numbers> = std::to_array<Choice<Numbers>>(
-    {{Numbers::low_discrepancy, "low_discrepancy", "samples cover evenly what they are taken from"},
-     {Numbers::independent, "independent", "none knows of another"}});
+    {{Numbers::low_discrepancy, "low_discrepancy", "samples cover their domain evenly"},
+     {Numbers::independent, "independent", "all are independent"}});
 
 template <>
 inline constexpr auto kChoices<GradientMethod> = std::to_array<Choice<GradientMethod>>(
@@ -33,8 +33,8 @@ inline constexpr auto kChoices<GradientMethod> = std::to_array<Choice<GradientMe
 template <>
 inline constexpr auto kChoices<LossKind> = std::to_array<Choice<LossKind>>(
     {{LossKind::squared, "squared", "its square"},
-     {LossKind::huber, "huber", "beyond `scale`, residuals pull like their size, not its square"},
-     {LossKind::cauchy, "cauchy", "large residuals hardly pull"},
+     {LossKind::huber, "huber", "beyond `scale` the absolute value in place of the square"},
+     {LossKind::cauchy, "cauchy", "large residuals have hardly any effect"},
      {LossKind::poisson, "poisson", "half the deviance of counts: their negative log likelihood"}});
 
 }  // namespace isochron

@@ -60,7 +60,7 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
              "EXR file of measured images, one channel or three per gate; without it the target is rendered",
              {.unset = target.images.empty()});
   keys.value("capture", folder.file(target.capture),
-             "HDF5 file of a measurement's counts; gates of kind `bins` may leave theirs to it, or combine some of its",
+             "HDF5 file of a measurement's counts (layout: FILES.md). Gates of kind `bins` take its bins, or combine some of them",
              {.only = {target.images.empty(), "targets without images", "images"}, .unset = target.capture.empty()});
   const Only rendered{!target.measured(), "rendered targets", target.images.empty() ? "a capture" : "images"};
   keys.value("samples", field::integer(target.samples, 1, kMostSamples), "per pixel", {.only = rendered});
@@ -71,28 +71,29 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
     // So many that their noise, a millionth, no longer matters.
     inner.value("photons", field::number(target.photons, {.low = 0, .high = 1e12, .low_open = true}),
                 "mean count of a pixel and colour in the brightest gate", {.unset = target.photons == 0});
-    inner.value("counts", field::boolean(target.counts), "the images are expected counts, taken as they are");
+    inner.value("counts", field::boolean(target.counts), "the images are expected counts; each value becomes a Poisson number of that mean");
     inner.check([&](const YamlValue& value) {
       if ((target.photons > 0) == target.counts) value.fail("has to say how many", "photons: N, or counts: true");
     });
   };
   keys.map("noise", noise, "Poisson noise of the rendered target",
            {.only = rendered, .unset = target.photons == 0 && !target.counts});
-  keys.value("window", interval(target.window), "gates whose centre lies outside are not used",
+  keys.value("window", interval(target.window), "only gates whose centre lies within are used",
              {.unit = "scene units", .unset = !target.windowed(), .otherwise = "all are"});
   keys.value("mask", folder.file(target.mask),
-             "NumPy array (.npy) [columns, rows] of the pixels; those with a zero are not used",
+             "NumPy array (.npy) [columns, rows] of the pixels; pixels with a zero are not used",
              {.unset = target.mask.empty(), .otherwise = "all are"});
 }
 
 void describe(Keys& keys, SampleSpec& s) {
   keys.value("primal", field::integer(s.primal, 1, kMostSamples), "the images, for the loss");
   keys.value("interior", field::integer(s.interior, 0, kMostSamples),
-             "derivative: what moves within lit surfaces, and the gates' slopes; 0: left out");
+             "interior term of the derivative: changes along paths whose visibility stays, the gates' slopes included; 0: left out");
   keys.value("visibility", field::integer(s.visibility, 0, kMostSamples),
-             "derivative: moving silhouettes and shadow edges; a sample looks for one of them; 0: left out");
+             "visibility term: moving silhouettes and shadow boundaries; a sample is one attempt to find one; 0: left out");
   keys.value("path_length", field::integer(s.path_length, 0, kMostSamples),
-             "derivative: jumps of the gates; 0: left out, but where they matter `run` takes as many as of `interior`");
+             "gate-edge (path-length) boundary term: jumps of the gates; gaussian gates have none. 0: left out, but if gates jump "
+             "`run` takes as many as of `interior`");
 }
 
 Field hidden_share(std::optional<double>& share) {
@@ -111,20 +112,21 @@ void describe_estimator(Keys& keys, Experiment& e) {
   keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
   keys.value(
       "hidden", hidden_share(options.hidden),
-      "standard sampling: the share of a path's steps that are drawn on `hidden_shapes`, until it gets there; of "
-      "derivatives, and of the first step from a capture's wall in images, too",
+      "area sampling, for standard sampling: the probability that a step is drawn on `hidden_shapes`, until the path has met "
+      "one. For derivatives, and for the first step from a capture's wall in images",
       {.unset = !options.hidden,
-       .otherwise = "cameras `0`; captures `0.5`, derivatives `0.75`, all where no other could serve"});
+       .otherwise = "cameras `0`; captures `0.5`, derivatives `0.75`, or all where that is better"});
   keys.value(
       "hidden_shapes", field::names(e.hidden_shapes),
-      "the shapes that hidden geometry sampling draws points on, by area",
+      "the area-sampled shapes: path vertices are drawn on them by area",
       {.unset = e.hidden_shapes.empty(), .otherwise = "those that parameters change; captures: all if there are none"});
   keys.value("guiding", field::boolean(e.guiding),
-             "visibility: learn where boundaries matter from a small share of the samples");
+             "visibility: learn where boundaries matter from a small part of the samples");
   keys.value("follow", field::non_negative(options.follow),
-             "how far path vertices follow what moves close to them (needed where objects touch); 0: not at all",
+             "contact-aware reparameterisation, needed where objects touch: distance within which path vertices follow what moves "
+             "close to them; 0: not at all",
              {.unit = "radii of the smaller body"});
-  keys.value("follow_radius", field::non_negative(options.follow_radius), "the same of what the camera sees",
+  keys.value("follow_radius", field::non_negative(options.follow_radius), "the same for the points that the camera sees",
              {.unit = "widths of a pixel"});
 }
 
@@ -140,10 +142,10 @@ void describe(Keys& keys, GradientSpec& gradient) {
 }
 
 void describe(Keys& keys, LossSpec& loss) {
-  keys.value("kind", field::choice(loss.kind), "what counts of a pixel's residual", {.required = true});
+  keys.value("kind", field::choice(loss.kind), "how a pixel's residual counts", {.required = true});
   keys.value("scale", field::positive(loss.scale), "residuals beyond it count for less",
              {.only = only(loss.kind, {LossKind::huber, LossKind::cauchy}),
-              .unit = "RMS of a typical pixel of the target (the median over those that hold anything)"});
+              .unit = "RMS of a typical pixel of the target (the median over lit pixels)"});
 }
 
 /// Levels carry the shape's offsets over into a new mesh, which leaves no place for what refers to the old one.

@@ -94,9 +94,9 @@ void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder) {
   keys.value("centers", centers(gates.centers),
              "one per gate: lengths of whole paths, camera and light segments included",
              {.required = true, .only = placed, .unit = "`unit`"});
-  keys.value("unit", field::choice(gates.unit), "of all lengths here; of a time, how far light travels in it");
+  keys.value("unit", field::choice(gates.unit), "of all lengths here; a time stands for how far light travels in it");
   const bool in_metres = gates.unit != LengthUnit::scene || gates.shape->needs_metres();
-  keys.value("scene_unit_m", field::positive(gates.scene_unit_m), "how long a scene unit is",
+  keys.value("scene_unit_m", field::positive(gates.scene_unit_m), "length of a scene unit",
              {.required = in_metres,
               .unit = "metres",
               .unset = gates.scene_unit_m == 0,

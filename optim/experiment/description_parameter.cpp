@@ -104,7 +104,7 @@ Field per(ParameterSpec& spec) {
   return field::checked(field::choice(spec.per), choose);
 }
 
-constexpr int kMostLevels = 12;  // of which each has four times the triangles of the one before
+constexpr int kMostLevels = 12;  // each may have four times the triangles of the one before
 
 void check_name(const YamlValue& value) {
   for (const char* reserved : {"render", "target", "initial", "final"})
@@ -153,31 +153,31 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
              {.only = of({translation, rotation, vertices}),
               .unset = spec.selection.kind == Selection::Kind::all,
               .otherwise = "all"});
-  keys.value("direction", direction(spec), "by the parameter times this, as long as it is given",
+  keys.value("direction", direction(spec), "vertices move by the parameter times this vector, which is not normalised",
              {.required = true, .only = of({translation, vertices, camera_translation}), .unit = "scene units"});
   const auto check_axis = [&](const YamlValue& value) {
     if (!std::isnormal(length_squared(spec.axis)))
       value.fail("is too long or too short", "a length whose square a double can hold");
   };
   keys.value("axis", field::checked(field::direction(spec.axis), check_axis),
-             "turned about by the right-hand rule; its length does not matter",
+             "of the turn, by the right-hand rule; its length does not matter",
              {.required = true, .only = of({rotation, camera_rotation})});
   Only with_pivot = of({rotation});
   if (of_light && with_pivot.here) with_pivot = {false, "rotations of shapes", "one of a light"};
   keys.value("pivot", pivot(spec), "what the axis goes through", {.only = with_pivot, .unit = "scene units"});
   const auto smoothing = [&](Keys& inner) {
     inner.value("diffusion", field::non_negative(spec.diffusion),
-                "adam alone: gradients diffuse over the mesh, over about the root of this many edges; 0: not");
+                "adam only: gradients diffuse over the mesh, over about the root of this many edges; 0: not");
     inner.value("slopes", field::non_negative(spec.slopes), "weight of a penalty on uneven offsets or albedos; 0: none",
                 {.unit = "mean square of the target"});
     inner.value(
         "bending", field::non_negative(spec.bending),
-        "of vertices, for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
+        "for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
         "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
         {.only = of({vertices})});
     inner.value("evidence", field::boolean(spec.evidence),
-                "of counts, in a run in levels: each finer level multiplies the weight of bending, or without "
-                "bending that of slopes, by what makes the data of the one before most probable");
+                "for counts, in a run in levels: each finer level takes the weight of bending (without bending, that of slopes) that "
+                "makes the data of the level before most probable");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}), .unset = spec.diffusion == 0 && spec.slopes == 0 && spec.bending == 0});
@@ -188,23 +188,23 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "of the first level's triangles; those of each further level have half of it",
                 {.unit = "scene units", .unset = spec.remesh.edge_length == 0, .otherwise = "the mesh as it is"});
     inner.value("coarse_levels", field::integer(spec.remesh.coarse_levels, 1, kMostLevels),
-                "so many levels have the edges of the first one: a surface that has far to go gets there in triangles "
-                "of even size",
+                "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
+                "even size",
                 {.unset = spec.remesh.coarse_levels == 1});
   };
   keys.map(
       "remesh", remesh,
-      "a run in levels: the surface that one has found is cut into finer triangles for the next. One parameter may "
+      "a run in levels: the surface that a level has found gets finer triangles for the next. One parameter may "
       "have it",
       {.only = of({vertices}), .unset = spec.remesh.levels == 0});
   keys.value(
       "prior_width", field::non_negative(spec.prior_width),
       "standard deviation of a normal prior about `initial`, for `loss: {kind: poisson}`. Offsets of single sensor "
-      "points need one: what all of them have in common, distance explains as well; 0: none",
+      "points need one, as depth explains their common part as well; 0: none",
       {.only = of({time_offset}), .unit = own});
   keys.value(
       "initial", folder.values(spec.initial),
-      "where the optimisation starts; of what moves, offsets from the scene file. Backgrounds per sensor point of a "
+      "where the optimisation starts; for motions, offsets from the scene file. Backgrounds per sensor point of a "
       "measurement's counts start at their dark bins unless a list is given",
       {.required = spec.type != background,
        .unit = own,
@@ -216,13 +216,13 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
               .unset = spec.target.empty(),
               .otherwise = "required to render a target"});
   keys.value("lower", folder.values(spec.lower),
-             "bound. Besides, ior stays on its side of 1, emission, intensity and gain above 0, background at 0 or "
-             "above, what else materials have between 0 and 1",
+             "bound. In any case ior stays on its side of 1, emission, intensity and gain above 0, background at 0 or "
+             "above, other quantities of materials between 0 and 1",
              {.unit = own, .unset = spec.lower.empty()});
-  keys.value("upper", folder.values(spec.upper), "bound. An ior above 1 has none of its own: give one",
+  keys.value("upper", folder.values(spec.upper), "bound. An ior above 1 has no upper bound unless given",
              {.unit = own, .unset = spec.upper.empty()});
   keys.value("scale", field::positive(spec.scale),
-             "what counts as one unit where parameters are compared. Default: 1; of a "
+             "the unit in which optimisers see the parameter. Default: 1; of a "
              "rotation 180 / pi; of an emission, intensity or gain its largest initial component",
              {.unit = own, .unset = spec.scale == 0, .otherwise = "by `type`"});
 }

@@ -113,7 +113,7 @@ struct Experiment {
   std::array<int, 2> resolution{0, 0};
   GateSpec gates;
   EstimatorOptions estimator;
-  /// Of hidden geometry sampling (Shape::hidden), by name; none: those that parameters change.
+  /// The area-sampled shapes (Shape::hidden), by name; none: those that parameters change.
   std::vector<std::string> hidden_shapes;
   Keys::Places estimator_keys;  ///< where the file has them
   bool guiding = true;          ///< of the visibility term; see Problem::estimator

@@ -42,7 +42,7 @@ struct OptimizerSpec {
 
   /// Converged once the loss has settled over so many iterations (safeguard.h); 0: never. Unless given: 5 where an iteration
   /// solves the problem of its own random numbers, so that of ten without a visible fall none found more than noise. Steps of
-  /// adam are small: 50, of which the mean gradient must be noise, too, as losses can lie on a plateau.
+  /// adam are small: 50, over which the mean gradient must be noise, too, as losses can lie on a plateau.
   int window() const {
     constexpr int kSolvingWindow = 5, kSteppingWindow = 50;
     if (stop_window != kStopOfMethod) return stop_window;
@@ -54,7 +54,7 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   const auto of = [&](OptimizerMethod method) { return only(optimizer.method, {method}); };
   keys.value("method", field::choice(optimizer.method), "how the unknowns are found");
   keys.value("learning_rate", field::positive(optimizer.learning_rate),
-             "adam: largest step of an iteration, about; lbfgs: first trial step; halved whenever the loss rises",
+             "adam: about the largest step of an iteration; lbfgs: first trial step; halved whenever the loss rises",
              {.unit = "the parameter's `scale`"});
   keys.value("iterations", field::integer(optimizer.iterations, 0, kMostIterations), "at most");
   keys.value("tolerance", field::non_negative(optimizer.tolerance),
@@ -73,9 +73,9 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   const auto halving = [&](Keys& inner) {
     inner.value("half_life", field::positive(decay.half_life), "iterations after which steps are half as long",
                 {.required = true});
-    inner.value("start", field::integer(decay.start, 0, kMostIterations), "the iteration that it begins with");
+    inner.value("start", field::integer(decay.start, 0, kMostIterations), "the iteration at which it begins");
   };
-  keys.map("decay", halving, "steps shrink, so that the noise that they carry averages out",
+  keys.map("decay", halving, "steps shrink, so that their noise averages out",
            {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
   keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
              "line searches of an iteration, all on the same random numbers",

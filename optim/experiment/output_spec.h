@@ -22,12 +22,12 @@ inline void describe(Keys& keys, OutputSpec& output) {
   formats.emplace_back("none", "no meshes");
   const auto choose = [&output, formats](int i) { output.geometry = formats[i].first; };
   keys.value("geometry", field::choice(formats, choose, [&output] { return output.geometry; }),
-             "format of the meshes of the shapes that move: initial, final and, where known, target");
-  keys.value("every", field::integer(output.every, 0), "and those of every so many; 0: none", {.unit = "iterations"});
+             "format of the meshes of moving shapes: initial, final and, if known, target");
+  keys.value("every", field::integer(output.every, 0), "also writes them at every so many iterations; 0: none", {.unit = "iterations"});
   keys.value("frames", field::integer(output.frames, 0, 10000),
-             "images over the iterations that DIR/frames keeps for reports, at most (fewer above 64 MB); 0: none");
+             "largest number of images over the iterations in DIR/frames, for reports (fewer above 64 MB); 0: none");
   keys.value("histogram_samples", field::integer(output.histogram_samples, 1, 1 << 30),
-             "of the expected counts of a capture in final.h5, per sensor point");
+             "samples per sensor point for the expected counts of a capture in final.h5");
 }
 
 }  // namespace isochron

@@ -40,8 +40,8 @@ std::unique_ptr<Parameters> bind_parameters(Experiment& experiment, const Scene&
   return std::make_unique<Parameters>(scene, experiment.parameters, length_unit(experiment.gates));
 }
 
-/// How the rays' hierarchy follows the parameters. Making it anew takes about as long as kRaysPerTriangle rays for each
-/// triangle lose by one that is refitted (a ball of 70 000 triangles, 32 x 32 pixels: 0.33 us of one core per triangle, 14 ns
+/// How the rays' hierarchy is updated. Rebuilding it costs as much time as kRaysPerTriangle rays for each triangle lose in a
+/// refitted one (a ball of 70 000 triangles, 32 x 32 pixels: 0.33 us of one core per triangle, 14 ns
 /// per ray); a sample takes about kRaysPerSample.
 CasterUpdate caster_update(const Experiment& experiment, const Scene& scene) {
   constexpr double kRaysPerTriangle = 20, kRaysPerSample = 6;

@@ -101,8 +101,8 @@ class ScaledLoss : public ceres::FirstOrderFunction {
 };
 
 /// L-BFGS of Ceres. One iteration makes up to `inner_iterations` steps, each with a line search (strong Wolfe conditions), all on
-/// the random numbers of that iteration; the pairs that approximate the curvature are gathered anew, since they are of use only
-/// on one and the same function. The point of least loss among all that were tried is kept. Bounds: the loss is evaluated at
+/// the random numbers of that iteration; the pairs that approximate the curvature are gathered again, since they hold only
+/// for one and the same function. The point of least loss among all that were tried is kept. Bounds: the loss is evaluated at
 /// the nearest point within them and is constant beyond. The first trial step of each iteration has the length `first_step`
 /// (largest component, > 0); no unknown moves further than 10 times that in one iteration.
 class Lbfgs : public Optimizer {

@@ -24,7 +24,7 @@ TABLE = """
 PICTURE = """
 From the left: images through four gates (path length at the centre) at the start, halfway, at the end and at the target;
 derivatives by one unknown, red above zero; RMSE. A gate has one exposure in all states. Pictures are of the first seed,
-rendered anew with more pixels and samples than the optimisation takes.
+rendered again with more pixels and samples than the optimisation takes.
 """
 
 

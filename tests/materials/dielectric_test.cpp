@@ -1,4 +1,4 @@
-// The rough dielectric against Walter et al. 2007 written anew with half vectors, Snell's law and Fresnel's equations:
+// The rough dielectric against Walter et al. 2007 written independently with half vectors, Snell's law and Fresnel's equations:
 // values and derivatives on dual numbers in extended precision, energy by quadrature, sampling by chi-square.
 #include <ceres/jet.h>
 #include <gtest/gtest.h>

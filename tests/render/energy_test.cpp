@@ -79,7 +79,7 @@ std::vector<Sampling> samplings(const PlainGate& gate) {
   return {Sampling::standard, Sampling::ellipsoidal};
 }
 
-/// The camera's mapping written anew: direction (not unit) through image coordinates in pixels.
+/// The camera's mapping written independently: direction (not unit) through image coordinates in pixels.
 struct PlainCamera {
   Vec3 position, forward, right, up;
   double size;

@@ -1,4 +1,4 @@
-// The differential of a path against automatic differentiation (ceres::Jet) of ln F and l written anew from
+// The differential of a path against automatic differentiation (ceres::Jet) of ln F and l written independently from
 // theory section 2: as functions of all vertices, albedos, roughnesses and radiances, one degree of freedom
 // at a time.
 #include "core/paths/path_differential.h"

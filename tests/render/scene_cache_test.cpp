@@ -1,4 +1,4 @@
-// Scenes kept from one evaluation to the next: the same bits as scenes made anew, whatever was rendered in between, and work
+// Scenes kept from one evaluation to the next: the same bits as rebuilt scenes, whatever was rendered in between, and work
 // only for what has moved.
 #include "core/render/scene_cache.h"
 
@@ -87,7 +87,7 @@ TEST(KeptAndRefitted, DoesNotDependOnWhatCameBefore) {
       SceneCache fresh(scene, CasterUpdate::refit);
       const auto kept = everything(Renderer(moved, gates, options, &basis, &cache), moved, gates);
       EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis, &fresh), moved, gates));
-      // Rays meet the same triangles as those of a hierarchy made anew.
+      // Rays meet the same triangles as those of a rebuilt hierarchy.
       EXPECT_EQ(kept, everything(Renderer(moved, gates, options, &basis), moved, gates));
     }
   }

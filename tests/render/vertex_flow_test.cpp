@@ -150,7 +150,7 @@ TEST(VertexFlows, DifferentialOfX1IsThatOfTheFlow) {
   EXPECT_GT(following, 20) << "paths close enough to test anything";
 }
 
-/// The flow of a path camera - x1 ... x4 over four triangles, each a body, written anew from the header of VertexFlows.
+/// The flow of a path camera - x1 ... x4 over four triangles, each a body, written independently from the header of VertexFlows.
 struct FlowingPath {
   const Scene& scene;
   const CameraModel& camera;

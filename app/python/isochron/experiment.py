@@ -159,15 +159,15 @@ class Scaled:
 
 
 class Experiment:
-    """An experiment's file made ready: scene, gates, parameters, samples.
+    """An experiment, loaded: scene, gates, parameters, samples.
 
     overrides: values in place of the file's, {"samples.primal": 16, "parameters[0].initial": 0.2} (None removes a key), or
-    a list of "KEY.PATH=VALUE", as the option --set of the commands.
+    a list of "KEY.PATH=VALUE", like the option --set of the commands.
 
     Wherever `theta` is asked for: an array [unknown] in the order of `parameters`, a dictionary from names to values (those
-    that are not named have their initial values), or None: the initial values. Random numbers follow from `seed` and
-    `iteration` alone, the number of threads does not matter. Give each iteration of an optimisation another `iteration`;
-    with another `seed`, automatic sampling is settled anew, which takes time.
+    that are not named have their initial values), or None: the initial values. Random numbers depend only on `seed` and
+    `iteration`, not on the number of threads. Give each iteration of an optimisation another `iteration`;
+    with another `seed`, automatic sampling repeats its trials, which takes time.
 
     Calls render without Python's lock. Ctrl-C ends them. Raises InputError.
     """

@@ -16,7 +16,7 @@ void describe(Keys& keys, PointLight& light, bool& grey) {
   const Only spot{light.kind == Kind::spot, "spot", "point"};
   keys.value("direction", unit_direction(light.direction), "the middle of the cone", {.required = true, .only = spot});
   keys.value("cone", field::number(light.cone, {.low = 0, .high = 180, .low_open = true}),
-             "from the direction to where it is dark", {.only = spot, .unit = "degrees"});
+             "angle from the direction to the edge, where it is dark", {.only = spot, .unit = "degrees"});
   keys.value("blend", field::number(light.blend, {.low = 0, .high = 1, .low_open = true}),
              "the outer part of the cone over which it fades, by smoothstep in the angle", {.only = spot});
   const auto shines = [&light](const YamlValue& value) {

@@ -9,7 +9,7 @@ class Diffuse final : public Bsdf {
   std::unique_ptr<Bsdf> clone() const override { return std::make_unique<Diffuse>(*this); }
 
   void describe(Keys& keys, bool& grey) override {
-    keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey), "share of the light that is reflected",
+    keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey), "fraction of light that is reflected",
                {.required = true});
     describe_two_sided(keys);
   }

@@ -37,13 +37,13 @@ class Plastic final : public Bsdf {
   void describe(Keys& keys, bool& grey) override {
     const auto follow = [this](const YamlValue&) { numbers_changed(); };
     keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey),
-               "share that the base reflects diffusely", {.required = true});
+               "fraction of light that the base reflects diffusely", {.required = true});
     keys.value("roughness", field::number(alpha_, {.low = 0, .high = 1, .low_open = true}), "alpha of GGX, of the coat",
                {.required = true});
     keys.value("ior", field::checked(field::number(ior_, {.low = 1, .low_open = true}), follow),
                "index of refraction of the coat");
     keys.value("reflectance", field::color(reflectance_, NumberRange::closed(0, 1), grey),
-               "what the coat's reflection is multiplied with");
+               "factor on the coat's reflection");
     describe_two_sided(keys);
   }
   std::vector<Quantity> quantities() override {

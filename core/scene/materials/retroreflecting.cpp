@@ -15,16 +15,16 @@ class Retroreflecting final : public Bsdf {
   std::unique_ptr<Bsdf> clone() const override { return std::make_unique<Retroreflecting>(*this); }
 
   void describe(Keys& keys, bool& grey) override {
-    keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey), "share that is scattered diffusely",
+    keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey), "fraction of light that is scattered diffusely",
                {.required = true});
     const auto check_energy = [this](const YamlValue& value) {
       if ((albedo_ + reflectance_).max() > 1)
         value.fail("albedo and reflectance make more than 1 together", "a sum of at most 1");
     };
     keys.value("reflectance", field::checked(field::color(reflectance_, NumberRange::closed(0, 1), grey), check_energy),
-               "share that goes back the way it came", {.required = true});
+               "fraction of light that returns the way it came", {.required = true});
     keys.value("roughness", field::number(alpha_, {.low = 0, .high = 1, .low_open = true}),
-               "alpha of GGX: how far around it", {.required = true});
+               "alpha of GGX: width of the returning lobe", {.required = true});
     describe_two_sided(keys);
   }
   std::vector<Quantity> quantities() override {

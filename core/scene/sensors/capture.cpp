@@ -132,11 +132,11 @@ void describe(Keys& keys, Capture& capture) {
   };
   const bool from_file = keys.value(
       "file", {"file", "relative to the scene file", read_file, [&] { return yaml_text(capture.file); }},
-      "HDF5 file of a measurement, whose geometry it is, in metres; in place of all other keys", {.unset = true});
+      "HDF5 file of a measurement whose geometry is taken, in metres; in place of all other keys", {.unset = true});
   const Only in_place{!from_file, "captures without a file", "`file`"};
   keys.map("sensor", [&](Keys& inner) { sensor.describe(inner); }, "the points of the wall that are looked at",
            {.required = true, .only = in_place});
-  keys.value("normal", unit_direction(normal), "of the wall, towards what is hidden",
+  keys.value("normal", unit_direction(normal), "of the wall, towards the hidden scene",
              {.required = true, .only = in_place});
   keys.value("laser", laser(spots), "where the wall is lit", {.only = in_place});
   const auto stands = [&](Keys& inner) {
@@ -145,7 +145,7 @@ void describe(Keys& keys, Capture& capture) {
     inner.value("sensor", field::vec3(origin.sensor), "where the detector stands",
                 {.required = true, .unit = "scene units"});
   };
-  keys.map("origin", stands, "so that the ways from the laser to the wall and from there to the detector count, too",
+  keys.map("origin", stands, "if given, path lengths include the ways from the laser to the wall and from the wall to the detector",
            {.only = in_place, .otherwise = "paths begin and end at the wall"});
   keys.check([&](const YamlValue& value) {
     if (!capture.file.empty()) return;
