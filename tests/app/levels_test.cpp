@@ -101,7 +101,7 @@ TEST_F(LevelsProgram, PageAndPlotsShowTheLastLevel) {
   EXPECT_EQ(run({"report", folder_.file("out")}).status, 0);
   EXPECT_EQ(run({"plot", folder_.file("out")}).status, 0);
   const std::string page = folder_.read("out/report.html");
-  EXPECT_NE(page.find("Levels, of which the page shows the last"), std::string::npos);
+  EXPECT_NE(page.find("Levels; the page shows the last one"), std::string::npos);
   EXPECT_EQ(page.find("left out"), std::string::npos);
   EXPECT_TRUE(folder_.has("out/final.png"));
   EXPECT_TRUE(folder_.has("out/rmse.png"));

@@ -67,7 +67,7 @@ class ReportTest(unittest.TestCase):
         page = self.page()
         self.assertEqual([words for level, words in page.headings if level == 2],
                          ["How it ended", "Parameters", "Convergence", "Images over the iterations", "Geometry",
-                          "What was asked", "Cost and versions"])
+                          "The experiment", "Cost and versions"])
         for words in ("All 20 iterations done", "translation of box", "albedo of white", "25 MB", "1e+06",
                       "scatter of the parameter", "as it was written", "gaussian"):
             self.assertIn(words, page.words)
@@ -140,7 +140,7 @@ class ReportTest(unittest.TestCase):
             fcntl.flock(lock, fcntl.LOCK_EX)
             page = self.page()
         self.assertIn("Still going: iteration 8 of 20", page.words)
-        self.assertEqual(page.headings[1], (2, "Where it stands"))
+        self.assertEqual(page.headings[1], (2, "So far"))
         self.assertIn("now", [data for tag, data in page.texts if tag == "th"])
         self.assertIn("0.05", page.words)  # the checkpoint's
         self.assertEqual(self.viewers()[0]["steps"][-1], "iteration 8")
@@ -166,7 +166,7 @@ class ReportTest(unittest.TestCase):
                           "  colour:\n    upper: {bound: 1, count: 2, first: [0, 2]}\n")
             summary.write("fit: {deviance: 1234.5, degrees_of_freedom: 1000, floor: 1100, p_value: 0.001, verdict: unexplained}\n")
         words = self.page().words
-        self.assertIn("The fit does not explain the data: deviance 1234.5, to be expected 1100, p = 0.001.", words)
+        self.assertIn("The fit does not explain the data: deviance 1234.5, expected 1100, p = 0.001.", words)
         self.assertIn("height ended at its lower bound −0.5", words)
         self.assertIn("colour: 2 of 3 ended at their upper bound 1 (0, 2)", words)
 
@@ -256,10 +256,10 @@ class ReportTest(unittest.TestCase):
         page = self.page()
         self.assertEqual([words for level, words in page.headings if level == 2][:4],
                          ["How it ended", "The surface", "Geometry", "Parameters"])
-        for words in ("The fit explains the data: deviance 1234.5", "Levels, of which the page shows the last",
-                      "Begun from back projection, significant by 41.8 standard deviations of the counts' noise, which took 2.5 s.",
+        for words in ("The fit explains the data: deviance 1234.5", "Levels; the page shows the last one",
+                      "Started from back projection, significant by 41.8 standard deviations of the counts' noise, which took 2.5 s.",
                       "Seen from the wall: depth, albedo and standard error of the surface, and depth and albedo by back-projection, "
-                      "which it was begun from."):
+                      "the start of the fit."):
             self.assertIn(words, page.words)
         switches = page.all("input", type="radio", name="layer")
         self.assertEqual([(s["value"], "checked" in s) for s in switches], [("shape", False), ("albedo", True), ("uncertainty", False)])
@@ -288,7 +288,7 @@ class ReportTest(unittest.TestCase):
         self.edit("levels/1/summary.yaml", "status: interrupted", "status: iterations_reached")
         (self.folder / "geometry/final_surface.ply").unlink()
         page = self.page()
-        self.assertIn("Seen from the wall: depth and albedo by back-projection, which it was begun from.", page.words)
+        self.assertIn("Seen from the wall: depth and albedo by back-projection, the start of the fit.", page.words)
         self.assertEqual(page.all("input", type="radio"), [])
         self.assertEqual(self.view()["names"], {"initial": "initial", "current": "final", "target": "target"})
         (self.folder / "back_projection.ply").write_bytes(b"ply")

@@ -1,4 +1,4 @@
-"""What was found, as who stands at the wall sees it: albedo, depth and the data's back-projection; and a box of numbers."""
+"""The result as seen from the wall: albedo, depth and the data's back-projection; and a box of numbers."""
 
 import matplotlib
 import matplotlib.patheffects

@@ -86,7 +86,7 @@ def fitted(run):
 
 
 def views(capture, chosen):
-    """What was found as who stands at the wall sees it, and the data's back-projection."""
+    """The result as seen from the wall, and the data's back-projection."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -102,7 +102,7 @@ def views(capture, chosen):
     alt = "Seen from the wall: albedo and depth where they are unknowns, and the filtered back-projection of the counts"
     picture = element("figure", element("img", src=uri, alt=alt, class_="paper"), element("figcaption", alt + "."),
                       class_="card wide")
-    return join([element("h3", "What was found"), picture, element("div", *boxes(lines), class_="boxes")])
+    return join([element("h3", "Result"), picture, element("div", *boxes(lines), class_="boxes")])
 
 
 def boxes(lines):

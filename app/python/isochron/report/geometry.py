@@ -209,7 +209,7 @@ def geometry_section(run):
         words = f"The surface and the wall, from behind the wall: {', '.join(names.values())}, side by side."
     canvas = element("canvas", words, id="view", width="1200", height="440", tabindex="0", role="img", aria_label=words,
                      aria_describedby="view-keys")
-    keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: as at first.", class_="note",
+    keys = element("p", "Drag, or arrow keys: turn. + and −: nearer and farther. Home: initial view.", class_="note",
                    id="view-keys")
     notes = [f"{name}: drawn coarser than it is" for name in geometry.coarse]
     notes += geometry.notes

@@ -16,7 +16,7 @@ def resource(name):
     return Markup((importlib.resources.files("isochron.report") / name).read_text(encoding="utf-8"))
 
 
-TITLES = {"asked": "What was asked", "ended": "How it ended", "stands": "Where it stands", "surface": "The surface", "parameters": "Parameters",
+TITLES = {"asked": "The experiment", "ended": "How it ended", "stands": "So far", "surface": "The surface", "parameters": "Parameters",
           "convergence": "Convergence", "capture": "The capture", "images": "Images", "geometry": "Geometry",
           "derivatives": "Derivatives", "cost": "Cost and versions", "results": "Results",
           "differences": "Settings that differ", "curves": "Curves"}

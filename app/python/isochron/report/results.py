@@ -118,7 +118,7 @@ def joint_notes(run):
     """What the readings determine together only, and what a Newton step would still move."""
     rows = [[name, number(mean, 5), plus_minus(error)] for name, mean, error in run.combinations]
     if rows:
-        yield table(["determined together", "mean", "±"], rows, "What is determined together", "numbers")
+        yield table(["determined together", "mean", "±"], rows, "Determined together", "numbers")
     if run.steps_left:
         yield element("p", "Not at the minimum: a Newton step would move " +
                       ", ".join(f"{name} by {number(step, 3)}" for name, step in run.steps_left) +
@@ -188,7 +188,7 @@ def convergence_section(run):
     charts, noise = [], log.get("loss_noise")
     if "loss" in log:
         charts.append(Chart("loss", "Loss", [Series("", x, log["loss"], band=noise)], "iteration", "loss", log=True,
-                            times=log.get("seconds"), note="Strip: ± its standard error. An estimate without bias, which "
+                            times=log.get("seconds"), note="Strip: ± its standard error. An unbiased estimate, which "
                             "can come out negative; a logarithmic axis has gaps there."))
     if "image_rmse" in log:
         values = np.where(log["image_rmse"] > 0, log["image_rmse"], np.nan)
@@ -198,7 +198,7 @@ def convergence_section(run):
     if errors is not None and np.isfinite(errors).any():
         charts.append(Chart("param", "All parameters against their targets", [Series("", x, errors)], "iteration",
                             "RMSE (units of scale)", log=True, times=log.get("seconds"),
-                            note="For evaluation alone: the optimiser does not see targets of parameters."))
+                            note="For evaluation only: the optimiser does not see targets of parameters."))
     if "gradient_norm" in log:
         charts.append(Chart("gradient", "Gradient of the loss", [Series("", x, log["gradient_norm"])], "iteration",
                             "norm", log=True, times=log.get("seconds")))
@@ -263,7 +263,7 @@ def start(run):
         return ""
     method = str(found.get("method", "unknown")).replace("_", " ")
     spent, significance = (as_numbers(found.get(key)) for key in ("seconds", "significance"))
-    words = [f"Begun from {method}"]
+    words = [f"Started from {method}"]
     if significance is not None:
         words.append(f"significant by {number(significance[0], 3)} standard deviations of the counts' noise")
     if spent is not None:
@@ -272,7 +272,7 @@ def start(run):
 
 
 def levels(run):
-    """What the levels of a run came to, of which the page shows the last."""
+    """The results of a run's levels; the page shows the last one."""
     if not run.levels:
         return ""
     keys = ("edge_length", "vertices", "iterations", "loss", "seconds", "status")
@@ -281,7 +281,7 @@ def levels(run):
         return number(value) if isinstance(value, float) else "–" if value is None else str(value).replace("_", " ")
 
     rows = [[str(i + 1), *(shown(level.get(key)) for key in keys)] for i, level in enumerate(run.levels)]
-    return table(["level", *(key.replace("_", " ") for key in keys)], rows, "Levels, of which the page shows the last",
+    return table(["level", *(key.replace("_", " ") for key in keys)], rows, "Levels; the page shows the last one",
                  "numbers")
 
 
@@ -290,11 +290,11 @@ FIT = {"explained": "The fit explains the data", "unexplained": "The fit does no
 
 
 def fit(run):
-    """Whether the counts are explained, with the numbers behind it."""
+    """The verdict on the fit, with its numbers."""
     found = None if run.going else run.whole.get("fit") or run.summary.get("fit")
     if not isinstance(found, dict) or found.get("verdict") not in FIT:
         return ""
-    return element("p", f"{FIT[found['verdict']]}: deviance {number(found['deviance'], 6)}, to be expected "
+    return element("p", f"{FIT[found['verdict']]}: deviance {number(found['deviance'], 6)}, expected "
                    f"{number(found['floor'], 6)}, p = {number(found['p_value'], 2)}.", class_="fit")
 
 
@@ -317,4 +317,4 @@ def notes(run):
     if not run.notes:
         return ""
     lines = (element("li", note) for note in run.notes)
-    return element("div", element("p", "What could not be read:"), element("ul", *lines), class_="warning", role="note")
+    return element("div", element("p", "Could not be read:"), element("ul", *lines), class_="warning", role="note")

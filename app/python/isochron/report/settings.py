@@ -1,4 +1,4 @@
-"""What was asked, and what it cost: the experiment in a table and as text, times, rays, memory, versions."""
+"""The experiment in a table and as text, and its cost: times, rays, memory, versions."""
 
 import datetime
 import platform
@@ -51,9 +51,9 @@ def asked_section(run):
         rest = {k: v for k, v in p.spec.items() if k not in ("name", "type")}
         rows.append((f"parameter {p.name}", f"{p.kind}: {short(rest)}"))
     original = run.read(lambda path: path.read_text(encoding="utf-8"), "inputs/experiment.yaml")
-    return section("asked", "What was asked", table(["key", "value"], rows, "The experiment", "asked") if rows else None,
+    return section("asked", "The experiment", table(["key", "value"], rows, "The experiment", "asked") if rows else None,
                    text_of("The experiment, resolved: experiment.yaml", run.text),
-                   text_of("As it was written: inputs/experiment.yaml", original))
+                   text_of("The original file: inputs/experiment.yaml", original))
 
 
 def text_of(title, text):

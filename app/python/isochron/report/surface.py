@@ -31,7 +31,7 @@ def surface_section(run):
     uri = figure_uri(figure)
     plt.close(figure)
     of_fit = f"depth, albedo{' and standard error' if found.fit.errors is not None else ''} of the surface, and " if found.fit else ""
-    words = f"Seen from the wall: {of_fit}depth and albedo by back-projection, which it was begun from."
+    words = f"Seen from the wall: {of_fit}depth and albedo by back-projection, the start of the fit."
     picture = element("figure", element("img", src=uri, alt=words, class_="paper"), element("figcaption", words), class_="card wide")
     return section("surface", "The surface", picture)
 
