@@ -39,7 +39,7 @@ void warn(const std::string& text);
 /// The -o folder or runs/NAME followed by `suffix`.
 std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix = "");
 
-/// --parameter, of the commands that can look at one parameter alone.
+/// --parameter, of the commands that can be restricted to one parameter.
 void add_parameter_option(CLI::App& command, std::string& name);
 /// Unknowns [begin, begin + count) that --parameter names; all for an empty name. Throws InputError.
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name);

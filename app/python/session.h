@@ -1,4 +1,4 @@
-// An experiment made ready, and what Python asks of it. All functions must hold the interpreter's lock, and release it while
+// A loaded experiment, and the functions that Python calls. All functions must hold the interpreter's lock, and release it while
 // they work.
 #pragma once
 #include <pybind11/pybind11.h>
@@ -51,7 +51,7 @@ class Session {
   void require_renderable(const std::vector<double>& theta) const;
   /// Throws InputError where a parameter lacks the target value that a target is rendered with.
   void require_target() const;
-  /// What optimisations aim at, computed when first asked for. For tasks of run_work alone, which take turns.
+  /// The target of optimisations, computed when first asked for. Only for tasks of run_work, which take turns.
   std::shared_ptr<const GatedImage> shared_target();
   /// Sets samples, seed and how many evaluations they are for.
   void choose(Samples samples, Seed seed, int evaluations);

@@ -95,7 +95,7 @@ Field choice(E& variable) {
 /// The word that says of which kind a map is; choose(kind) receives it, `chosen` is written.
 Field kind(const std::vector<KindName>& kinds, std::function<void(const std::string&)> choose,
            const std::string& chosen);
-/// The field with a check, or whatever else is to be done, after it was read.
+/// The field with a check, or another action, after it was read.
 Field checked(Field field, std::function<void(const YamlValue&)> check);
 
 }  // namespace field

@@ -113,7 +113,7 @@ Sum sum_of_partitions(SharedPartitions& shared, Run&& run) {
     int node = count + partition;
     partial[node] = run(partition);
     for (; node > 1 && tree.is_of_one_rank(node / 2); node /= 2) {
-      if (!half_done[node / 2].exchange(true)) return;  // the other half goes on from here
+      if (!half_done[node / 2].exchange(true)) return;  // the other half continues from here
       Sum &first = partial[node & ~1], &second = partial[node | 1];
       first.add(second);
       second = Sum();

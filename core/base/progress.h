@@ -32,7 +32,7 @@ inline void throw_if_stopped() {
 /// Work of so many equal steps, from construction to destruction. Stages nest: one is a step of the stage around it.
 class ProgressStage {
  public:
-  /// `name` is shown of the outermost stage alone; steps >= 1.
+  /// Only the `name` of the outermost stage is shown; steps >= 1.
   explicit ProgressStage(const std::string& name, int steps);
   ~ProgressStage();
   ProgressStage(const ProgressStage&) = delete;

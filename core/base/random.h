@@ -1,4 +1,4 @@
-// Counter-based random numbers (Philox 4x32-10, Salmon et al. 2011): a number depends on its key and counter alone,
+// Counter-based random numbers (Philox 4x32-10, Salmon et al. 2011): a number depends only on its key and counter,
 // so results do not depend on the order of execution, on threads or on a resume.
 #pragma once
 #include <array>

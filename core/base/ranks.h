@@ -1,5 +1,5 @@
 // Processes that share the work of one command, as mpirun starts them: ranks. All run the same program on the same input and
-// call what is below in the same order; without mpirun there is one, and nothing of it costs anything. Rank 0 alone reads
+// call what is below in the same order; without mpirun there is one, and nothing of it costs anything. Only rank 0 reads
 // what users give, writes files and prints.
 #pragma once
 #include <cstdint>
@@ -51,7 +51,7 @@ struct SharedError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Runs f on rank 0 alone, where what is called from it does not wait for other ranks. An exception that f throws there is
+/// Runs f only on rank 0, where what is called from it does not wait for other ranks. An exception that f throws there is
 /// thrown by all: an InputError, or else a SharedError with its message. After a request to stop the others do nothing.
 void on_first_rank(const std::function<void()>& f);
 /// The same, where f returns something for all.

@@ -46,7 +46,7 @@ class SparseSum {
         for (std::size_t i = block * kBlock; i < std::min(size, (block + 1) * kBlock); ++i) f(i, values_[i]);
   }
 
-  /// Touched blocks alone.
+  /// Only touched blocks.
   void pack(Packer& packer) const {
     packer.put(touched_);
     for (std::size_t block = 0; block < touched_.size(); ++block)

@@ -7,7 +7,7 @@
 
 namespace isochron {
 
-/// A finite number, with a point whatever the locale; what is nearer to 0 than a double can be is 0. Empty where the text
+/// A finite number, with a point in every locale; what is nearer to 0 than a double can be is 0. Empty where the text
 /// is another, or goes on behind it.
 std::optional<double> parse_number(std::string_view text);
 std::optional<long long> parse_integer(std::string_view text);  ///< decimal, likewise

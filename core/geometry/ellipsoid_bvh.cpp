@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Nodes or blocks that a thinned query goes on with: more of them cost time, fewer variance (halving them doubled the
+/// Nodes or blocks that a thinned query continues with: more of them cost time, fewer variance (halving them doubled the
 /// variance on the glossy tree, doubling them gained nothing on 1700 and 70 000 triangles).
 constexpr int kKept = 16;
 

@@ -29,7 +29,7 @@ class EllipsoidBvh {
   /// are not finite are never reported, those without area may be. The order depends on the hierarchy only.
   /// Safe to call from several threads. Returns the nodes and leaves visited: the work done.
   int query(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
-  /// The same for the two ellipsoids of total lengths tau_low and tau_high alone: leaves out nearly all triangles
+  /// The same for the two ellipsoids of total lengths tau_low and tau_high only: leaves out nearly all triangles
   /// strictly between them, of which a fine mesh has many. The others come in the order of `query`.
   int query_surfaces(const Vec3& a, const Vec3& b, double tau_low, double tau_high, std::vector<int>& ids) const;
 
@@ -42,7 +42,7 @@ class EllipsoidBvh {
   };
   /// The triangles of `query_surfaces`, and some that only come close: for callers who look for arcs on each. Of the many
   /// of a fine mesh a random choice of those between the foci's cones: as many as make up a few leaves, at a cost that
-  /// grows with the hierarchy's depth alone. Appends to `ids` and, of the same length, one over each triangle's
+  /// grows only with the hierarchy's depth. Appends to `ids` and, of the same length, one over each triangle's
   /// probability, which favours what is near the foci. `u`: uniform in (0, 1).
   void sample_surfaces(const Focus& a, const Focus& b, double tau_low, double tau_high, double u, std::vector<int>& ids,
                        std::vector<double>& inverse_probability) const;

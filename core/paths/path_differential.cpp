@@ -221,7 +221,7 @@ void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoin
   }
   if (scene.differentiable.gain && !length_only)
     out.scalars.push_back({scene.layout.gain(), -1, 1 / scene.scene.detector.gain});
-  // Where colours differ, what is theirs alone.
+  // Where colours differ: what belongs to single colours.
   thread_local std::array<std::vector<Accumulated>, 3> own;
   bool coloured = false;
   if (!length_only) {

@@ -29,7 +29,7 @@ inline int light_number(int triangle) {
 }
 
 /// What paths ask of a triangle, side by side in memory: two cache lines, the first of which decides where a ray ends and how
-/// it goes on. On a fine mesh each is a wait for main memory.
+/// it continues. On a fine mesh each costs an access to main memory.
 struct alignas(64) TriangleRecord {
   Vec3 normal;  ///< unit; zero when the triangle has no area
   Vec3 origin;  ///< corner 0

@@ -37,14 +37,14 @@ struct Following {
 /// t_k = P_k sum weight (material velocity of the neighbour - base velocity of x_k).
 struct VertexFlow {
   Following before, after;  ///< neighbours on the camera's and on the light's side
-  Following own;            ///< of x1 alone: its own material point
+  Following own;            ///< only of x1: its own material point
   bool follows() const { return before.weight > 0 || after.weight > 0 || own.weight > 0; }
 };
 
 class VertexFlows {
  public:
   explicit VertexFlows(const Scene& scene);
-  /// For the scene as it is made ready but for its flows.
+  /// For a scene that is prepared except for its flows.
   void update(const PreparedScene& scene, const FollowOptions& options);
 
   /// Of a segment between neighbours x_k and x_(k+1): how either would follow the other, were there no further ones.

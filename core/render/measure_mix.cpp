@@ -154,7 +154,7 @@ struct Trial {
     const double budget = kTrialPart * pixels_of(scene) * job - 3 * kSamplesPerTriangle * triangles;
     const double paths = std::min(kPaths, budget / 3);
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
-    // At least what lets the smallest batches have a sample by connections alone.
+    // At least so many that the smallest batches have a sample of pure connections.
     const double per_pixel = kFewestBatches * kSamples[0] / kSamples[2];
     if (!(paths >= fewest * per_pixel)) return by_width;
     const Scene small = reduced(scene, std::clamp<double>(paths / per_pixel, fewest, kPixels));
@@ -225,7 +225,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   best.image = choose(kImage, by_width.image, job.image, nullptr, nullptr);
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
-  // Paths of more bounces are found by walks alone, and what rare ones carry a trial cannot tell.
+  // Only walks find paths of more bounces, and a trial cannot judge rare ones.
   const bool has_rates = options.max_bounces == 1;
   const Term interior = Term::interior;
   best.interior = choose(kInterior, by_width.interior, has_rates ? job.interior / 2 : job.interior, &one, &interior);

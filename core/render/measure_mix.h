@@ -21,7 +21,7 @@ struct Job {
 
 /// The mix of techniques with the least variance x work, found by rendering small images (at most 4096
 /// pixels, some hundred thousand paths each), and, where `basis` has columns, the interior term of the derivative
-/// along a random combination of them. Depends on the arguments alone. For gradients, variance is that of
+/// along a random combination of them. Depends only on the arguments. For gradients, variance is that of
 /// sums over blocks of a quarter of the image's width. Gates much wider or narrower than where the techniques
 /// cross need no trial; other sampling than automatic none either. Where connections find all of a term and paths
 /// bounce once, so that each technique could find them all, rates are chosen by a trial of that term's derivative.

@@ -8,7 +8,7 @@
 
 namespace isochron {
 
-/// What renderers do, in the order in which they do it: the scene made ready, images, and the terms of the derivative, of
+/// What renderers do, in this order: preparing the scene, images, and the terms of the derivative, of
 /// which the visibility term needs the edges to be found and learned about.
 enum class PassKind { scene, primal, interior, edges, visibility, path_length };
 inline constexpr std::array kPassKinds = {PassKind::scene, PassKind::primal,     PassKind::interior,

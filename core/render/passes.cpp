@@ -46,7 +46,7 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
 }
 
 int Passes::partitions_for(SampleRange range, std::size_t values) const {
-  // Of a small image always the fewest, so that a derivative has the same bits alone and among others.
+  // A small image always gets the fewest, so that a derivative has the same bits whether rendered singly or among others.
   const unsigned blocks = Partition::blocks(scene.camera.pixels());
   const int most = std::max(kFewestPartitions, static_cast<int>(std::bit_ceil(blocks)));
   return std::min(most, partition_count(double{1} * scene.camera.pixels() * range.count(), values));

@@ -44,7 +44,7 @@ struct Pass {
   SampleRange range;
 };
 
-/// The passes of a scene made ready for rendering. Safe to share between threads.
+/// The passes over a prepared scene. Safe to share between threads.
 class Passes {
  public:
   /// `basis` says what moves; null or empty: nothing does. What this refers to must outlive it.
@@ -128,7 +128,7 @@ class Passes {
   double pair_coupling_gain_ = 1;
   mutable std::atomic<long long> rays_{0}, arcs_{0};
   mutable std::once_flag learned_;
-  mutable std::optional<BoundaryGuide> guide_;  ///< of the visibility term alone
+  mutable std::optional<BoundaryGuide> guide_;  ///< only of the visibility term
 };
 
 }  // namespace isochron

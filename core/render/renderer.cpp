@@ -27,7 +27,7 @@ struct Renderer::Impl : Passes {
   /// Whether there are enough of them for partitions that have their pixels for themselves.
   bool has_many_pixels() const { return Partition::blocks(scene.pixels()) >= kFewestPartitions; }
 
-  /// run(partition) of every partition, whose samples add to pixels of its own alone, and so need no sums.
+  /// run(partition) of every partition, whose samples add only to pixels of its own, and so need no sums.
   template <class Run>
   void run_in_pixels(PassKind kind, std::span<GatedImage> images, Run&& run) const {
     const int count = Partition{0, kMostPartitions}.pixel_parts(scene.pixels());
@@ -239,7 +239,7 @@ ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange rang
     impl.run_images({stream, range}, {partition, partitions}, sink);
     return own;
   });
-  blank.add(sum);  // from another rank come the numbers alone
+  blank.add(sum);  // only the numbers come from another rank
   return blank;
 }
 

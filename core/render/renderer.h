@@ -18,7 +18,7 @@ class SceneCache;
 /// Of a gradient, see Renderer::add_gradient.
 inline constexpr int kGradientParts = 32;
 
-/// A scene made ready for rendering at one value of the parameters. Immutable; safe to share between threads.
+/// A prepared scene at one value of the parameters. Immutable; safe to share between threads.
 class Renderer {
  public:
   /// `basis` says what moves (derivatives skip all else); null or empty: nothing does, only `render` makes sense.
@@ -50,7 +50,7 @@ class Renderer {
                                        SampleRange range) const;
 
   /// Whether values of different pixels, in images and in a term of the derivative, are independent: every sample adds to
-  /// its own pixel alone and shares no random numbers with those of others.
+  /// only its own pixel and shares no random numbers with those of others.
   bool pixels_are_independent() const;
   bool pixels_are_independent(Term term) const;
 

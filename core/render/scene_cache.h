@@ -1,4 +1,4 @@
-// Scenes made ready for rendering, kept from one evaluation to the next, so that each pays for what has changed alone.
+// Prepared scenes, kept from one evaluation to the next, so that each pays only for what has changed.
 #pragma once
 #include <atomic>
 #include <map>
@@ -27,7 +27,7 @@ class SceneCache {
   /// Of scenes that have the topology of `at_first`, which must outlive this. `update`: of the rays' hierarchy.
   SceneCache(const Scene& at_first, CasterUpdate update) : at_first_(at_first), update_(update) {}
 
-  /// The scene made ready, for the caller alone until the pointer is gone. The same bits whatever was taken before.
+  /// The prepared scene, exclusively for the caller as long as the pointer lives. The bits do not depend on earlier calls.
   std::shared_ptr<ReadyScene> take(const Scene& scene, const TangentBasis* basis, const FollowOptions& follow);
   const Scene& at_first() const { return at_first_; }
 

@@ -37,7 +37,7 @@ struct Edge {
 /// The vertices of a mesh file, where they are not one by one those of the shape: some have no face, or lie at one position.
 struct FileVertices {
   std::vector<int> vertex;  ///< of the shape, for each of the file; -1: without a face
-  std::vector<Vec3> loose;  ///< where those are, in their order; they stay whatever moves
+  std::vector<Vec3> loose;  ///< where those are, in their order; they never move
 };
 
 /// Whether a face that has both vertices goes on from the first to the second. Of two faces with one outside, one does.

@@ -12,7 +12,7 @@ namespace isochron {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-/// Faces whose planes differ by more are not compared: they have a common area, as close as that, on the least of scales alone.
+/// Faces whose planes differ by more are not compared: such close faces share an area only at the smallest scales.
 constexpr double kMostTilt = 1e-3;
 
 using Corners = std::array<Vec3, 3>;

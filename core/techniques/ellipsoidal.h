@@ -4,10 +4,10 @@
 //                  ellipse of total length tau;
 //   emitter arcs   the emitter's point itself is put on a circle at the distance that is left.
 // Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
-// that ends outside is found by emitter arcs, whatever it went through before.
+// that ends outside is found by emitter arcs, also if it went through dielectrics before.
 // Every crossing arc is sampled once; only which of them get their visibility tested is a random choice, so the density
 // of a technique is one over the arc's span. (The choice by contribution evaluates all arcs and tests as many of them as
-// cost about as much again; the uniform one evaluates and tests one arc alone.)
+// cost about as much again; the uniform one evaluates and tests only one arc.)
 #pragma once
 #include <span>
 #include <vector>
@@ -24,7 +24,7 @@ namespace isochron {
 double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
                          double ArcDensities::*technique, double pdf_on_arc);
 
-/// The same of a path that was gathered for its vertex 0: techniques by arcs alone share it.
+/// The same of a path that was gathered for its vertex 0: only techniques by arcs share it.
 double gathered_weight(const Worker& worker, const Path& path, double ArcDensities::*technique, double pdf_on_arc);
 
 /// Takes the light that EllipsoidalConnections::gather finds.
@@ -68,7 +68,7 @@ class EllipsoidalConnections {
   /// Connections at the path's last vertex and at those of a walk from there.
   void connect_along(int pixel, double scale, int max_bounces, Rng& rng);
 
-  /// Whether a connection of the worker's path to an emitter's triangle may contribute by whatever point on an arc. If not,
+  /// Whether a connection of the worker's path to an emitter's triangle may contribute by any point on an arc. If not,
   /// for neither the path nor the emitter has a gradient, it does so only by points on triangles that move.
   bool any_arc_contributes(int emitter_triangle) const;
 

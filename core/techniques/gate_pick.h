@@ -18,7 +18,7 @@ class GatePick {
 
   /// Every gate alike. `gates` must outlive this.
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
-  /// `lengths`: whether lengths are drawn. Without, rate() alone may be asked for, and no table of the size of an image is made.
+  /// `lengths`: whether lengths are drawn. Without, only rate() may be called, and no table of the size of an image is made.
   GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths = true);
   /// Of the tables that draw lengths, in bytes.
   static double table_bytes(int pixels, int gates) { return sizeof(double) * (pixels + 1.0) * (gates + 1.0); }

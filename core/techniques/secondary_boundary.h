@@ -110,7 +110,7 @@ class SecondaryBoundary {
   /// follow nothing; once with D as x1, once as a material point. False when nothing moves.
   bool differentiate(const Segment& g);
 
-  /// The same on the path of connection c that goes on to `next` (none: triangle -1), with what D and S follow.
+  /// The same on the path of connection c that continues to `next` (none: triangle -1), with what D and S follow.
   const LocalDifferential& with_following(const Segment& g, const Connection& c, const SurfacePoint& next);
 
   /// Of the vertices from x1 to D: the product of the densities per area with which BSDF sampling draws each of them, walking
@@ -148,7 +148,7 @@ class SecondaryBoundary {
   void connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng);
 
   /// Density of the edge point when the length is drawn from the gates, over that of a random one from the camera; S is
-  /// on an emitter. Lengths are drawn for segments outside of dielectrics alone.
+  /// on an emitter. Lengths are drawn only for segments outside of dielectrics.
   double length_over_random(const Segment& g, const Connection& c) const;
 
   /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.

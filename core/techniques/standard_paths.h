@@ -12,7 +12,7 @@ namespace isochron {
 GateWeights standard_weights(const Worker& worker, const Path& path, int pixel, bool pairs);
 
 /// In a scene too large for the caches two paths are under way at a time and take turns: while one's next triangle comes
-/// from main memory, the other goes on.
+/// from main memory, the other continues.
 class StandardPaths {
  public:
   /// `pairs`: see standard_weights.

@@ -35,7 +35,7 @@ class StandardWalk {
         light_is_given_(worker.scene.captures()),
         hidden_share_(hidden_share) {}
 
-  /// At the first surface point, the path's last vertex; next_event_and_sample() goes on.
+  /// At the first surface point, the path's last vertex; next_event_and_sample() continues.
   void begin(Rng& rng) {
     w_o_ = path_.vertex[path_.size() - 2].p - path_.back().p;
     distance_o_ = length(w_o_);
@@ -46,7 +46,7 @@ class StandardWalk {
     pick_light();
     bounce_ = 1;
   }
-  /// At the camera, with a ray through a random point of `pixel`; intersect() goes on.
+  /// At the camera, with a ray through a random point of `pixel`; intersect() continues.
   void begin_at_camera(int pixel, Rng& rng) {
     worker_.start_at_sensor(path_, pixel);
     const Vec3 direction = worker_.direction_through(pixel, rng);
@@ -133,7 +133,7 @@ class StandardWalk {
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
     return hidden == 0 ? pdf_bsdf : worker_.scene.next_vertex_pdf(triangle, hidden, pdf_bsdf);
   }
-  /// Takes the step by area sampling; intersect() goes on. False if the walk ends.
+  /// Takes the step by area sampling; intersect() continues. False if the walk ends.
   bool step_to_hidden(const SurfacePoint& x, Rng& rng) {
     const PreparedScene& scene = worker_.scene;
     double u0 = rng.fine_uniform();

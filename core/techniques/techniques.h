@@ -82,7 +82,7 @@ class Techniques {
   }
 
  private:
-  /// Density per area with which a walk that stands at the path's vertex `from` goes on to q (from the
+  /// Density per area with which a walk at the path's vertex `from` continues to q (from the
   /// camera: by a random point of a random pixel).
   double step_pdf(const Path& path, int from, const SurfacePoint& q) const {
     const SurfacePoint& x = path.vertex[from];

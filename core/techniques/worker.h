@@ -108,7 +108,7 @@ struct Worker {
 
   /// Hands the complete path p to the sink.
   void emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use);
-  /// Hands the change of its length alone to the sink, for one gate: a member of a coupled pair.
+  /// Passes only the change of its length to the sink, for one gate: a member of a coupled pair.
   void emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value);
 
  private:
@@ -126,7 +126,7 @@ inline Rgb bsdf_value(const PreparedScene& scene, const SurfacePoint& x, const D
   return scene.textured(x.triangle) ? f * scene.texture(x) : f;
 }
 
-/// Samples the direction in which a path goes on from x, reached from the direction of the unit vector w_back. `throughput` gets
+/// Samples the direction in which a path continues from x, reached from the direction of the unit vector w_back. `throughput` gets
 /// the BSDF's weight. Empty where the path ends.
 inline std::optional<BsdfSample> sample_bsdf(const PreparedScene& scene, const SurfacePoint& x, const Vec3& w_back,
                                              Rgb& throughput, Rng& rng, TransportMode mode = TransportMode::radiance) {

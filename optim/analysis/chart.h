@@ -30,7 +30,7 @@ struct Reference {
   double error = 0;         ///< standard error of the mean, relative to the gradient's norm
 };
 
-/// Whether the gradient is told apart from zero, and the reference fine enough to judge a bias of `error`:
+/// Whether the gradient is significantly above zero, and the reference precise enough to judge a bias of `error`:
 /// half of it.
 bool resolved(const Reference& reference);
 bool fine_enough(const Reference& reference, double error);

@@ -39,7 +39,7 @@ enum class Finding {
   agrees,
   differs,
   /// The two disagree, but none of the difference's samples changed by more than rounding. With common random numbers that
-  /// happens where all samples missed what changes; their standard error is zero then, whatever they missed.
+  /// happens if all samples missed what changes; their standard error is then zero, however much they missed.
   difference_saw_nothing,
   nothing,  ///< both are zero
 };

@@ -13,7 +13,7 @@ namespace isochron {
 struct GradientCost {
   GradientVariance variance;  ///< in the units of PointInspection::gradient
   PerPass seconds{};          ///< CPU seconds per sample per pixel; 0 of a pass that is not run
-  double overhead = 0;        ///< CPU seconds per evaluation, whatever the samples
+  double overhead = 0;        ///< CPU seconds per evaluation, independent of the samples
   /// Of the gradient's batches, by their squared distances from the mean over all unknowns; for one unknown
   /// that of Statistics. Below kFewestDeviations the variance is not to be trusted.
   double effective_count = std::numeric_limits<double>::infinity();

@@ -43,7 +43,7 @@ std::vector<double> default_steps(const Problem& problem, const std::vector<doub
 /// At most `most` of n unknowns, evenly spread.
 std::vector<int> spread_components(int n, int most);
 
-/// One method made ready on an experiment.
+/// One method, set up for an experiment.
 class MethodRun {
  public:
   /// Throws InputError.

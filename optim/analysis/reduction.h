@@ -42,7 +42,7 @@ class GradientReplicates {
 /// |E d| over |E g|, g the full gradient and d what the reduced one differs by; norms over the columns.
 struct RelativeBias {
   double value = 0, standard_error = 0;
-  /// Two standard errors to either side, of d and of g. Above: infinite where g is not told from zero.
+  /// Two standard errors to either side, of d and of g. Above: infinite where g is not significantly above zero.
   double lower = 0, upper = 0;
 };
 

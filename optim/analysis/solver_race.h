@@ -38,7 +38,7 @@ struct Race {
 /// Throws InputError where target values are unknown or those of the start: no error to follow.
 void require_error(const Problem& problem);
 
-/// Every optimiser (lbfgs with half of learning_rate as its first trial step, diffusion with adam alone), all else as the
+/// Every optimiser (lbfgs with half of learning_rate as its first trial step, diffusion only with adam), all else as the
 /// experiment says. A method that would not fit into memory is left out with a note. Of a problem that passed
 /// require_error.
 Race race_solvers(const Experiment& experiment, const GatedImage& target, const RaceOptions& options);

@@ -1,4 +1,4 @@
-// Linear systems of a matrix that is known by its products alone.
+// Linear systems of a matrix of which only products are available.
 #pragma once
 #include <functional>
 #include <vector>

@@ -62,7 +62,7 @@ bool by_differences(const Problem& problem) {
   return problem.experiment().gradient.method == GradientMethod::finite_difference;
 }
 
-/// `total` alone, of so many images that `difference(stream, range)` makes.
+/// Only `total`, from so many images that `difference(stream, range)` makes.
 template <class Difference>
 std::vector<DerivativeEstimate> differences(const Problem& problem, int count, std::uint32_t iteration,
                                             const Poll& poll, int most_replicates, Difference&& difference) {

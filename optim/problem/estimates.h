@@ -30,7 +30,7 @@ struct DerivativeEstimate {
 };
 
 /// Derivative images of the unknowns [first, first + count) at theta: `total` first, then the terms with
-/// samples. The finite-difference method gives `total` alone, from samples.primal. Throws InputError when a
+/// samples. The finite-difference method gives only `total`, from samples.primal. Throws InputError when a
 /// term has one sample.
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
                                                      int first, int count, const Poll& poll,

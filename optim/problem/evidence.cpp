@@ -31,7 +31,7 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
     for (const std::vector<double>& sample : samples) trace += penalty.curved(block, sample, scale) / kSamples;
     // What the samples' noise may hide counts as determined, so that the weight stays finite.
     const double determined = std::max(rank - trace, std::sqrt(2 * rank / kSamples));
-    // Nor can a penalty be told from none that is less than what a single unknown's scatter makes, half of a logarithm's unit.
+    // A penalty below that of a single unknown's scatter, half of a logarithm's unit, is not distinguishable from none.
     factors[i] = determined * scale.priors / std::max(2 * value, scale.priors);
   }
   return factors;

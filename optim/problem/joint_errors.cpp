@@ -61,7 +61,7 @@ class Inverse {
   Eigen::VectorXd inverse_width_, values_;
   std::vector<Eigen::VectorXd> gradients_;  ///< without what noise hides
   Eigen::MatrixXd vectors_;
-  Eigen::Index hidden_ = 0;  ///< eigenvalues that cannot be told from zero
+  Eigen::Index hidden_ = 0;  ///< eigenvalues that may be zero
 };
 
 }  // namespace

@@ -70,7 +70,7 @@ struct LossEstimate {
 /// Of images of one shape. All NaN when a reading that counts is not finite, or where the image has a single sample and thus no
 /// halves. Standard errors take the values of one pixel for correlated, as the gates of one path are, and pixels for
 /// independent. The variance of the sum over a pixel is on average the square of its sum of e = rho'(I - T) D / 2, for
-/// normal noise of whatever correlation; few bright samples make that too large. The scatter of the sums over pixels
+/// normal noise of any correlation; few bright samples make that too large. The scatter of the sums over pixels
 /// bounds it, too, being too large by how much the residuals differ between pixels: the smaller of both is taken.
 /// Stated over true: 0.71 to 1.13 at the start and the target of seven scenes, but 2.4 once, where the random numbers of an
 /// image are spread over it, so that errors of pixels cancel, which this does not see.

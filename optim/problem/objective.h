@@ -13,10 +13,10 @@ struct Evaluation {
   /// What is minimised, an estimate that is right on average; so it can lie below 0 where the least possible is 0.
   double loss = 0;
   double loss_noise = 0;  ///< standard error of `loss`, of a single evaluation
-  /// Of the image alone, unbiased as the loss, and its standard error.
+  /// Of the image's mismatch without penalties, unbiased as the loss, and its standard error.
   double mean_squared_error = 0, mean_squared_error_noise = 0;
   std::vector<double> gradient;  ///< of the loss, one entry per unknown
-  /// Of linearise() alone: the Gauss-Newton matrix of the loss, its second derivative where residuals are
+  /// Only from linearise(): the Gauss-Newton matrix of the loss, its second derivative where residuals are
   /// linear; symmetric, row after row. Two estimates from a noisy Jacobian, their difference is its noise:
   /// one from two independent halves of the samples (unbiased, may be indefinite), one from all of them at
   /// once (semidefinite, on average too large).
@@ -29,7 +29,7 @@ struct Coupling {
   double curvature;
 };
 
-/// A loss whose estimates depend on theta and `iteration` alone: equal iterations share their random numbers,
+/// A loss whose estimates depend only on theta and `iteration`: equal iterations share their random numbers,
 /// so that differences between points of one iteration are far less noisy than the loss.
 class Objective {
  public:

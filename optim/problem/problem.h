@@ -1,4 +1,4 @@
-// An experiment made ready: scene, gates and parameters, and what the optimiser asks of them.
+// A loaded experiment: scene, gates and parameters, and the functions that optimisers evaluate.
 #pragma once
 #include <array>
 #include <functional>

@@ -41,7 +41,7 @@ class RenderedCurvature : public CurvatureProducts {
   const Problem& problem_;
   const std::vector<double>& theta_;
   const Poll& poll_;
-  PenaltyScale smoothing_, priors_;  ///< of either part of the penalty alone
+  PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
   Scene scene_;
   TangentBasis basis_;
   std::vector<std::vector<double>> gradients_;

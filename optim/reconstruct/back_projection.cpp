@@ -10,7 +10,7 @@
 namespace isochron {
 namespace {
 
-constexpr int kMargin = 4;  // voxels around what is significant: two lengths that can be told apart
+constexpr int kMargin = 4;  // voxels around significant ones: two resolution lengths
 
 /// Half of the optical path at which most points have the most filtered counts: the distance that resolution is judged at.
 double distance_of_light(const Histograms& histograms, double sigma, const DetectorResponse& response) {

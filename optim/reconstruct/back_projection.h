@@ -30,7 +30,7 @@ struct BackProjection {
   /// surfaces elsewhere adds up to: see surface_threshold.
   double least_significance = 0, least_albedo = 0;
   TimeFilter filter;
-  /// What can be told apart: along the depth, and across it at the distance of the light. Metres. Twice the voxels' sides.
+  /// Resolution along the depth, and across it at the distance of the light. Metres. Twice the voxels' sides.
   double depth_resolution = 0, lateral_resolution = 0;
 
   std::size_t index(std::size_t d, std::size_t u, std::size_t a) const {

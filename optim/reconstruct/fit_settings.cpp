@@ -69,7 +69,7 @@ std::vector<double> by_gate(const GatedImage& image, const Readings& readings) {
 }
 
 /// The multiple of the light that with a background explains the counts best: weighted least squares of the sums, whose variances are
-/// the counts. What is dark cannot be told from counts alone where a response has a long tail. NaN or below zero: none.
+/// the counts. Counts do not tell which bins are dark if a response has a long tail. NaN or below zero: none.
 double multiple_of(const std::vector<double>& light, const std::vector<double>& counts) {
   double weights = 0, x = 0, y = 0, xx = 0, xy = 0;
   for (std::size_t g = 0; g < light.size(); ++g) {

@@ -6,7 +6,7 @@
 // - It does not move far from where a level began: offsets of neighbours differ by a sixteenth of their distance.
 // - Albedos differ little, by 0.03 across the surface. One that falls off freely imitates a border that is elsewhere, and tilts
 //   the surface to do so.
-// - Gain and albedo are known as a product alone: the gain is that of a start with an albedo of a half.
+// - Only the product of gain and albedo is known: the gain is that of a start with an albedo of a half.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -27,7 +27,7 @@ struct ReconstructionSpec {
 /// What a run of that begins with.
 struct Reconstruction {
   bool has_signal = false;
-  /// Of a surface as large as what can be told apart, in all histograms, to be found in the background that there is.
+  /// Photons in all histograms from the weakest surface of the size of a resolution cell that is significant above the background.
   double photons_needed = 0;
   /// By name, beside what the run writes: scene.yaml, start.ply, back_projection.ply, start.yaml (RunOptions::files).
   std::map<std::string, std::string> files;

@@ -25,7 +25,7 @@ struct TimeFilter {
 TimeFilter time_filter(double sigma, const DetectorResponse& response, double bin);
 
 /// Filtered counts and the variances that they have by the counts' own Poisson variance, ready to be interpolated linearly. (The
-/// variance of an interpolated sum is no larger than that.) Nothing is said of times within two sigma of the first and last bin, where
+/// variance of an interpolated sum is no larger than that.) There is no value at times within two sigma of the first and last bin, where
 /// the filter's positive part would not be whole.
 class FilteredHistograms {
  public:
@@ -39,7 +39,7 @@ class FilteredHistograms {
   const Entry* row(std::size_t i) const { return &values_[i * stride()]; }
   int steps() const { return std::max(0, entries_ - 1); }
   int first() const { return first_; }  ///< bin of the first entry
-  /// Bins at either end of which nothing is said.
+  /// Bins at either end for which the filter has no value.
   static int margin(double sigma, double bin);
 
  private:

@@ -7,8 +7,8 @@
 namespace isochron {
 
 /// Keeps the images of every iteration that a stride divides. The stride is the least power of two under which the iterations
-/// so far leave no more than `most`, so that it doubles as the run goes on and every other frame is removed then. Which frames
-/// there are depends on the iteration alone: a resumed run has those of an uninterrupted one.
+/// so far leave no more than `most`, so that it doubles as the run continues and every other frame is removed then. Which frames
+/// there are depends only on the iteration: a resumed run has those of an uninterrupted one.
 class Frames {
  public:
   /// Of `image`'s size fewer than `most` are kept where they would take more than 64 MB. 0: none.

@@ -23,7 +23,7 @@ std::vector<FileCopy> collect_inputs(const Experiment& experiment);
 void write_inputs(const std::string& folder, const std::vector<FileCopy>& inputs, Experiment& experiment);
 
 /// Throws InputError when a copy has changed since the run began. Where an original has, `warning` receives one line: the
-/// run goes on with the copies. Originals that are no longer there are passed over.
+/// run continues with the copies. Originals that are no longer there are passed over.
 void check_inputs(const std::string& folder, const std::function<void(const std::string&)>& warning);
 
 }  // namespace isochron

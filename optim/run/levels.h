@@ -10,8 +10,8 @@
 //   DIR/log.csv                                 of all levels that have ended, iterations and seconds counted through
 //   DIR/summary.yaml                            of that level, and `levels`, a line for each, also of one under way
 //
-// A level is made of files of the one before alone, its experiment.yaml last. So a run that was killed, within a level or between
-// two, goes on where it was, to the same bits.
+// A level is made only from files of the one before, its experiment.yaml last. So a run that was killed, within a level or between
+// two, continues where it was, to the same bits.
 #pragma once
 #include <functional>
 #include <string>
@@ -37,7 +37,7 @@ void require_levels(const Problem& problem);
 /// Of a run's folder: that of the last level there is, or itself where there is none.
 std::string last_level_folder(const std::string& folder);
 
-/// Begins or goes on. `run_level` runs what its options' folder holds.
+/// Begins or continues. `run_level` runs what its options' folder holds.
 RunStatus run_levels(const Experiment& experiment, const RunOptions& options,
                      const std::function<RunStatus(const RunOptions&)>& run_level);
 

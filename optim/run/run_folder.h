@@ -6,7 +6,7 @@
 namespace isochron {
 
 /// While it lives, no other process works in the folder: an exclusive flock on FOLDER/.lock, which the system releases
-/// when the process ends in whatever way. Network file systems know it where their server does locks (NFS from Linux 2.6.12
+/// when the process ends in any way. Network file systems know it where their server does locks (NFS from Linux 2.6.12
 /// on); where it cannot be had, `warning` receives one line and the run goes on.
 class FolderLock {
  public:

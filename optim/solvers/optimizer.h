@@ -29,7 +29,7 @@ class Optimizer {
                                    std::uint32_t iteration, double rate) = 0;
   /// Whether the last step() stayed where it was because no point that it tried had a lower loss.
   virtual bool rejected() const { return false; }
-  /// Whether the last step was refused although the gradient promised a fall above the loss's noise: losses that stand still
+  /// Whether the last step was refused although the gradient promised a fall above the loss's noise: losses that no longer change
   /// so are no sign of rest.
   virtual bool stuck() const { return false; }
   /// Whether each iteration solves the problem of its own random numbers, so that near the optimum the parameters of
@@ -41,7 +41,7 @@ class Optimizer {
   virtual void restore(const OptimizerState& state) = 0;
 };
 
-/// As the experiment says: each method is a file of its own. The preconditioner, which must outlive it, is for Adam alone.
+/// As the experiment says: each method is a file of its own. The preconditioner, which must outlive it, is only for Adam.
 /// `scales`, one > 0 per unknown (none: all 1): the method works on u = theta / scale, so that its steps mean the same for
 /// unknowns of different units; callers see theta. With equal scales within each of a preconditioner's blocks, that acts on u
 /// as it would on theta. Scales of 1 change no bit.

@@ -21,7 +21,7 @@ struct QuadraticModel {
 /// From an Evaluation of linearise() whose max_expected_decrease is above 0. The curvature is made positive definite. An unbiased
 /// estimate from a noisy Jacobian can be indefinite; the one from squares is not, but so much too large that
 /// steps stall. Noise pushes eigenvalues (of the matrix scaled by the bound's diagonal) below zero as far as
-/// above: those smaller than the most negative one is large cannot be told from noise and are raised to its
+/// above: those smaller than the size of the most negative one may be noise and are raised to its
 /// size. After that the whole curvature is raised, where need be, until the model nowhere predicts a fall
 /// by more than max_expected_decrease.
 QuadraticModel quadratic_model(const Evaluation& at);

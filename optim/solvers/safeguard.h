@@ -1,4 +1,4 @@
-// Judges the losses of an optimisation while it goes on: has it risen, has it settled? Single losses are
+// Judges the losses of a running optimisation: has it risen, has it settled? Single losses are
 // noisy and rise all the time, so all rules compare with the noise that the losses themselves show.
 //
 // Rise. The *level* is the median of the last 5 losses, the *noise* the median of the absolute differences
@@ -16,7 +16,7 @@
 // Without any trend left a check says so with probability 0.84; a decrease of 3 standard errors is taken for
 // none with probability 0.02.
 //
-// Plateaus. Losses can stand still for long while gradients still lead somewhere. From windows of 20 rows on the mean
+// Plateaus. Losses can be constant for long while gradients are not zero. From windows of 20 rows on the mean
 // gradient of the block must be noise, too: the sum over unknowns of squared means in units of their standard errors is no
 // more than 3 standard deviations above what unknowns with independent normal noise would have. Unknowns that share
 // noise make it larger, which only delays the end. A bound counts as rest for the unknown that it holds.

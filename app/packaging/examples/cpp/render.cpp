@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
     const GateSet gates(GateShape::gaussian(0.2), {5, 5.5, 6});
     const Renderer renderer(scene, gates, {.max_bounces = 2}, &basis);
 
-    // What is told apart by `pass` has random numbers of its own; 64 samples per pixel.
+    // Each `pass` has random numbers of its own; 64 samples per pixel.
     const GatedImage image = renderer.render({.seed = 1, .pass = 0}, {0, 64});
     std::vector<double> slope(gates.size(), 0.0);
     for (const Term term : kTerms) {
