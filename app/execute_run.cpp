@@ -31,7 +31,7 @@ std::optional<int> execute_run_if_any(const std::string& folder, const CommonOpt
   display.end();
   if (!status) return {};
   if (status == RunStatus::interrupted) {
-    spdlog::warn("interrupted; go on with: isochron resume {}", folder);
+    spdlog::warn("interrupted; continue with: isochron resume {}", folder);
     return 1;
   }
   bool plotted = common.no_plots || draw_plots(folder);

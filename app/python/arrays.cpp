@@ -33,7 +33,7 @@ GatedImage to_image(const Array& array, const GatedImage& shape) {
   if (array.ndim() != 4 || array.shape(0) != shape.height || array.shape(1) != shape.width ||
       array.shape(2) != shape.gates || array.shape(3) != shape.channels)
     throw InputError(
-        fmt::format("image: another shape than the experiment's (allowed: {} gates, {} rows, {} columns, {} channels)",
+        fmt::format("image: its shape is not the experiment's (allowed: {} gates, {} rows, {} columns, {} channels)",
                     shape.gates, shape.height, shape.width, shape.channels));
   image.data.assign(array.data(), array.data() + array.size());
   return image;

@@ -178,7 +178,7 @@ YamlMap YamlValue::map() const {
     YamlMap::Entry entry{name, YamlValue(document_, pair.first, path), YamlValue(document_, pair.second, path)};
     for (const YamlMap::Entry& earlier : map.entries_) {
       if (earlier.name == name)
-        entry.key.fail(fmt::format("stands here twice, first on line {}", earlier.key.node_->Mark().line + 1));
+        entry.key.fail(fmt::format("is given twice, first on line {}", earlier.key.node_->Mark().line + 1));
     }
     map.entries_.push_back(std::move(entry));
   }

@@ -40,7 +40,7 @@ class Tabulated final : public GateDescription {
     const bool positive = std::all_of(values_.begin(), values_.end(), [](double v) { return v >= 0; }) &&
                           std::any_of(values_.begin(), values_.end(), [](double v) { return v > 0; });
     if (offsets_.size() < 2 || !sorted || !(offsets_.front() < offsets_.back()) || !positive)
-      gates.fail("the table is no gate",
+      gates.fail("the table is not a gate",
                  "two rows or more, offsets in rising order, values at least 0 and one of them above");
   }
   GateShape shape(const GateUnits& units) const override {

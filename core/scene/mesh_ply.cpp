@@ -59,7 +59,7 @@ void read_property(MeshText& text, Header& header, std::set<std::string>& known)
   } else if (!property.list && element.name == "vertex" && (name == "x" || name == "y" || name == "z")) {
     property.axis = name[0] - 'x';
   }
-  if ((property.corners || property.axis >= 0) && !known.insert(name).second) text.fail(name + " stands here twice");
+  if ((property.corners || property.axis >= 0) && !known.insert(name).second) text.fail(name + " is given twice");
   element.properties.push_back(property);
 }
 
@@ -79,7 +79,7 @@ Header read_header(MeshText& text) {
       const std::string name(text.word());
       header.elements.push_back({name, text.count(), {}});
       if (name != "vertex" && name != "face") continue;
-      if (!known.insert("element " + name).second) text.fail("element " + name + " stands here twice");
+      if (!known.insert("element " + name).second) text.fail("element " + name + " is given twice");
       if (name == "vertex") header.vertices = header.elements.back().count;
     } else if (keyword == "property") {
       read_property(text, header, known);

@@ -47,7 +47,7 @@ Field interval(std::array<double, 2>& ends) {
           [&ends](const YamlValue& value) {
             const std::vector<double> numbers = value.numbers();
             if (numbers.size() != 2 || !(numbers[0] < numbers[1]))
-              value.fail("is no interval", "[start, stop], start below stop");
+              value.fail("is not an interval", "[start, stop], start below stop");
             ends = {numbers[0], numbers[1]};
           },
           [&ends] {
@@ -166,9 +166,9 @@ void check_remesh(const ParameterSpec& remeshed, const std::vector<ParameterSpec
 void check_parameters(const Experiment& experiment) {
   std::set<std::string> names;
   for (const ParameterSpec& spec : experiment.parameters) {
-    if (!names.insert(spec.name).second) spec.fail("name", fmt::format("'{}' stands here twice", spec.name));
+    if (!names.insert(spec.name).second) spec.fail("name", fmt::format("'{}' is given twice", spec.name));
     if (spec.diffusion > 0 && experiment.optimizer.method != OptimizerMethod::adam)
-      spec.fail("smoothing", "diffusion works with the method adam alone", "slopes for the other methods");
+      spec.fail("smoothing", "diffusion works only with the method adam", "slopes for the other methods");
     if (spec.remesh.levels > 0) check_remesh(spec, experiment.parameters);
   }
 }

@@ -50,7 +50,7 @@ void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
     if (index >= 0) scene.shapes[index].hidden = true;
     if (spec.per == Per::pixel) {
       if (!scene.capture)
-        spec.fail("per", "the scene has a camera", fmt::format("captures alone have a {} per pixel", type_name(spec)));
+        spec.fail("per", "the scene has a camera", fmt::format("only captures have a {} per pixel", type_name(spec)));
       const bool offset = spec.type == ParameterType::time_offset;
       (offset ? scene.detector.time_offset : scene.detector.background).assign(scene.capture->sensor.size(), 0.0);
     }

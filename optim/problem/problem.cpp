@@ -139,13 +139,13 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     for (const std::string& line : scene_.capture->assumed) warning(scene_.capture->file + ": " + line);
   if (const std::string name = light_that_leaves_the_camera(); !name.empty())
     warning(fmt::format(
-        "{}: light '{}' is where the camera is: as one of them moves alone, shadows open on one side, so that "
+        "{}: light '{}' is at the camera's position: if only one of them moves, a shadow appears whichever way it goes, so "
         "derivatives are one-sided",
         experiment_.file, name));
   if (leaves_out_jumps())
     warning(
-        fmt::format("{}: samples.path_length: 0 leaves the jumps of the gates out of the derivatives by what changes "
-                    "the lengths of paths, which would lead a fit astray",
+        fmt::format("{}: samples.path_length: 0 leaves out the gate-edge (path-length) boundary term: derivatives by "
+                    "parameters that change path lengths are biased",
                     experiment_.file));
   std::string stacked = stacked_warning(parameters_->apply(parameters_->initial()));
   if (stacked.empty() && parameters_->target_known())

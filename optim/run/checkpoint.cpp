@@ -165,7 +165,7 @@ std::optional<Checkpoint> load_checkpoint(const std::string& folder, const Param
       if (!problems.empty()) {
         // The next save moves the latest over the one before: a damaged file must not replace a whole one.
         on_first_rank([&] { std::filesystem::remove(folder + "/checkpoint.yaml"); });
-        note = problems + "; going on from " + (note.empty() ? file : note);
+        note = problems + "; continuing from " + (note.empty() ? file : note);
       }
       if (warning) *warning = note;
       return checkpoint;

@@ -100,7 +100,7 @@ void check_inputs(const std::string& folder, const std::function<void(const std:
       changed += (changed.empty() ? "" : ", ") + original;
   }
   if (!changed.empty() && warning)
-    warning(fmt::format("changed since the run began: {}; going on with the copies in {}", changed, place.string()));
+    warning(fmt::format("changed since the run began: {}; continuing with the copies in {}", changed, place.string()));
 }
 
 }  // namespace isochron

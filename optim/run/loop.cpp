@@ -93,7 +93,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
       optimizer.reset();
       descent.restart_average();
       next = safeguard.state().best_theta;
-      warn(fmt::format("{}; going on from the best parameters with {} of the rate",
+      warn(fmt::format("{}; continuing from the best parameters with {} of the rate",
                        finite ? "the loss has risen" : "loss or gradient is not finite", safeguard.state().rate));
     } else {
       next = optimizer.step(objective, now, state.theta, iteration, safeguard.state().rate);

@@ -79,7 +79,7 @@ TEST_F(Program, ChangedInputsAreNoticed) {
   const std::vector<std::string> resume = {"resume", folder_.file("a"), "--no-plots", "--quiet"};
   const Result result = run(resume);
   EXPECT_EQ(result.status, 0);
-  EXPECT_NE(result.errors.find("changed since the run began: " + folder_.file("block.obj") + "; going on with the "),
+  EXPECT_NE(result.errors.find("changed since the run began: " + folder_.file("block.obj") + "; continuing with the "),
             std::string::npos)
       << result.errors;
   EXPECT_EQ(lines(result.errors), 1);

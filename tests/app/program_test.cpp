@@ -125,7 +125,7 @@ TEST_F(Program, ValuesThatOverflowAreNoResult) {
   EXPECT_FALSE(folder_.has("out/render.csv"));
   const Result narrow = run({"render", file, "-o", out, "--no-plots", "--set", "gates.sigma=1e-300"});
   EXPECT_EQ(narrow.status, 2);
-  EXPECT_NE(narrow.errors.find("cannot be told from rounding"), std::string::npos) << narrow.errors;
+  EXPECT_NE(narrow.errors.find("are below the rounding of path lengths"), std::string::npos) << narrow.errors;
 }
 
 TEST_F(Program, OutputThatCannotBeWrittenIsAFailure) {

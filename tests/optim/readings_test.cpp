@@ -131,7 +131,7 @@ TEST_F(ReadingsOfTiny, WhatCannotBeUsedIsRefused) {
   EXPECT_NE(said({"target.window=[7, 8]"})
                 .find("target.window: no gate has its centre within 7 to 8 (they lie at 4.5 to 5.5"),
             std::string::npos);
-  EXPECT_NE(said({"target.window=[8, 7]"}).find("is no interval"), std::string::npos);
+  EXPECT_NE(said({"target.window=[8, 7]"}).find("is not an interval"), std::string::npos);
   EXPECT_NE(said({"target.window=[1, 2]", "gates={kind: steady}"}).find("target.window: the steady sensor"),
             std::string::npos);
   folder_.write("small.npy", npy("|u1", false, "2, 3", "\1\1\1\1\1\1"));

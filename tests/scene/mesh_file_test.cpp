@@ -321,11 +321,11 @@ TEST_F(MeshFile, PlyHeadersThatContradictThemselves) {
     std::string contents = good;
     return error("m.ply", contents.replace(contents.find(from), from.size(), to));
   };
-  EXPECT_EQ(with("uchar red", "float x"), "m.ply:7: x stands here twice");
+  EXPECT_EQ(with("uchar red", "float x"), "m.ply:7: x is given twice");
   EXPECT_EQ(with("uchar red", "colour red"), "m.ply:7: 'colour' is not a type of PLY");
-  EXPECT_EQ(with("element face", "element vertex"), "m.ply:9: element vertex stands here twice");
+  EXPECT_EQ(with("element face", "element vertex"), "m.ply:9: element vertex is given twice");
   EXPECT_EQ(with("end_header", "property list int int vertex_index\nend_header"),
-            "m.ply:11: vertex_indices stands here twice");
+            "m.ply:11: vertex_indices is given twice");
   // A list's size of four and the first bytes of its indices, taken for a float.
   EXPECT_TRUE(with("uchar int vertex_indices", "float int vertex_indices").starts_with("m.ply: a list of "));
 }

@@ -155,7 +155,7 @@ TEST_F(SceneLoader, Retroreflector) {
   EXPECT_EQ(number(m, "roughness"), 0.1);
   EXPECT_EQ(
       error(white, sign("albedo: 0.3, reflectance: 0.8, roughness: 0.1")),
-      "scene.yaml:8:60: materials.white.reflectance: albedo and reflectance make more than 1 together (a sum of at "
+      "scene.yaml:8:60: materials.white.reflectance: albedo and reflectance add up to more than 1 (a sum of at "
       "most 1)");
 }
 
@@ -261,7 +261,7 @@ TEST_F(SceneLoader, CameraErrors) {
   EXPECT_EQ(error("  fov: 40\n", ""), "scene.yaml:2:3: camera.fov: is missing");
   EXPECT_EQ(error("fov: 40", "fov: 40\n  zoom: 2"),
             "scene.yaml:6:3: camera.zoom: is not a known key (allowed: position, look_at, up, fov, resolution)");
-  EXPECT_EQ(error("fov: 40", "fov: 40\n  fov: 41"), "scene.yaml:6:3: camera.fov: stands here twice, first on line 5");
+  EXPECT_EQ(error("fov: 40", "fov: 40\n  fov: 41"), "scene.yaml:6:3: camera.fov: is given twice, first on line 5");
   EXPECT_EQ(error("[64, 48]", "[64, 0]"),
             "scene.yaml:6:20: camera.resolution[1]: 0 is out of range (an integer from 1 to 32768)");
   EXPECT_EQ(error("[64, 48]", "[64.5, 48]"),
@@ -305,7 +305,7 @@ TEST_F(SceneLoader, MaterialErrors) {
             "scene.yaml:8:39: materials.white.roughness: belongs to rough_conductor, rough_dielectric, plastic "
             "and retroreflecting, not to diffuse "
             "(allowed: type, albedo, two_sided)");
-  EXPECT_EQ(error("  metal:", "  white:"), "scene.yaml:9:3: materials.white: stands here twice, first on line 8");
+  EXPECT_EQ(error("  metal:", "  white:"), "scene.yaml:9:3: materials.white: is given twice, first on line 8");
 }
 
 TEST_F(SceneLoader, ShapeErrors) {

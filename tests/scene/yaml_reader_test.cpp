@@ -130,7 +130,7 @@ TEST_F(YamlReader, MissingUnknownAndRepeatedKeys) {
             "f.yaml:3:3: inner.hieght: is not a known key, did you mean 'height'? (allowed: width, height)");
   EXPECT_EQ(read("inner: {width: 2}\n\nzebra: 3\n"), "f.yaml:3:1: zebra: is not a known key (allowed: inner)");
   EXPECT_EQ(read("inner:\n  width: 2\n  height: 1\n  width: 3\n"),
-            "f.yaml:4:3: inner.width: stands here twice, first on line 2");
+            "f.yaml:4:3: inner.width: is given twice, first on line 2");
   EXPECT_EQ(read("inner: {[1]: 2}\n"), "f.yaml:1:9: inner: a list of 1 is used as a key (a word)");
 }
 

@@ -69,7 +69,7 @@ class LightsTest(unittest.TestCase):
         for light, told in (("flash", True), ("point", False)):
             done = self.run_program("render", light, "--samples", 4)
             self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual("light 'lamp' is where the camera is" in done.stderr, told, done.stderr)
+            self.assertEqual("light 'lamp' is at the camera's position" in done.stderr, told, done.stderr)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ class Retroreflecting final : public Bsdf {
                {.required = true});
     const auto check_energy = [this](const YamlValue& value) {
       if ((albedo_ + reflectance_).max() > 1)
-        value.fail("albedo and reflectance make more than 1 together", "a sum of at most 1");
+        value.fail("albedo and reflectance add up to more than 1", "a sum of at most 1");
     };
     keys.value("reflectance", field::checked(field::color(reflectance_, NumberRange::closed(0, 1), grey), check_energy),
                "fraction of light that returns the way it came", {.required = true});
