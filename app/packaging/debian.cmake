@@ -24,10 +24,11 @@ set(CPACK_ISOCHRON_PREFIX ${CMAKE_INSTALL_PREFIX})
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "inverse rendering for time-of-flight cameras
-Renders time-gated images with all orders of reflection, differentiates them
-with respect to anything in the scene, and reconstructs scenes from measured
-images and histograms of photons.
+set(CPACK_DEBIAN_PACKAGE_DESCRIPTION "inverse rendering for time-of-flight imaging
+Renders time-gated images with all orders of reflection, and their unbiased
+derivatives by shapes, poses, materials and lights. Reconstructs scenes from
+measured images and, around corners (non-line-of-sight imaging), from
+histograms of photons that single-photon detectors count.
 .
 Holds the program, its Python package, and libraries and headers for C++.")
 # Shared libraries by dpkg-shlibdeps; for Python what the package imports.
