@@ -176,16 +176,16 @@ def positive(text):
 def parse(arguments):
     parser = Parser(prog="import_capture.py", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
-    add("input", metavar="IN", type=pathlib.Path, help="a .mat, .hdf5, .h5, .npy or .npz file")
+    add("input", metavar="IN", type=pathlib.Path, help="the measurement: a .mat, .hdf5, .h5, .npy or .npz file")
     add("output", metavar="OUT.h5", type=pathlib.Path)
-    add("--rebin", metavar="N", type=at_least_one, default=1, help="add N bins up into one")
-    add("--stride", metavar="N", type=at_least_one, default=1, help="every N-th point along either axis")
+    add("--rebin", metavar="N", type=at_least_one, default=1, help="sum every N bins into one")
+    add("--stride", metavar="N", type=at_least_one, default=1, help="keep every N-th point along each axis")
     add("--bins", metavar=("FIRST", "LAST"), type=int, nargs=2,
-        help="these bins alone, LAST excluded: bins of the file, where there is a tofgrid counted from time zero. Without the "
+        help="only these bins, LAST excluded: bins of the file, or, if there is a tofgrid, counted from time zero. Without the "
         "wall's own light among them, what is said at the end is where the fit of a plane may begin")
-    add("--bin-ps", metavar="PS", type=positive, help="length of a bin")
+    add("--bin-ps", metavar="PS", type=positive, help="width of a bin")
     add("--t-start-ps", metavar="PS", type=number, default=0.0,
-        help="when the first bin begins, 0 being when light is at the wall (default: 0)")
+        help="when the first bin begins; 0 is when light is at the wall (default: 0)")
     add("--tof", metavar="FILE", type=pathlib.Path, help="the file with tofgrid")
     add("--variable", metavar="NAME", help="the array of counts")
     add("--axes", choices=["XYT", "YXT", "TXY", "TYX", "XTY", "YTX", "XT", "TX"], help="of the array (default: XYT)")
@@ -198,18 +198,17 @@ def parse(arguments):
         help="of the wall (default: 0 0 1)")
     add("--laser", metavar=("X", "Y", "Z"), type=number, nargs=3, help="the laser's one spot, metres; else confocal")
     add("--mask", metavar="OUT.npy", type=pathlib.Path,
-        help="writes the mask of an experiment's target, which leaves dead points out: those with values that are not finite or "
-        "negative, or all zero where by the others' counts less than one capture of 1000 had such a point; what to put into the experiment "
-        "is printed. Hot points are named, with it and without: those that count so much in the darkest sixteenth of the time that this "
-        "happens by chance in one capture of 1000, if expectations differ from point to point as the quartiles show")
+        help="writes the mask of an experiment's target, which leaves out dead points, and prints the line for the experiment. Dead: "
+             "values that are not finite or negative, or all zero where, by the counts of the others, less than one capture of 1000 had "
+             "such a point. Hot points are named in any case: those that count so much in the darkest sixteenth of the time that this "
+             "happens by chance in one capture of 1000, if expectations differ from point to point as the quartiles show")
     add("--mask-hot", action="store_true", help="leaves hot points out, too")
     add("--dark-subtracted", action="store_true", help="keeps negative values, for loss: {kind: squared}")
     add("--response", metavar="OUT.csv", type=pathlib.Path,
-        help="writes the capture's direct light, which is the instrument's response: the average over all points, "
-        "aligned to each other where the file has the pulse's rise, without the background, until it is below a "
-        "thousandth of its peak or lost in noise. Offsets are in ps from time zero, when light is at the wall; so "
-        "where the file has the whole pulse, depths are unbiased even if its time zero is wrong, and else as far as it "
-        "is right")
+        help="writes the detector's response, measured on the capture's direct light: the average over all points, aligned to each "
+             "other if the file has the pulse's rise, without the background, until it is below a thousandth of its peak or lost in noise. "
+             "Offsets are in ps from time zero, when light is at the wall. If the file has the whole pulse, depths are unbiased even if its "
+             "time zero is wrong; otherwise they are as right as that")
     add("--response-end", metavar="PS", type=number, help="the response's last offset, instead of where it is faint")
     options = parser.parse_args(arguments)
     if not np.linalg.norm(options.normal) > 0:

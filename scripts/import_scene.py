@@ -1,12 +1,11 @@
 #!/usr/bin/python3
-"""Turns a scene of Mitsuba (3, 0.5, 0.6) or of mitransient, an XML file, into a folder with a scene, its meshes and an experiment.
+"""Converts a scene of Mitsuba (3, 0.5, 0.6) or of mitransient, an XML file, to a folder with a scene, its meshes and an experiment.
 
   scripts/import_scene.py cbox.xml -o my/cbox -D res=64
   build/isochron render my/cbox/experiment.yaml
 
-What it cannot turn it names, each with its line, and writes nothing (exit status 2). With --skip it goes on without it: a
-material becomes a diffuse one of albedo 0.5, all else is left out, as long as a camera and a shape remain. scenes/README.md says what becomes
-of what.
+Elements that cannot be converted are named with their line, and nothing is written (exit status 2). With --skip they are left out, as
+long as a camera and a shape remain; an unknown material becomes a diffuse one of albedo 0.5. scenes/README.md lists the conversions.
 """
 
 import argparse
@@ -104,15 +103,15 @@ def parse(arguments):
     add("--force", action="store_true", help="replace an earlier scene in the folder")
     add("-D", "--define", metavar="NAME=VALUE", type=definition, action="append", default=[],
         help="the value of $NAME in the scene")
-    add("--skip", action="store_true", help="go on without what cannot be turned")
+    add("--skip", action="store_true", help="leave out what cannot be converted")
     add("--sensor", metavar="ID", help="which sensor, where there are several (default: the first)")
     add("--mean-textures", action="store_true", help="bitmaps and checkerboards become their mean colour")
     add("--fineness", metavar="N", type=ranged(int, 1, 8), default=4,
         help="a sphere has 20 x 4^N triangles, a disk and a cylinder 4 x 2^N sides (default: 4)")
     add("--smooth", metavar="ALPHA", type=ranged(float, 0.001, 1), default=0.05,
-        help="roughness of what is a smooth conductor or dielectric there (default: 0.05)")
+        help="roughness for smooth conductors and dielectrics (default: 0.05)")
     add("--max-bounces", metavar="N", type=ranged(int, 0, 1000), default=8,
-        help="where the integrator has no limit (default: 8)")
+        help="max_bounces if the integrator has no limit (default: 8)")
     add("--laser-pixel", metavar="X,Y", type=coordinates(2),
         help="of a capture: the film's pixel that the laser is aimed at, as in mitransient, where 0,0 is the corner")
     add("--laser-point", metavar="X,Y,Z", type=coordinates(3), help="of a capture: the point that the laser is aimed at")
