@@ -1,10 +1,10 @@
-// The velocities of path vertices when a parameter changes (theory sections 2 and 8).
+// The vertex velocity field: how path vertices move when a parameter changes (theory sections 2 and 8).
 //
 // Plain velocities: x1, the point that the camera sees, stays on its pixel's ray; every other vertex moves with its material.
-// Where something that moves comes close to something that does not, samples then have no variance (section 8). So a vertex
-// x_k also follows the material points of its neighbours on the path, by a tangential velocity
+// Where a moving shape comes close to a static one, samples then have no variance. The contact-aware reparameterisation lets a
+// vertex x_k also follow the material points of its neighbours on the path, by a tangential velocity
 //     t_k = P_k sum_j a_j (v_j - v_k)        P_k: projection into the plane of x_k, v: material velocities
-// whose divergence counts in the interior term and what it carries across edges in the visibility term. Section 8 has the
+// whose divergence counts in the interior term, and its flux across edges in the visibility term. Section 8 has the
 // weights a_j, their gradients, and the rules for x1.
 #pragma once
 #include <vector>
@@ -20,7 +20,7 @@ struct Differentiable;
 struct SurfacePoint;
 class PreparedScene;
 
-/// How far the vertices of a path follow what is close to them; see above.
+/// Within which distance the vertices of a path follow what is close to them; see above.
 struct FollowOptions {
   /// s of x1 in widths of a pixel; 0: x1 stays on its pixel ray.
   double radius_in_pixels = 0;
@@ -47,7 +47,7 @@ class VertexFlows {
   /// For a scene that is prepared except for its flows.
   void update(const PreparedScene& scene, const FollowOptions& options);
 
-  /// Of a segment between neighbours x_k and x_(k+1): how either would follow the other, were there no further ones.
+  /// Of a segment between neighbours x_k and x_(k+1): how each would follow the other if there were no further neighbours.
   struct Pair {
     struct Weight {
       double value = 0;

@@ -21,9 +21,9 @@ inline constexpr int kGradientParts = 32;
 /// A prepared scene at one value of the parameters. Immutable; safe to share between threads.
 class Renderer {
  public:
-  /// `basis` says what moves (derivatives skip all else); null or empty: nothing does, only `render` makes sense.
+  /// `basis` says what moves (derivatives skip the rest); null or empty: nothing does, only `render` makes sense.
   /// The scene, gates and basis must outlive the renderer.
-  /// With a cache, what scenes of the same topology have in common is not made again; the bits are the same.
+  /// A cache reuses what scenes of the same topology have in common; the bits are the same.
   Renderer(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
            const TangentBasis* basis = nullptr, SceneCache* cache = nullptr);
   ~Renderer();
@@ -31,16 +31,16 @@ class Renderer {
   /// Unbiased estimate of the gated images: average over the samples of `range`.
   GatedImage render(const Stream& stream, SampleRange range) const;
 
-  /// Unbiased estimate of one term of the images' derivative, one image per column of the basis.
+  /// Unbiased estimate of one term of the images' derivative, one image per unknown (column of the basis).
   std::vector<GatedImage> derive(Term term, const Stream& stream, SampleRange range) const;
 
   /// Unbiased estimate of one term of sum(adjoint * dI), added to `dof_gradient` (size DofLayout::size()). Costs the
-  /// same for any number of columns. `parts`, where asked for, becomes what disjoint sets of pixels' samples contribute,
-  /// per column of the basis: [part][column], kGradientParts of them, of the same pixels in every range.
+  /// same for any number of unknowns. `parts`, if given, receives the contributions of disjoint sets of pixels' samples,
+  /// per unknown (column of the basis): [part][column], kGradientParts of them, of the same pixels in every range.
   void add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
                     std::vector<double>& dof_gradient, std::vector<std::vector<double>>* parts = nullptr) const;
 
-  /// Whether the term can be other than zero: something that it depends on moves, and gates have what it needs.
+  /// Whether the term can be other than zero: it depends on what moves and, for path_length, gates have jumps.
   bool has(Term term) const;
 
   /// As `render`, sorted.
@@ -62,7 +62,7 @@ class Renderer {
   double work() const;
 
  private:
-  /// What is not background.
+  /// All but the background.
   void render_light(GatedImage& image, const Stream& stream, SampleRange range) const;
 
   struct Impl;

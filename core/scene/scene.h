@@ -40,7 +40,7 @@ struct FileVertices {
   std::vector<Vec3> loose;  ///< where those are, in their order; they never move
 };
 
-/// Whether a face that has both vertices goes on from the first to the second. Of two faces with one outside, one does.
+/// Whether a face that has both vertices runs from the first to the second. Of two consistently oriented faces, one does.
 inline bool runs_along(const std::array<int, 3>& face, int from, int to) {
   return face[0] == from ? face[1] == to : face[1] == from ? face[2] == to : face[0] == to;
 }

@@ -18,8 +18,8 @@
 
 namespace isochron {
 
-/// Multiple importance sampling of the complete path of a pixel, as long as that side of the target says: the part of it that
-/// connections by `technique` take, over the connections' share of the samples. `pdf_on_arc`: of the point that was found, per
+/// Multiple importance weight of the complete path of a pixel, whose length is that side of the target: that of connections by
+/// `technique`, over the connections' share of the samples. `pdf_on_arc`: of the point that was found, per
 /// area and length.
 double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
                          double ArcDensities::*technique, double pdf_on_arc);
