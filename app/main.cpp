@@ -83,7 +83,8 @@ int run_program(int argc, char** argv) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   isochron::keep_messages_off_the_bar();
-  CLI::App app("Inverse rendering for time-of-flight imaging: gated images, their derivatives, reconstructions", "isochron");
+  CLI::App app("Inverse rendering for time-of-flight imaging: gated images, their derivatives, reconstructions",
+               "isochron");
   app.set_version_flag("--version", "isochron " ISOCHRON_VERSION);
   app.require_subcommand(1);
   app.footer("Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");

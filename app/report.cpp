@@ -29,9 +29,7 @@ int report(const ReportCommand& command) {
 void add_report(CLI::App& app, Action& action) {
   auto command = std::make_shared<ReportCommand>();
   CLI::App* sub = app.add_subcommand("report", "Write a page about a run, or a comparison of several");
-  sub->add_option("folders", command->folders, "folders of runs, finished or not")
-      ->required()
-      ->type_name("DIR...");
+  sub->add_option("folders", command->folders, "folders of runs, finished or not")->required()->type_name("DIR...");
   sub->add_option("-o,--output", command->output,
                   "the page; default DIR/report.html, for several runs comparison.html in the current folder")
       ->type_name("FILE");

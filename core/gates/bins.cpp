@@ -19,9 +19,10 @@ class Bins final : public GateDescription {
     key("start", field::number(start_), "where the first bin begins; may be negative", "`unit`");
     key("width", field::positive(width_), "of a bin; each begins where the one before ends", "`unit`");
     key("count", field::integer(count_, 1, kMostGates), "how many", "");
-    keys.value("response", response(read_numbers),
-               "the detector's: how much later than it arrives light is counted; piecewise linear, scaled to an integral of 1",
-               {.unit = "`unit`", .unset = offsets_.empty(), .otherwise = "none: at once"});
+    keys.value(
+        "response", response(read_numbers),
+        "the detector's: how much later than it arrives light is counted; piecewise linear, scaled to an integral of 1",
+        {.unit = "`unit`", .unset = offsets_.empty(), .otherwise = "none: at once"});
   }
   void check(const YamlValue& gates) const override {
     if (given_ != 0 && given_ != kKeys)

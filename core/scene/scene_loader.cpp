@@ -256,8 +256,7 @@ void describe(Keys& keys, Scene& scene) {
     if (scene.shapes.empty()) value.fail("has no shape", "at least one");
     const bool emits = std::any_of(scene.shapes.begin(), scene.shapes.end(),
                                    [](const Shape& shape) { return shape.emission.emits(); });
-    if (scene.capture && emits)
-      value.fail("a shape emits light", "none in a capture: only its laser emits light");
+    if (scene.capture && emits) value.fail("a shape emits light", "none in a capture: only its laser emits light");
     if (!scene.capture && !emits && scene.lights.empty())
       value.fail("no shape emits light", "emission above 0 on at least one, or `lights`");
     check_place(scene, value);

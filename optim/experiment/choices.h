@@ -21,9 +21,9 @@ inline constexpr auto kChoices<ArcPick> = std::to_array<Choice<ArcPick>>(
      {ArcPick::uniform, "uniform", "the paper's way, noisier"}});
 
 template <>
-inline constexpr auto kChoices<Numbers> = std::to_array<Choice<Numbers>>(
-    {{Numbers::low_discrepancy, "low_discrepancy", "samples cover their domain evenly"},
-     {Numbers::independent, "independent", "all are independent"}});
+inline constexpr auto kChoices<Numbers> =
+    std::to_array<Choice<Numbers>>({{Numbers::low_discrepancy, "low_discrepancy", "samples cover their domain evenly"},
+                                    {Numbers::independent, "independent", "all are independent"}});
 
 template <>
 inline constexpr auto kChoices<GradientMethod> = std::to_array<Choice<GradientMethod>>(

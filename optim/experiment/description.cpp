@@ -60,7 +60,8 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
              "EXR file of measured images, one channel or three per gate; without it the target is rendered",
              {.unset = target.images.empty()});
   keys.value("capture", folder.file(target.capture),
-             "HDF5 file of a measurement's counts (layout: FILES.md). Gates of kind `bins` take its bins, or combine some of them",
+             "HDF5 file of a measurement's counts (layout: FILES.md). Gates of kind `bins` take its bins, or combine "
+             "some of them",
              {.only = {target.images.empty(), "targets without images", "images"}, .unset = target.capture.empty()});
   const Only rendered{!target.measured(), "rendered targets", target.images.empty() ? "a capture" : "images"};
   keys.value("samples", field::integer(target.samples, 1, kMostSamples), "per pixel", {.only = rendered});
@@ -71,7 +72,8 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
     // So many that their noise, a millionth, no longer matters.
     inner.value("photons", field::number(target.photons, {.low = 0, .high = 1e12, .low_open = true}),
                 "mean count of a pixel and colour in the brightest gate", {.unset = target.photons == 0});
-    inner.value("counts", field::boolean(target.counts), "the images are expected counts; each value becomes a Poisson number of that mean");
+    inner.value("counts", field::boolean(target.counts),
+                "the images are expected counts; each value becomes a Poisson number of that mean");
     inner.check([&](const YamlValue& value) {
       if ((target.photons > 0) == target.counts) value.fail("has to say how many", "photons: N, or counts: true");
     });
@@ -88,11 +90,14 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
 void describe(Keys& keys, SampleSpec& s) {
   keys.value("primal", field::integer(s.primal, 1, kMostSamples), "the images, for the loss");
   keys.value("interior", field::integer(s.interior, 0, kMostSamples),
-             "interior term of the derivative: changes along paths whose visibility stays, the gates' slopes included; 0: left out");
-  keys.value("visibility", field::integer(s.visibility, 0, kMostSamples),
-             "visibility term: moving silhouettes and shadow boundaries; a sample is one attempt to find one; 0: left out");
+             "interior term of the derivative: changes along paths whose visibility stays, the gates' slopes included; "
+             "0: left out");
+  keys.value(
+      "visibility", field::integer(s.visibility, 0, kMostSamples),
+      "visibility term: moving silhouettes and shadow boundaries; a sample is one attempt to find one; 0: left out");
   keys.value("path_length", field::integer(s.path_length, 0, kMostSamples),
-             "gate-edge (path-length) boundary term: jumps of the gates; gaussian gates have none. 0: left out, but if gates jump "
+             "gate-edge (path-length) boundary term: jumps of the gates; gaussian gates have none. 0: left out, but if "
+             "gates jump "
              "`run` takes as many as of `interior`");
 }
 
@@ -110,12 +115,12 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "coupled pairs for the gates' slopes, under ellipsoidal sampling");
   keys.value("pick", field::choice(options.pick), "which arc of an ellipsoid a connection takes");
   keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
-  keys.value(
-      "hidden", hidden_share(options.hidden),
-      "area sampling, for standard sampling: the probability that a step is drawn on `hidden_shapes`, until the path has met "
-      "one. For derivatives, and for the first step from a capture's wall in images",
-      {.unset = !options.hidden,
-       .otherwise = "cameras `0`; captures `0.5`, derivatives `0.75`, or all where that is better"});
+  keys.value("hidden", hidden_share(options.hidden),
+             "area sampling, for standard sampling: the probability that a step is drawn on `hidden_shapes`, until the "
+             "path has met "
+             "one. For derivatives, and for the first step from a capture's wall in images",
+             {.unset = !options.hidden,
+              .otherwise = "cameras `0`; captures `0.5`, derivatives `0.75`, or all where that is better"});
   keys.value(
       "hidden_shapes", field::names(e.hidden_shapes),
       "the area-sampled shapes: path vertices are drawn on them by area",
@@ -123,11 +128,12 @@ void describe_estimator(Keys& keys, Experiment& e) {
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");
   keys.value("follow", field::non_negative(options.follow),
-             "contact-aware reparameterisation, needed where objects touch: distance within which path vertices follow what moves "
+             "contact-aware reparameterisation, needed where objects touch: distance within which path vertices follow "
+             "what moves "
              "close to them; 0: not at all",
              {.unit = "radii of the smaller body"});
-  keys.value("follow_radius", field::non_negative(options.follow_radius), "the same for the points that the camera sees",
-             {.unit = "widths of a pixel"});
+  keys.value("follow_radius", field::non_negative(options.follow_radius),
+             "the same for the points that the camera sees", {.unit = "widths of a pixel"});
 }
 
 void describe(Keys& keys, GradientSpec& gradient) {

@@ -42,7 +42,8 @@ void require_resolved(const GateSet& gates, const YamlValue& value) {
   for (int g = 0; g < gates.size(); ++g) longest = std::max(longest, std::abs(gates.center(g)));
   const double least = std::max(kLeastWidth, kLeastRelativeWidth * longest), width = gates.shape().detail();
   if (width < least)
-    value.fail(fmt::format("gates of a standard deviation of {:.3g} scene units are below the rounding of path lengths", width),
+    value.fail(fmt::format("gates of a standard deviation of {:.3g} scene units are below the rounding of path lengths",
+                           width),
                fmt::format("at least {:.3g}, {} of the longest centre", least, kLeastRelativeWidth));
   if (!(width <= kMostWidth)) value.fail(fmt::format("gates are {:.3g} scene units wide", width), "at most 1e100");
 }

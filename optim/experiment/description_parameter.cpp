@@ -170,13 +170,13 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "adam only: gradients diffuse over the mesh, over about the root of this many edges; 0: not");
     inner.value("slopes", field::non_negative(spec.slopes), "weight of a penalty on uneven offsets or albedos; 0: none",
                 {.unit = "mean square of the target"});
-    inner.value(
-        "bending", field::non_negative(spec.bending),
-        "for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
-        "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
-        {.only = of({vertices})});
+    inner.value("bending", field::non_negative(spec.bending),
+                "for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
+                "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
+                {.only = of({vertices})});
     inner.value("evidence", field::boolean(spec.evidence),
-                "for counts, in a run in levels: each finer level takes the weight of bending (without bending, that of slopes) that "
+                "for counts, in a run in levels: each finer level takes the weight of bending (without bending, that "
+                "of slopes) that "
                 "makes the data of the level before most probable");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
@@ -187,16 +187,16 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.value("edge_length", field::positive(spec.remesh.edge_length),
                 "of the first level's triangles; those of each further level have half of it",
                 {.unit = "scene units", .unset = spec.remesh.edge_length == 0, .otherwise = "the mesh as it is"});
-    inner.value("coarse_levels", field::integer(spec.remesh.coarse_levels, 1, kMostLevels),
-                "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
-                "even size",
-                {.unset = spec.remesh.coarse_levels == 1});
+    inner.value(
+        "coarse_levels", field::integer(spec.remesh.coarse_levels, 1, kMostLevels),
+        "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
+        "even size",
+        {.unset = spec.remesh.coarse_levels == 1});
   };
-  keys.map(
-      "remesh", remesh,
-      "a run in levels: the surface that a level has found gets finer triangles for the next. One parameter may "
-      "have it",
-      {.only = of({vertices}), .unset = spec.remesh.levels == 0});
+  keys.map("remesh", remesh,
+           "a run in levels: the surface that a level has found gets finer triangles for the next. One parameter may "
+           "have it",
+           {.only = of({vertices}), .unset = spec.remesh.levels == 0});
   keys.value(
       "prior_width", field::non_negative(spec.prior_width),
       "standard deviation of a normal prior about `initial`, for `loss: {kind: poisson}`. Offsets of single sensor "

@@ -23,7 +23,8 @@ inline void describe(Keys& keys, OutputSpec& output) {
   const auto choose = [&output, formats](int i) { output.geometry = formats[i].first; };
   keys.value("geometry", field::choice(formats, choose, [&output] { return output.geometry; }),
              "format of the meshes of moving shapes: initial, final and, if known, target");
-  keys.value("every", field::integer(output.every, 0), "also writes them at every so many iterations; 0: none", {.unit = "iterations"});
+  keys.value("every", field::integer(output.every, 0), "also writes them at every so many iterations; 0: none",
+             {.unit = "iterations"});
   keys.value("frames", field::integer(output.frames, 0, 10000),
              "largest number of images over the iterations in DIR/frames, for reports (fewer above 64 MB); 0: none");
   keys.value("histogram_samples", field::integer(output.histogram_samples, 1, 1 << 30),

@@ -138,10 +138,11 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
   if (scene_.capture)
     for (const std::string& line : scene_.capture->assumed) warning(scene_.capture->file + ": " + line);
   if (const std::string name = light_that_leaves_the_camera(); !name.empty())
-    warning(fmt::format(
-        "{}: light '{}' is at the camera's position: if only one of them moves, a shadow appears whichever way it goes, so "
-        "derivatives are one-sided",
-        experiment_.file, name));
+    warning(
+        fmt::format("{}: light '{}' is at the camera's position: if only one of them moves, a shadow appears whichever "
+                    "way it goes, so "
+                    "derivatives are one-sided",
+                    experiment_.file, name));
   if (leaves_out_jumps())
     warning(
         fmt::format("{}: samples.path_length: 0 leaves out the gate-edge (path-length) boundary term: derivatives by "

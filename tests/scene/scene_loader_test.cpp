@@ -153,10 +153,9 @@ TEST_F(SceneLoader, Retroreflector) {
   EXPECT_EQ(number(m, "reflectance"), 0.8);
   EXPECT_EQ(m.number(m.find("reflectance") + 1), 0.1);
   EXPECT_EQ(number(m, "roughness"), 0.1);
-  EXPECT_EQ(
-      error(white, sign("albedo: 0.3, reflectance: 0.8, roughness: 0.1")),
-      "scene.yaml:8:60: materials.white.reflectance: albedo and reflectance add up to more than 1 (a sum of at "
-      "most 1)");
+  EXPECT_EQ(error(white, sign("albedo: 0.3, reflectance: 0.8, roughness: 0.1")),
+            "scene.yaml:8:60: materials.white.reflectance: albedo and reflectance add up to more than 1 (a sum of at "
+            "most 1)");
 }
 
 TEST_F(SceneLoader, GlassIsSolid) {

@@ -15,8 +15,8 @@ class Retroreflecting final : public Bsdf {
   std::unique_ptr<Bsdf> clone() const override { return std::make_unique<Retroreflecting>(*this); }
 
   void describe(Keys& keys, bool& grey) override {
-    keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey), "fraction of light that is scattered diffusely",
-               {.required = true});
+    keys.value("albedo", field::color(albedo_, NumberRange::closed(0, 1), grey),
+               "fraction of light that is scattered diffusely", {.required = true});
     const auto check_energy = [this](const YamlValue& value) {
       if ((albedo_ + reflectance_).max() > 1)
         value.fail("albedo and reflectance add up to more than 1", "a sum of at most 1");

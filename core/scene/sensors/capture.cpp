@@ -145,7 +145,8 @@ void describe(Keys& keys, Capture& capture) {
     inner.value("sensor", field::vec3(origin.sensor), "where the detector stands",
                 {.required = true, .unit = "scene units"});
   };
-  keys.map("origin", stands, "if given, path lengths include the ways from the laser to the wall and from the wall to the detector",
+  keys.map("origin", stands,
+           "if given, path lengths include the ways from the laser to the wall and from the wall to the detector",
            {.only = in_place, .otherwise = "paths begin and end at the wall"});
   keys.check([&](const YamlValue& value) {
     if (!capture.file.empty()) return;
