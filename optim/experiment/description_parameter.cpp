@@ -153,7 +153,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
              {.only = of({translation, rotation, vertices}),
               .unset = spec.selection.kind == Selection::Kind::all,
               .otherwise = "all"});
-  keys.value("direction", direction(spec), "vertices move by the parameter times this vector, which is not normalised",
+  keys.value("direction", direction(spec), "the motion per unit of the parameter; not normalised",
              {.required = true, .only = of({translation, vertices, camera_translation}), .unit = "scene units"});
   const auto check_axis = [&](const YamlValue& value) {
     if (!std::isnormal(length_squared(spec.axis)))
