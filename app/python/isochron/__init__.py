@@ -1,8 +1,8 @@
-"""isochron: inverse rendering for time-of-flight cameras.
+"""isochron: inverse rendering for time-of-flight imaging.
 
-Experiment renders, differentiates and optimises; read_run, read_image, read_exr and read_capture read what was written, and
-work where the compiled part of the package is missing, too. reconstruct finds the surface behind a capture, back_project where
-it may be. isochron.torch makes images that PyTorch differentiates.
+Experiment renders, differentiates and optimises. read_run, read_image, read_exr and read_capture read results, also without the
+compiled part of the package. reconstruct finds the hidden surface behind a capture's photon counts, back_project shows where it
+may be. isochron.torch makes images that PyTorch differentiates.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Captures in the HDF5 layout of the `tal` library, read and written, and tables of responses. Lengths are in metres."""
+"""Captures in the HDF5 layout of the `tal` library (experiments/FILES.md), read and written, and tables of responses. Lengths are in metres."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _normals(file: h5py.File, name: str, points: np.ndarray, origins: tuple[np.n
 
 
 def read_capture(path: Any) -> Capture:
-    """A measurement, or a rendering of one such as a run's final.h5. What is missing is taken as the program takes it, with a
+    """Reads a measurement, or a rendering of one such as a run's final.h5. Missing fields are replaced as the program does, with a
     warning. Raises CaptureError."""
     try:
         with h5py.File(path, "r") as file:
@@ -155,7 +155,7 @@ def write_array(path: pathlib.Path, values: np.ndarray) -> None:
 
 def write_capture(path: Any, counts: np.ndarray, delta_t: float, t_start: float, points: np.ndarray, normal: Any, laser: Any = None,
                   original_format: str = "arrays", *, laser_normal: Any = None, origins: Any = None) -> None:
-    """A measurement that experiments can read. counts [bin, Sx, Sy], of several spots [bin, Lx, Ly, Sx, Sy]; points [Sx, Sy, xyz] in
+    """Writes a measurement that experiments can read. counts [bin, Sx, Sy], of several spots [bin, Lx, Ly, Sx, Sy]; points [Sx, Sy, xyz] in
     metres, as are the bins' width and start (optical path); normal: of the wall, or [Sx, Sy, xyz]; laser is one point,
     [Lx, Ly, xyz], or None: confocal, as where it is `points`; laser_normal like `normal`, which it is where it is None; origins of laser and sensor, where
     times include the ways from and to there. Raises CaptureError."""

@@ -40,15 +40,15 @@ class Parameter:
 
     name: str
     type: str
-    """As the experiment's file says: translation, rotation, vertices, albedo, emission, time_offset, ..."""
+    """As in the experiment's file: translation, rotation, vertices, albedo, emission, time_offset, ..."""
     unit: str
     """'scene units' (of the offset along a direction of length one), 'degrees', the gates' unit; '' for what has none."""
     scale: float
-    """How much of the unit counts as one where parameters of different units are compared."""
+    """The unit in which optimisers see the parameter, in units of `unit`."""
     shape: tuple[int, ...]
     """() for one value, (3,) for a colour, (n,) or (n, 3) for vertices."""
     slice: slice
-    """Where its values stand in theta."""
+    """The indices of its values in theta."""
     initial: np.ndarray
     target: np.ndarray
     """NaN where unknown."""
@@ -84,7 +84,7 @@ class Gradient:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Iteration:
-    """What a callback is told after a row of a run's log."""
+    """The argument of callbacks, after each row of a run's log."""
 
     iteration: int
     closing: bool
@@ -134,8 +134,8 @@ def _overrides(overrides: Overrides) -> list[str]:
 
 
 class Scaled:
-    """An experiment as optimisers of others want it: unknowns x, theta in units of the parameters' scales, and the loss as a
-    part of the loss at the start, both of one iteration's random numbers."""
+    """An experiment for other optimisers: the unknowns x are theta in units of the parameters' scales, and the loss is divided by
+    the loss at the start; all with one iteration's random numbers."""
 
     def __init__(self, experiment: Experiment, start: Theta = None, iteration: int = 0) -> None:
         self._experiment, self._iteration = experiment, iteration
@@ -153,7 +153,7 @@ class Scaled:
         return np.asarray(x, dtype=float) * self._scale
 
     def loss_and_gradient(self, x: Any) -> tuple[float, np.ndarray]:
-        """As scipy.optimize.minimize(..., jac=True) wants them."""
+        """As scipy.optimize.minimize(..., jac=True) expects."""
         loss, gradient = self._experiment.loss_and_gradient(self.theta(x), self._iteration)
         return loss / self.loss_at_start, gradient * self._scale / self.loss_at_start
 
@@ -178,12 +178,12 @@ class Experiment:
 
     @classmethod
     def from_dict(cls, description: Mapping[str, Any]) -> Experiment:
-        """Of the keys of an experiment's file. `scene` may be the keys of a scene's file, and its shapes may have `vertices` [N, 3]
-        and `triangles` [M, 3] in place of `file`. Of arrays may be also initial, target, lower and upper of parameters, the target's
+        """From the keys of an experiment's file. `scene` may be the keys of a scene's file, and its shapes may have `vertices` [N, 3]
+        and `triangles` [M, 3] in place of `file`. Arrays may also be initial, target, lower and upper of parameters, the target's
         `images` [gate, row, column, channel] and `mask` [column, row], and `response` and `file` of gates: (offsets, values). A Capture
         may be the target's `capture` and `file` of the scene's `capture`. Paths are relative to the current folder.
 
-        What arrays hold now is what counts. Images and counts have 32 bits, all else keeps its own. Raises InputError, which names
+        Arrays are copied now. Images and counts have 32 bits, all else keeps its own. Raises InputError, which names
         keys, such as scene.shapes[0].vertices.
         """
         experiment = cls.__new__(cls)
@@ -198,7 +198,7 @@ class Experiment:
         return experiment
 
     def save(self, folder: Path) -> pathlib.Path:
-        """Writes what from_dict was given as files, over those of the same names, and returns the experiment's, folder/experiment.yaml.
+        """Writes the arguments of from_dict as files, over those of the same names, and returns the path of folder/experiment.yaml.
         Raises InputError."""
         if self._files is None:
             raise InputError(f"save: the experiment {self.name} has its files already (allowed: one of from_dict)")
@@ -239,17 +239,17 @@ class Experiment:
 
     @property
     def lower(self) -> np.ndarray:
-        """[unknown]: the least that theta may be; -inf where there is no bound."""
+        """[unknown]: lower bounds of theta; -inf where there is none."""
         return self._flat("lower")
 
     @property
     def upper(self) -> np.ndarray:
-        """[unknown]: the most that theta may be; inf where there is no bound."""
+        """[unknown]: upper bounds of theta; inf where there is none."""
         return self._flat("upper")
 
     @property
     def target(self) -> Image:
-        """[gate, row, column, channel]: what optimisations aim at, rendered at the target values or read from a file; as runs
+        """[gate, row, column, channel]: the target of optimisations, rendered at the target values or read from a file; as runs
         use it, rounded to 32 bits. Computed when first asked for."""
         with self._naming():
             return Image(self._session.target(), self._coordinates)
