@@ -80,7 +80,8 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
   };
   keys.map("noise", noise, "Poisson noise of the rendered target",
            {.only = rendered, .unset = target.photons == 0 && !target.counts});
-  keys.value("window", interval(target.window), "only gates whose centre lies within are used",
+  keys.value("window", interval(target.window),
+             "only gates whose centre lies within are used; other bins of a capture are not rendered",
              {.unit = "scene units", .unset = !target.windowed(), .otherwise = "all are"});
   keys.value("mask", folder.file(target.mask),
              "NumPy array (.npy) [columns, rows] of the pixels; pixels with a zero are not used",

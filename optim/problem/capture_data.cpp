@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/image/capture_file.h"
@@ -31,6 +33,18 @@ GatedImage combined(const GatedImage& counts, int first, int each, int count) {
   return sums;
 }
 
+/// The file's bins that the window leaves, first and number. Where it leaves none, all of them: make_readings says what is wrong.
+std::pair<int, int> windowed(const TargetSpec& target, double start, double width, int bins) {
+  int first = bins, last = -1;
+  for (int g = 0; g < bins; ++g) {
+    const double center = start + (g + 0.5) * width;
+    if (center < target.window[0] - kSame * width || center > target.window[1] + kSame * width) continue;
+    first = std::min(first, g);
+    last = g;
+  }
+  return last < 0 ? std::pair{0, bins} : std::pair{first, last - first + 1};
+}
+
 }  // namespace
 
 std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene,
@@ -51,8 +65,9 @@ std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene
   GateSpec& gates = experiment.gates;
   const double width = capture.delta_t / metres(gates), start = capture.t_start / metres(gates);
   if (gates.needs_bins()) {
-    gates.set_bins(start, width, counts.gates);
-    return std::move(capture.counts);
+    const auto [first, count] = windowed(experiment.target, start, width, counts.gates);
+    gates.set_bins(start + first * width, width, count);
+    return count == counts.gates ? std::move(capture.counts) : combined(counts, first, 1, count);
   }
   const BinGrid bins = *grid_of(gates);
   const double ratio = bins.width / width, offset = (bins.start - start) / width;

@@ -33,18 +33,24 @@ constexpr int kProbes = 12;
 RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
                                      const Poll& poll)
     : problem_(problem),
+      target_(target),
       theta_(theta),
       poll_(poll),
       smoothing_{problem.penalty_scale(target).slopes, 0},
       priors_{0, problem.penalty_scale(target).priors},
       scene_(problem.parameters().apply(theta)),
       basis_(problem.parameters().tangent(theta)) {
-  const Parameters& parameters = problem.parameters();
-  for (int k = 0; k < kGradients; ++k) {
-    Evaluation at = problem.evaluate(theta, target, kMatrixIteration + k, poll);
-    if (k == 0) weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
-    gradients_.push_back(within_bounds(std::move(at.gradient), theta, parameters.lower(), parameters.upper()));
-  }
+  const Evaluation at = problem.evaluate(theta, target, kMatrixIteration, poll);
+  weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
+}
+
+std::vector<std::vector<double>> RenderedCurvature::gradients() const {
+  const Parameters& parameters = problem_.parameters();
+  std::vector<std::vector<double>> gradients;
+  for (int k = 0; k < kGradients; ++k)
+    gradients.push_back(within_bounds(problem_.evaluate(theta_, target_, kMatrixIteration + k, poll_).gradient, theta_,
+                                      parameters.lower(), parameters.upper()));
+  return gradients;
 }
 
 std::vector<double> RenderedCurvature::diagonal() const {

@@ -24,7 +24,7 @@ class RenderedCurvature : public CurvatureProducts {
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
   /// Some of the loss, penalty included, each from random numbers of its own; 0 for unknowns that a bound keeps from following
   /// it.
-  const std::vector<std::vector<double>>& gradients() const { return gradients_; }
+  std::vector<std::vector<double>> gradients() const;
   /// How the unknowns scatter about the optimum, `count` times: by the noise of the readings, and by what the penalty, taken for a
   /// prior, leaves open. Their covariance is (H + P)^-1, which is that of the unknowns but for variance_scale(). The Jacobian's
   /// own noise adds to it. Unknowns that lie at a bound, or that nothing depends on, stay. Not for finite differences.
@@ -39,12 +39,12 @@ class RenderedCurvature : public CurvatureProducts {
   std::vector<double> penalty_product(PenaltyScale scale, const std::vector<double>& vector) const;
 
   const Problem& problem_;
+  const GatedImage& target_;
   const std::vector<double>& theta_;
   const Poll& poll_;
   PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
   Scene scene_;
   TangentBasis basis_;
-  std::vector<std::vector<double>> gradients_;
   std::vector<double> weights_;
 };
 

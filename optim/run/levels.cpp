@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 
 #include "core/base/error.h"
@@ -39,6 +41,13 @@ struct Level {
 double edge_length_of(int level, const RemeshSpec& remesh, const Mesh& loaded) {
   const double first = remesh.edge_length > 0 ? remesh.edge_length : mean_edge_length(loaded);
   return std::ldexp(first, -std::max(0, level - remesh.coarse_levels));
+}
+
+/// Levels that fitted the noise of the same random numbers would not find each other's errors.
+std::uint64_t seed_of(int level, std::uint64_t seed) {
+  constexpr std::uint64_t kApart = 0x9e3779b97f4a7c15;  // 2^64 over the golden ratio: nobody chooses seeds so far apart
+  constexpr std::uint64_t kMostSeed = std::numeric_limits<long long>::max();
+  return (seed + (level - 1) * kApart) & kMostSeed;
 }
 
 void write_surface(const std::string& file, const Mesh& mesh) {
@@ -103,6 +112,7 @@ class Levels {
   bool prepare(int level, double edge_length) {
     Experiment next = experiment_;
     if (!next.target.measured()) next.target.images = file("target.exr");
+    next.seed = seed_of(level, experiment_.seed);
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};

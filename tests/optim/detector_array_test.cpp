@@ -147,6 +147,29 @@ class DetectorArray : public ::testing::Test {
   TemporaryFolder folder_;
 };
 
+// Bins that come from the file end with the window: images are no larger, and the likelihood is that of the same bins of all.
+TEST_F(DetectorArray, BinsOfTheFileEndWithTheWindow) {
+  const std::string parameters = "  - {name: gain, type: gain, initial: 5000, target: 8000}\n";
+  write_counts(parameters, 0);
+  const std::string target = "{capture: counts.h5, window: [1.9, 2.54]}";  // centres 1.91 to 2.53
+  const std::string file = experiment(target, parameters, "{method: quasi_newton}");
+  const Problem cut(load_experiment(file, {"gates={kind: bins}"})), whole(load_experiment(file));
+  const GatedImage seen = cut.make_target(kGoOn), all = whole.make_target(kGoOn);
+  ASSERT_EQ(seen.gates, 32);
+  ASSERT_EQ(all.gates, 80);
+  EXPECT_NEAR(cut.gates().center(0), 1.91, 1e-12);
+  for (int p = 0; p < seen.pixels(); ++p)
+    for (int g = 0; g < seen.gates; ++g) EXPECT_EQ(seen.at(p, g), all.at(p, 25 + g));
+  EXPECT_EQ(cut.readings().count(seen), whole.readings().count(all));
+  const std::vector<double> theta = cut.parameters().initial();
+  const Evaluation one = cut.evaluate(theta, seen, 0, kGoOn), other = whole.evaluate(theta, all, 0, kGoOn);
+  EXPECT_GT(one.loss, 0);
+  EXPECT_NEAR(one.loss, other.loss, 0.02 * other.loss);
+  const Problem none(load_experiment(file, {"gates={kind: bins}", "target.window=[1.4, 3]"}));
+  EXPECT_EQ(none.blank().gates, 80);
+  EXPECT_THROW(Problem(load_experiment(file, {"gates={kind: bins}", "target.window=[8, 9]"})), InputError);
+}
+
 // Without dark bins to begin at, levenberg_marquardt and quasi_newton end with z at 6e4 and the gain at its bound.
 TEST_F(DetectorArray, AHotPointThrowsNoFitOff) {
   const std::string parameters =

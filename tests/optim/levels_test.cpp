@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
@@ -153,12 +154,24 @@ TEST_F(LevelsTest, TheFirstLevelMayBeRemeshed) {
 
 TEST_F(LevelsTest, CoarseLevelsKeepTheLengthOfEdges) {
   write_target();
-  start_run(load_experiment(experiment("flat", "remesh: {levels: 3, coarse_levels: 2, edge_length: 0.4}",
-                                       "{images: hill.exr}")),
+  start_run(load_experiment(
+                experiment("flat", "remesh: {levels: 3, coarse_levels: 2, edge_length: 0.4}", "{images: hill.exr}")),
             options());
   EXPECT_NEAR(mean_edge_length(found("out/levels/1")), 0.4, 0.04);
   EXPECT_NEAR(mean_edge_length(found("out/levels/2")), 0.4, 0.04);
   EXPECT_NEAR(mean_edge_length(found("out/levels/3")), 0.2, 0.02);
+}
+
+TEST_F(LevelsTest, EachHasRandomNumbersOfItsOwn) {
+  write_target();
+  const Experiment all = load_experiment(
+      experiment("flat", "remesh: {levels: 3, coarse_levels: 3, edge_length: 0.8}", "{images: hill.exr}"));
+  start_run(all, options());
+  std::set<std::uint64_t> seeds;
+  for (int level = 1; level <= 3; ++level)
+    seeds.insert(load_experiment(folder_.file("out/levels/" + std::to_string(level) + "/experiment.yaml")).seed);
+  EXPECT_EQ(seeds.size(), 3u);
+  EXPECT_TRUE(seeds.contains(all.seed));
 }
 
 /// Everything begins where it was found: the same surface, albedos, gain and shift; the image is that of before.
