@@ -139,6 +139,8 @@ std::string start_yaml(const BackProjection& volume, const FirstSurface& first, 
 Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::string& place,
                                     const std::function<void(const std::string&)>& warning) {
   const auto begun = std::chrono::steady_clock::now();
+  if (!spec.response.empty() && !file_exists(spec.response))
+    throw InputError(spec.response + ": does not exist (a table of the detector's response: offsets in ps, values)");
   const std::string experiment = place + "/experiment.yaml";
   Reconstruction result;
   FitSettings settings;

@@ -109,7 +109,7 @@ TEST_F(Reconstruct, SaysInOneLineWhatIsWrong) {
   folder_.write("words.csv", "offset,value\n0,one\n");
   const std::vector<std::pair<std::vector<std::string>, std::string>> cases = {
       {command("out", {}, "absent.h5"), "absent.h5"},
-      {command("out", {"--response", folder_.file("absent.csv")}), "absent.csv"},
+      {command("out", {"--response", folder_.file("absent.csv")}), "absent.csv: does not exist"},
       {command("out", {"--response", folder_.file("words.csv")}), "words.csv"},
       {command("out", {"--response", folder_.file("long.csv")}), "plate.h5: the capture's 200 bins are too few"},
       {command("out", {}, "point.h5"), "point.h5: the capture's sensor points are all at one place"},
@@ -120,6 +120,7 @@ TEST_F(Reconstruct, SaysInOneLineWhatIsWrong) {
     EXPECT_EQ(result.status, 2) << named;
     EXPECT_NE(result.errors.find(named), std::string::npos) << result.errors;
     EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
+    EXPECT_EQ(result.errors.find("experiment.yaml"), std::string::npos) << "of a folder that nobody knows";
     EXPECT_FALSE(folder_.has("out"));
   }
 }
