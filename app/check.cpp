@@ -84,7 +84,9 @@ int check(const CheckCommand& command) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
   const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
-  require_memory(problem, derivative_memory(problem, 1, 4 + kMostCheckReplicates));
+  std::vector<MemoryUse> memory = derivative_memory(problem, 1);
+  for (const MemoryUse& part : difference_memory(problem, kMostCheckReplicates)) memory.push_back(part);
+  require_memory(problem, memory);
   const std::string folder = output_folder(command.common, problem.experiment(), "-check");
   make_output_folder(folder);
   catch_interrupts();

@@ -24,7 +24,7 @@ struct DeriveCommand {
   std::string parameter;  ///< empty: all
 };
 
-/// Images held at a time; more unknowns are done in groups, each with the same random numbers.
+/// Of images held at a time, about; more unknowns are done in groups, each with the same random numbers.
 constexpr double kMostBytes = 1e9;
 
 std::vector<std::string> written(const Parameters& parameters, const Parameters::Block& block, const char* ending) {
@@ -44,12 +44,10 @@ int derive(const DeriveCommand& command) {
   const Parameters::Block block = chosen_parameter(parameters, command.parameter);
   const std::string folder = output_folder(command.common, problem.experiment(), "-derive");
 
-  const Camera& camera = problem.scene().camera;
-  const double bytes = 8.0 * camera.width * camera.height * problem.gates().size() * 3;
-  const double images_per_unknown = 4 + kMostReplicates;  // total, three terms and a term's replicates
-  const int group = std::max(1, static_cast<int>(std::min(kMostBytes / (bytes * images_per_unknown), 1e6)));
-  require_memory(problem,
-                 derivative_memory(problem, std::min(group, block.count), static_cast<int>(images_per_unknown)));
+  double bytes = 0;
+  for (const MemoryUse& part : derivative_memory(problem, 1)) bytes += part.bytes;
+  const int group = std::max(1, static_cast<int>(std::min(kMostBytes / bytes, 1e6)));
+  require_memory(problem, derivative_memory(problem, std::min(group, block.count)));
   make_output_folder(folder);
   catch_interrupts();
   ProgressDisplay display(command.common.quiet);
@@ -60,16 +58,17 @@ int derive(const DeriveCommand& command) {
   bool dark = true;  // every derivative is exactly zero
   for (int first = block.begin; first < block.begin + block.count; first += group) {
     const int count = std::min(group, block.begin + block.count - first);
-    const auto components = estimate_derivatives(problem, theta, first, count, poll_interrupt);
+    auto components = estimate_derivatives(problem, theta, first, count, poll_interrupt);
     for (int i = 0; i < count; ++i) {
       const std::string& name = parameters.component_names()[first + i];
       std::vector<std::string> names;
-      std::vector<GatedImage> images;
-      for (const DerivativeEstimate& component : components) {
+      std::vector<StoredImage> images;
+      for (DerivativeEstimate& component : components) {
         names.push_back(component.component);
-        images.push_back(component.images[i]);
+        images.push_back(std::move(component.images[i]));
         require_finite(images.back(), fmt::format("{} of {}", component.component, name));
-        dark = dark && mean_square(images.back()) == 0;
+        for (int pixel = 0; dark && pixel < images.back().pixels(); ++pixel)
+          images.back().for_each(pixel, [&](std::uint32_t, float value) { dark = dark && value == 0; });
       }
       write_exr_components(folder + "/" + name + ".exr", names, images, exr_notes(problem.experiment().gates));
       for (int g = 0; g < problem.gates().size(); ++g)

@@ -45,7 +45,7 @@ double write_images(const Problem& problem, const std::vector<double>& theta, co
   const Clock::time_point start = Clock::now();
   for (const int unknown : unknowns) {
     std::vector<std::string> names;
-    std::vector<GatedImage> images;
+    std::vector<StoredImage> images;
     for (DerivativeEstimate& component : estimate_derivatives(problem, theta, unknown, 1, poll)) {
       names.push_back(component.component);
       images.push_back(std::move(component.images[0]));
@@ -70,7 +70,7 @@ void write_final_derivatives(const std::string& of_run) {
   problem.set_evaluations(1);
   const std::vector<double> theta = final_values(summary, problem.parameters());
   if (!problem.can_render(theta)) return;
-  require_memory(problem, derivative_memory(problem, 1, 4 + kMostReplicates));
+  require_memory(problem, derivative_memory(problem, 1));
   std::filesystem::remove_all(folder);
   make_output_folder(folder);
   const std::vector<int> unknowns = chosen_unknowns(problem.parameters(), theta);

@@ -29,7 +29,8 @@ int render(const CommonOptions& options) {
   const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
   display.end();
   require_finite(estimate.image, "the image");
-  if (const std::string dark = darkness_warning(problem, theta, estimate.image, "the image"); !dark.empty()) warn(dark);
+  if (const std::string dark = darkness_warning(problem, theta, estimate.gates.mean, "the image"); !dark.empty())
+    warn(dark);
   write_exr(folder + "/render.exr", estimate.image, exr_notes(problem.experiment().gates));
   std::string table = "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count" +
                       gate_column_names(problem.experiment().gates) + "\n";

@@ -76,10 +76,10 @@ py::array Session::render(const Array& array, Samples samples, Seed seed, std::u
     choose(samples, seed, own_evaluations_);
     require_renderable(theta);
     require_memory(*problem_, image_memory(*problem_));
-    GatedImage image = estimate_image(*problem_, theta, throw_if_stopped, iteration).image;
-    require_finite(image, "the image");
-    dark = darkness_warning(*problem_, theta, image, "the image");
-    return image;
+    const ImageEstimate estimate = estimate_image(*problem_, theta, throw_if_stopped, iteration);
+    require_finite(estimate.image, "the image");
+    dark = darkness_warning(*problem_, theta, estimate.gates.mean, "the image");
+    return estimate.image.to_gated();
   });
   if (!dark.empty()) warn_python({dark});
   return to_array(std::move(found));
@@ -94,10 +94,11 @@ py::array Session::jvp(const Array& array, const Array& tangent, Samples samples
     choose(samples, seed, own_evaluations_);
     require_renderable(theta);
     problem_->require_parameters();
-    require_memory(*problem_, derivative_memory(*problem_, 1, 4 + kMostReplicates));
-    GatedImage image = estimate_tangent(*problem_, theta, direction, throw_if_stopped, iteration)[0].images[0];
+    require_memory(*problem_, derivative_memory(*problem_, 1));
+    const StoredImage image =
+        std::move(estimate_tangent(*problem_, theta, direction, throw_if_stopped, iteration)[0].images[0]);
     require_finite(image, "the derivative");
-    return image;
+    return image.to_gated();
   }));
 }
 

@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <iterator>
 #include <stdexcept>
+#include <utility>
 
 #include "core/base/error.h"
 #include "core/base/ranks.h"
@@ -33,13 +34,13 @@ int create_beside(const std::string& path, std::string& name) {
 }
 
 /// 0, or the errno of what failed.
-int write_all(int descriptor, const std::string& contents) {
+int write_all(int descriptor, std::string_view contents) {
   for (std::size_t done = 0; done < contents.size();) {
     const ssize_t written = ::write(descriptor, contents.data() + done, contents.size() - done);
     if (written < 0 && errno != EINTR) return errno;
     if (written > 0) done += static_cast<std::size_t>(written);
   }
-  return ::fsync(descriptor) == 0 ? 0 : errno;
+  return 0;
 }
 
 /// Makes the rename itself durable. Not every file system can; the file is whole either way.
@@ -87,20 +88,6 @@ int open_regular_file(const std::string& path, std::size_t& size, std::string& p
   return -1;
 }
 
-void write_here(const std::string& path, const std::string& contents) {
-  std::string temporary;
-  const int descriptor = create_beside(path, temporary);
-  if (descriptor < 0) fail_to_write(path, errno);
-  int error = write_all(descriptor, contents);
-  if (::close(descriptor) != 0 && error == 0) error = errno;
-  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
-    fail_to_write(path, error);
-  }
-  flush_folder(path);
-}
-
 std::optional<std::string> read_here(const std::string& path, std::string& problem) {
   std::string contents;
   std::size_t size = 0;
@@ -124,8 +111,61 @@ std::optional<std::string> read_here(const std::string& path, std::string& probl
 
 }  // namespace
 
+NewFile::NewFile(std::string path) : path_(std::move(path)) {
+  descriptor_ = create_beside(path_, temporary_);
+  if (descriptor_ < 0) fail_to_write(path_, errno);
+}
+
+NewFile::~NewFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  if (!temporary_.empty()) ::unlink(temporary_.c_str());
+}
+
+void NewFile::fail(int error) {
+  error_ = error;
+  fail_to_write(path_, error);
+}
+
+void NewFile::flush() {
+  if (error_ != 0) fail(error_);
+  if (const int error = write_all(descriptor_, buffer_); error != 0) fail(error);
+  written_ += buffer_.size();
+  buffer_.clear();
+}
+
+void NewFile::write(std::string_view bytes) {
+  constexpr std::size_t kBuffer = 1 << 20;
+  if (buffer_.size() + bytes.size() > kBuffer) flush();
+  if (bytes.size() <= kBuffer) {
+    buffer_ += bytes;
+    return;
+  }
+  if (const int error = write_all(descriptor_, bytes); error != 0) fail(error);
+  written_ += bytes.size();
+}
+
+void NewFile::seek(std::uint64_t position) {
+  flush();
+  if (::lseek(descriptor_, static_cast<off_t>(position), SEEK_SET) < 0) fail(errno);
+  written_ = position;
+}
+
+void NewFile::finish() {
+  flush();
+  int error = ::fsync(descriptor_) == 0 ? 0 : errno;
+  if (::close(std::exchange(descriptor_, -1)) != 0 && error == 0) error = errno;
+  if (error == 0 && std::rename(temporary_.c_str(), path_.c_str()) != 0) error = errno;
+  if (error != 0) fail(error);
+  temporary_.clear();
+  flush_folder(path_);
+}
+
 void write_file_atomically(const std::string& path, const std::string& contents) {
-  on_first_rank([&] { write_here(path, contents); });
+  on_first_rank([&] {
+    NewFile file(path);
+    file.write(contents);
+    file.finish();
+  });
 }
 
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -12,6 +13,31 @@ namespace isochron {
 /// where it fails, and throws with path and reason: InputError where the path is at fault (no such folder, no
 /// permission, a folder of that name), else, as on a full disk, std::runtime_error.
 void write_file_atomically(const std::string& path, const std::string& contents);
+
+/// The same in parts, for what is too large to be held twice; on rank 0 alone (on_first_rank). Throws as above.
+class NewFile {
+ public:
+  explicit NewFile(std::string path);
+  /// Without finish() nothing is left of it.
+  ~NewFile();
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+
+  /// Behind what was written last, or where seek() said.
+  void write(std::string_view bytes);
+  void seek(std::uint64_t position);
+  std::uint64_t position() const { return written_ + buffer_.size(); }
+  /// Throws what went wrong before, too, where whoever wrote kept it to himself.
+  void finish();
+
+ private:
+  void flush();
+  [[noreturn]] void fail(int error);
+
+  std::string path_, temporary_, buffer_;
+  int descriptor_ = -1, error_ = 0;
+  std::uint64_t written_ = 0;  ///< where the buffer begins in the file
+};
 
 /// Contents of a file. Empty where it cannot be read, with the reason in `problem`, to be put behind its name. Never
 /// waits: a named pipe or a device is refused.

@@ -38,12 +38,13 @@ class SparseSum {
     }
   }
 
-  /// f(i, value) for the sums of all touched blocks below `size`, in order.
+  /// f(i, value) for the sums of all touched blocks in [begin, end), in order.
   template <class F>
-  void for_each(std::size_t size, F&& f) const {
-    for (std::size_t block = 0; block < touched_.size(); ++block)
+  void for_each(std::size_t begin, std::size_t end, F&& f) const {
+    for (std::size_t block = begin / kBlock; block * kBlock < end && block < touched_.size(); ++block)
       if (touched_[block])
-        for (std::size_t i = block * kBlock; i < std::min(size, (block + 1) * kBlock); ++i) f(i, values_[i]);
+        for (std::size_t i = std::max(begin, block * kBlock); i < std::min(end, (block + 1) * kBlock); ++i)
+          f(i, values_[i]);
   }
 
   /// Only touched blocks.

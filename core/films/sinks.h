@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/sparse_sum.h"
+#include "core/films/film.h"
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/paths/path_differential.h"
@@ -42,29 +43,6 @@ class Sink {
   virtual void add(int pixel, const Rgb& value, double length, GateWeights use) = 0;
   /// value * dl for one gate, where contributions are derivatives: a member of a coupled pair.
   virtual void add_length_rate(int /*pixel*/, int /*gate*/, const Rgb& /*value*/) {}
-};
-
-/// Where the values of a gated image are added up: in the image itself, or in a part of a sparse sum. What it refers to must
-/// outlive it.
-class Film {
- public:
-  Film(GatedImage& image) : channels_(image.channels), gates_(image.gates), values_(image.data.data()) {}
-  /// For an image of the shape of `shape`, whose values begin at `offset`.
-  Film(const GatedImage& shape, SparseSum& sum, std::size_t offset)
-      : channels_(shape.channels), gates_(shape.gates), sum_(&sum), offset_(offset) {}
-
-  int channels() const { return channels_; }
-  /// The values of all channels of a gate and of those after it, up to GateSet::kRun gates in all.
-  double* at(int pixel, int gate, int count = 1) const {
-    const std::size_t index = (static_cast<std::size_t>(pixel) * gates_ + gate) * channels_;
-    return values_ ? values_ + index : sum_->at(offset_ + index, count * channels_);
-  }
-
- private:
-  int channels_, gates_;
-  double* values_ = nullptr;
-  SparseSum* sum_ = nullptr;
-  std::size_t offset_ = 0;
 };
 
 class PrimalSink final : public Sink {

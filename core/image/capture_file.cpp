@@ -209,9 +209,8 @@ Layout layout_of(const Hdf5Shape& laser, const CaptureGeometry& geometry) {
   return layout;
 }
 
-void require_fit(const CaptureFile& capture) {
-  const CaptureGeometry& geometry = capture.geometry;
-  const GatedImage& counts = capture.counts;
+template <class Image>
+void require_fit(const CaptureGeometry& geometry, double delta_t, const Image& counts) {
   const std::size_t points = static_cast<std::size_t>(geometry.columns) * static_cast<std::size_t>(geometry.rows);
   if (points < 1 || geometry.sensor.size() != points || geometry.sensor_normal.size() != points ||
       geometry.spots() < 1 || (!geometry.confocal && geometry.laser_normal.size() != geometry.laser.size()))
@@ -219,7 +218,7 @@ void require_fit(const CaptureFile& capture) {
   if (counts.width != geometry.columns || counts.height != geometry.rows * geometry.spots() || counts.gates < 1 ||
       counts.channels != 1)
     throw std::invalid_argument("a capture's counts need the columns and rows of its grid, bins, and one channel");
-  if (!(capture.delta_t > 0)) throw std::invalid_argument("a capture's bins need a width");
+  if (!(delta_t > 0)) throw std::invalid_argument("a capture's bins need a width");
 }
 
 /// Writes points, or normals, in tal's order: [columns, rows, 3].
@@ -261,7 +260,18 @@ void write_geometry(Hdf5Writer& writer, const CaptureGeometry& geometry) {
   write_point("sensor_xyz", geometry.sensor_origin);
 }
 
-void write_counts(Hdf5Writer& writer, const GatedImage& counts, const CaptureGeometry& geometry) {
+/// f(bin, count) for a pixel's bins in [begin, end) that can be other than zero.
+template <class F>
+void for_each_count(const GatedImage& counts, std::size_t pixel, std::size_t begin, std::size_t end, F&& f) {
+  for (std::size_t bin = begin; bin < end; ++bin) f(bin, counts.data[pixel * counts.gates + bin]);
+}
+template <class F>
+void for_each_count(const StoredImage& counts, std::size_t pixel, std::size_t begin, std::size_t end, F&& f) {
+  counts.for_each(static_cast<int>(pixel), static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end), f);
+}
+
+template <class Image>
+void write_counts(Hdf5Writer& writer, const Image& counts, const CaptureGeometry& geometry) {
   const std::size_t spots = static_cast<std::size_t>(geometry.spots()), bins = static_cast<std::size_t>(counts.gates);
   const Layout layout = layout_of({spots, 1}, geometry);
   Hdf5Shape shape{bins, layout.columns, layout.rows};
@@ -271,9 +281,11 @@ void write_counts(Hdf5Writer& writer, const GatedImage& counts, const CaptureGeo
   std::vector<float> slab(most * layout.size());
   for (std::size_t first = 0; first < bins; first += most) {
     const std::size_t count = std::min(most, bins - first);
+    std::fill(slab.begin(), slab.end(), 0.0f);
     layout.for_each([&](std::size_t i, std::size_t pixel) {
-      for (std::size_t bin = 0; bin < count; ++bin)
-        slab[bin * layout.size() + i] = static_cast<float>(counts.data[pixel * bins + first + bin]);
+      for_each_count(counts, pixel, first, first + count, [&](std::size_t bin, auto value) {
+        slab[(bin - first) * layout.size() + i] = static_cast<float>(value);
+      });
     });
     writer.write_slab("H", first, count, slab.data());
   }
@@ -303,20 +315,23 @@ GatedImage read_counts(const Hdf5Reader& reader, const CaptureGeometry& geometry
   return counts;
 }
 
-/// The file of a capture.
-std::string contents_of(const CaptureFile& capture) {
-  constexpr std::size_t kHeaders = std::size_t{1} << 16;
-  Hdf5Writer writer(sizeof(float) * capture.counts.data.size() + kHeaders);
-  write_counts(writer, capture.counts, capture.geometry);
-  // The names and numbers of tal's own enumerations.
-  writer.write_enumeration("H_format",
-                           {{"UNKNOWN", 0}, {"T_Sx_Sy", 1}, {"T_Lx_Ly_Sx_Sy", 2}, {"T_Si", 3}, {"T_Li_Si", 4}},
-                           capture.geometry.spots() > 1 ? 2 : 1);
-  write_geometry(writer, capture.geometry);
-  writer.write_number("delta_t", capture.delta_t);
-  writer.write_number("t_start", capture.t_start);
-  writer.write_text("scene_info", "{original_format: isochron}");
-  return writer.image();
+template <class Image>
+void write_with(const std::string& file, const CaptureFile& capture, const Image& counts) {
+  require_fit(capture.geometry, capture.delta_t, counts);
+  use_hdf5([&] {
+    constexpr std::size_t kHeaders = std::size_t{1} << 16;
+    Hdf5Writer writer(sizeof(float) * counts.gates * counts.pixels() + kHeaders);
+    write_counts(writer, counts, capture.geometry);
+    // The names and numbers of tal's own enumerations.
+    writer.write_enumeration("H_format",
+                             {{"UNKNOWN", 0}, {"T_Sx_Sy", 1}, {"T_Lx_Ly_Sx_Sy", 2}, {"T_Si", 3}, {"T_Li_Si", 4}},
+                             capture.geometry.spots() > 1 ? 2 : 1);
+    write_geometry(writer, capture.geometry);
+    writer.write_number("delta_t", capture.delta_t);
+    writer.write_number("t_start", capture.t_start);
+    writer.write_text("scene_info", "{original_format: isochron}");
+    writer.save(file);
+  });
 }
 
 }  // namespace
@@ -345,11 +360,11 @@ CaptureFile read_capture(const std::string& file) {
   return capture;
 }
 
+void write_capture(const std::string& file, const CaptureFile& capture, const StoredImage& counts) {
+  write_with(file, capture, counts);
+}
 void write_capture(const std::string& file, const CaptureFile& capture) {
-  require_fit(capture);
-  std::string contents;
-  use_hdf5([&] { contents = contents_of(capture); });
-  write_file_atomically(file, contents);
+  write_with(file, capture, capture.counts);
 }
 
 }  // namespace isochron

@@ -5,6 +5,7 @@
 
 #include "core/base/vec.h"
 #include "core/image/image.h"
+#include "core/image/stored_image.h"
 
 namespace isochron {
 
@@ -48,5 +49,7 @@ CaptureFile read_capture(const std::string& file);
 /// Writes counts as 32-bit floats, by temporary name and rename; several spots as [T, spots, 1, Sx, Sy]. Throws
 /// InputError where the file cannot be written, and std::invalid_argument where image and geometry do not fit together.
 void write_capture(const std::string& file, const CaptureFile& capture);
+/// The same with other counts than those of the capture.
+void write_capture(const std::string& file, const CaptureFile& capture, const StoredImage& counts);
 
 }  // namespace isochron

@@ -8,57 +8,240 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <functional>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 
 #include "core/base/error.h"
 #include "core/base/file.h"
+#include "core/base/ranks.h"
 #include "core/image/exr_check.h"
 #include "core/image/image.h"
+#include "core/image/sparse_block.h"
+#include "core/image/stored_image.h"
 
 namespace isochron {
 namespace {
 
 constexpr char kRgb[] = {'R', 'G', 'B'};
+/// The attribute that names the largest magnitude of each gate; with ".COMPONENT" behind it, of each component's.
+const std::string kPeaks = "isochron.peaks";
 
 std::string gate_channel(int gate, char letter) {
   return fmt::format("gate{:03}.{}", gate, letter);
 }
 
-/// A named channel of one float per pixel.
-struct Plane {
-  std::string name;
-  std::vector<float> values;
+/// What OpenEXR writes, on its way to a file.
+class FileStream final : public Imf::OStream {
+ public:
+  FileStream(const std::string& name, NewFile& file) : OStream(name.c_str()), file_(file) {}
+  void write(const char bytes[], int count) override { file_.write({bytes, static_cast<std::size_t>(count)}); }
+  std::uint64_t tellp() override { return file_.position(); }
+  void seekp(std::uint64_t position) override { file_.seek(position); }
+
+ private:
+  NewFile& file_;
 };
 
-void write_planes(const std::string& file, int width, int height, const std::vector<Plane>& planes,
-                  const ExrNotes& notes) {
-  Imf::Header header(width, height);
-  header.compression() = Imf::ZIP_COMPRESSION;
-  for (const auto& [name, text] : notes) header.insert(name, Imf::StringAttribute(text));
-  Imf::FrameBuffer buffer;
-  for (const Plane& plane : planes) {
-    header.channels().insert(plane.name, Imf::Channel(Imf::FLOAT));
-    // OpenEXR asks for a pointer to what it only reads.
-    char* base = reinterpret_cast<char*>(const_cast<float*>(plane.values.data()));
-    buffer.insert(plane.name, Imf::Slice(Imf::FLOAT, base, sizeof(float), sizeof(float) * width));
+/// f(column, channel, value)
+using TakeValue = std::function<void(int, std::size_t, float)>;
+
+/// Channels of one float per pixel.
+struct Planes {
+  int width, height;
+  std::vector<std::string> names;
+  std::function<void(int, const TakeValue&)> visit;  ///< of a row the values that can be other than zero
+};
+
+constexpr int kBlockLines = 16;  ///< that ZIP_COMPRESSION compresses together
+
+/// What is to be known of values before they are written.
+struct Survey {
+  std::vector<float> peaks;  ///< largest magnitude of each channel
+  /// The values other than zero of each block, where they are few in the whole image. Else empty.
+  std::vector<std::vector<SparseValue>> blocks;
+};
+
+Survey survey_of(const Planes& planes) {
+  constexpr std::size_t kFew = 16, kLargest = std::size_t{1} << 29;  // few: one of so many
+  const std::size_t count = planes.names.size(), row = count * planes.width;
+  std::vector<std::size_t> order(count), rank(count);  // channels lie in a file by their names
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return planes.names[a] < planes.names[b]; });
+  for (std::size_t i = 0; i < count; ++i) rank[order[i]] = i;
+  Survey survey{std::vector<float>(count),
+                std::vector<std::vector<SparseValue>>((planes.height - 1) / kBlockLines + 1)};
+  std::size_t found = 0;
+  bool few = row * kBlockLines < kLargest;
+  for (int y = 0; y < planes.height; ++y) {
+    std::vector<SparseValue>& block = survey.blocks[y / kBlockLines];
+    const std::size_t before = block.size(), first = y % kBlockLines * row;
+    planes.visit(y, [&](int column, std::size_t channel, float value) {
+      if (std::bit_cast<std::uint32_t>(value) == 0) return;
+      survey.peaks[channel] = std::max(survey.peaks[channel], std::abs(value));
+      ++found;
+      if (few) block.push_back({static_cast<std::uint32_t>(first + rank[channel] * planes.width + column), value});
+    });
+    few = few && kFew * found <= row * planes.height;
+    std::sort(block.begin() + static_cast<std::ptrdiff_t>(before), block.end(),
+              [](const SparseValue& a, const SparseValue& b) { return a.place < b.place; });
   }
-  Imf::StdOSStream stream;
-  {
-    Imf::OutputFile output(stream, header);
-    output.setFrameBuffer(buffer);
-    output.writePixels(height);
-  }  // the table of offsets is written on destruction
-  write_file_atomically(file, stream.str());
+  if (!few) survey.blocks.clear();
+  return survey;
 }
 
-void require_pixels(const GatedImage& image) {
-  if (image.width < 1 || image.height < 1 || image.gates < 1 || (image.channels != 1 && image.channels != 3))
+Imf::Header header_of(const Planes& planes, const ExrNotes& notes) {
+  Imf::Header header(planes.width, planes.height);
+  header.compression() = Imf::ZIP_COMPRESSION;
+  for (const auto& [name, text] : notes) header.insert(name, Imf::StringAttribute(text));
+  for (const std::string& name : planes.names) header.channels().insert(name, Imf::Channel(Imf::FLOAT));
+  return header;
+}
+
+/// By OpenEXR, in a time that goes with the number of values.
+void write_all(Imf::OStream& stream, const Imf::Header& header, const Planes& planes) {
+  const std::size_t count = planes.names.size();
+  std::vector<float> row(count * planes.width);
+  Imf::FrameBuffer buffer;
+  for (std::size_t i = 0; i < count; ++i) {
+    // One row for all scanlines (no stride in y).
+    char* base = reinterpret_cast<char*>(row.data() + i);
+    buffer.insert(planes.names[i], Imf::Slice(Imf::FLOAT, base, sizeof(float) * count, 0));
+  }
+  Imf::OutputFile output(stream, header);
+  output.setFrameBuffer(buffer);
+  for (int y = 0; y < planes.height; ++y) {
+    std::fill(row.begin(), row.end(), 0.0f);
+    planes.visit(y, [&](int column, std::size_t channel, float value) { row[column * count + channel] = value; });
+    output.writePixels();
+  }
+}  // the table of offsets is written on destruction
+
+template <class T>
+void write_plain(Imf::OStream& stream, const T& value) {
+  stream.write(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// Of few values that are not zero.
+void write_few(Imf::OStream& stream, const Imf::Header& header, const Planes& planes, const Survey& survey) {
+  constexpr std::int32_t kMagic = 20000630, kVersion = 2, kLongNames = 0x400;
+  write_plain(stream, kMagic);
+  write_plain(stream, kVersion | kLongNames);
+  header.writeTo(stream);
+  const std::uint64_t table = stream.tellp();
+  std::vector<std::uint64_t> offsets(survey.blocks.size());
+  const auto write_table = [&] {
+    for (const std::uint64_t offset : offsets) write_plain(stream, offset);
+  };
+  write_table();
+  for (std::size_t i = 0; i < survey.blocks.size(); ++i) {
+    const int y = static_cast<int>(i) * kBlockLines, lines = std::min(kBlockLines, planes.height - y);
+    const std::size_t size = planes.names.size() * planes.width * lines;
+    std::string block = compressed_block(size, survey.blocks[i]);
+    if (block.size() >= size * sizeof(float)) block = plain_block(size, survey.blocks[i]);
+    offsets[i] = stream.tellp();
+    write_plain(stream, static_cast<std::int32_t>(y));
+    write_plain(stream, static_cast<std::int32_t>(block.size()));
+    stream.write(block.data(), static_cast<int>(block.size()));
+  }
+  stream.seekp(table);
+  write_table();
+}
+
+/// `groups`: notes of what the channels belong to, equally many of each, `each` of them to a gate. A note of each group says how
+/// large the gates' values are, so that readers need not look at all of them to choose some.
+void write_planes(const std::string& file, const Planes& planes, ExrNotes notes, const std::vector<std::string>& groups,
+                  int each) {
+  on_first_rank([&] {
+    const Survey survey = survey_of(planes);
+    auto peak = survey.peaks.begin();
+    for (const std::string& group : groups) {
+      std::string text;
+      for (std::size_t i = 0; i < planes.names.size() / groups.size(); i += each, peak += each)
+        text += fmt::format("{}{:.3g}", text.empty() ? "" : " ", *std::max_element(peak, peak + each));
+      notes.emplace_back(group, text);
+    }
+    NewFile out(file);
+    FileStream stream(file, out);
+    const Imf::Header header = header_of(planes, notes);
+    if (survey.blocks.empty())
+      write_all(stream, header, planes);
+    else
+      write_few(stream, header, planes, survey);
+    out.finish();
+  });
+}
+
+std::vector<std::string> peaks_of(const std::vector<std::string>& components) {
+  std::vector<std::string> names;
+  for (const std::string& component : components) names.push_back(kPeaks + "." + component);
+  return names;
+}
+
+void require_pixels(int width, int height, int gates, int channels) {
+  if (width < 1 || height < 1 || gates < 1 || (channels != 1 && channels != 3))
     throw std::invalid_argument("an image to be written needs pixels, gates, and one or three channels");
+}
+
+/// f(place, value) for a pixel's values [gate][channel].
+template <class F>
+void for_each_value(const GatedImage& image, int pixel, F&& f) {
+  const std::size_t count = static_cast<std::size_t>(image.gates) * image.channels;
+  for (std::size_t i = 0; i < count; ++i) f(i, image.data[pixel * count + i]);
+}
+template <class F>
+void for_each_value(const StoredImage& image, int pixel, F&& f) {
+  image.for_each(pixel, f);
+}
+
+template <class Image>
+Planes planes_of(const Image& image) {
+  require_pixels(image.width, image.height, image.gates, image.channels);
+  Planes planes{image.width, image.height, {}, {}};
+  for (int gate = 0; gate < image.gates; ++gate)
+    for (int c = 0; c < image.channels; ++c)
+      planes.names.push_back(gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[c]));
+  planes.visit = [&image](int y, const TakeValue& take) {
+    for (int x = 0; x < image.width; ++x)
+      for_each_value(image, y * image.width + x,
+                     [&](std::size_t place, auto value) { take(x, place, static_cast<float>(value)); });
+  };
+  return planes;
+}
+
+/// Averages over channels of several images.
+template <class Image>
+Planes planes_of(const std::vector<std::string>& components, const std::vector<Image>& images) {
+  if (components.empty() || components.size() != images.size())
+    throw std::invalid_argument("one image per component is needed");
+  Planes planes{images[0].width, images[0].height, {}, {}};
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    require_pixels(images[i].width, images[i].height, images[i].gates, images[i].channels);
+    if (!images[i].same_shape(images[0])) throw std::invalid_argument("the components' images differ in shape");
+    for (int gate = 0; gate < images[i].gates; ++gate)
+      planes.names.push_back(components[i] + "." + gate_channel(gate, 'Y'));
+  }
+  planes.visit = [&images](int y, const TakeValue& take) {
+    const std::size_t channels = static_cast<std::size_t>(images[0].channels);
+    RowSum sum(images.size() * images[0].gates);
+    for (int x = 0; x < images[0].width; ++x) {
+      for (std::size_t i = 0; i < images.size(); ++i)
+        for_each_value(images[i], y * images[0].width + x, [&](std::size_t place, auto value) {
+          if (value != 0) sum.add(i * images[0].gates + place / channels, value);
+        });
+      sum.take([&](std::size_t channel, double value) {
+        take(x, channel, static_cast<float>(value / static_cast<double>(channels)));
+      });
+    }
+  };
+  return planes;
 }
 
 [[noreturn]] void fail(const std::string& file, const std::string& what) {
@@ -175,41 +358,19 @@ GatedImage read_planes(const std::string& file) {
 }  // namespace
 
 void write_exr(const std::string& file, const GatedImage& image, const ExrNotes& notes) {
-  require_pixels(image);
-  std::vector<Plane> planes;
-  for (int gate = 0; gate < image.gates; ++gate) {
-    for (int channel = 0; channel < image.channels; ++channel) {
-      Plane plane{gate_channel(gate, image.channels == 1 ? 'Y' : kRgb[channel]), {}};
-      plane.values.reserve(image.pixels());
-      for (int pixel = 0; pixel < image.pixels(); ++pixel)
-        plane.values.push_back(static_cast<float>(image.at(pixel, gate, channel)));
-      planes.push_back(std::move(plane));
-    }
-  }
-  write_planes(file, image.width, image.height, planes, notes);
+  write_planes(file, planes_of(image), notes, {kPeaks}, image.channels);
+}
+void write_exr(const std::string& file, const StoredImage& image, const ExrNotes& notes) {
+  write_planes(file, planes_of(image), notes, {kPeaks}, image.channels);
 }
 
 void write_exr_components(const std::string& file, const std::vector<std::string>& components,
                           const std::vector<GatedImage>& images, const ExrNotes& notes) {
-  if (components.empty() || components.size() != images.size())
-    throw std::invalid_argument("one image per component is needed");
-  std::vector<Plane> planes;
-  for (std::size_t i = 0; i < images.size(); ++i) {
-    const GatedImage& image = images[i];
-    require_pixels(image);
-    if (!image.same_shape(images[0])) throw std::invalid_argument("the components' images differ in shape");
-    for (int gate = 0; gate < image.gates; ++gate) {
-      Plane plane{components[i] + "." + gate_channel(gate, 'Y'), {}};
-      plane.values.reserve(image.pixels());
-      for (int pixel = 0; pixel < image.pixels(); ++pixel) {
-        double sum = 0;
-        for (int channel = 0; channel < image.channels; ++channel) sum += image.at(pixel, gate, channel);
-        plane.values.push_back(static_cast<float>(sum / image.channels));
-      }
-      planes.push_back(std::move(plane));
-    }
-  }
-  write_planes(file, images[0].width, images[0].height, planes, notes);
+  write_planes(file, planes_of(components, images), notes, peaks_of(components), 1);
+}
+void write_exr_components(const std::string& file, const std::vector<std::string>& components,
+                          const std::vector<StoredImage>& images, const ExrNotes& notes) {
+  write_planes(file, planes_of(components, images), notes, peaks_of(components), 1);
 }
 
 GatedImage read_exr(const std::string& file) {

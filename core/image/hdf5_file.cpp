@@ -251,13 +251,17 @@ Hdf5Writer::~Hdf5Writer() {
   H5Fclose(id_);
 }
 
-std::string Hdf5Writer::image() const {
+void Hdf5Writer::save(const std::string& file) const {
   if (H5Fflush(id_, H5F_SCOPE_GLOBAL) < 0) fail_to_write();
   const ssize_t size = H5Fget_file_image(id_, nullptr, 0);
-  if (size < 0) fail_to_write();
-  std::string contents(static_cast<std::size_t>(size), '\0');
-  if (H5Fget_file_image(id_, contents.data(), contents.size()) < 0) fail_to_write();
-  return contents;
+  void** memory = nullptr;
+  if (size < 0 || H5Fget_vfd_handle(id_, H5P_DEFAULT, reinterpret_cast<void**>(&memory)) < 0) fail_to_write();
+  const std::string_view contents(static_cast<const char*>(*memory), static_cast<std::size_t>(size));
+  on_first_rank([&] {
+    NewFile out(file);
+    out.write(contents);
+    out.finish();
+  });
 }
 
 void Hdf5Writer::write(const char* name, const Hdf5Shape& shape, const std::vector<double>& values) {

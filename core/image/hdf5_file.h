@@ -55,7 +55,7 @@ class Hdf5Reader {
   std::int64_t id_ = -1;
 };
 
-/// A new file, made in memory: HDF5 cannot be relied on where a disk is full. What it holds is copied once, by `image`.
+/// A new file, made in memory: HDF5 cannot be relied on where a disk is full.
 class Hdf5Writer {
  public:
   /// `bytes` is about how large the file will be.
@@ -73,8 +73,8 @@ class Hdf5Writer {
   /// A dataset of 32-bit floats, to be filled by `write_slab`.
   void create_floats(const char* name, const Hdf5Shape& shape);
   void write_slab(const char* name, std::size_t first, std::size_t count, const float* values);
-  /// The file's contents.
-  std::string image() const;
+  /// Writes what it holds, see write_file_atomically().
+  void save(const std::string& file) const;
 
  private:
   std::int64_t id_ = -1;

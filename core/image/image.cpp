@@ -21,11 +21,15 @@ void require_finite(const GatedImage& image, const std::string& what) {
   const auto wrong = std::count_if(image.data.begin(), image.data.end(), [](double value) {
     return !(std::abs(value) <= std::numeric_limits<float>::max());
   });
+  require_none_wrong(static_cast<std::size_t>(wrong), image.data.size(), what);
+}
+
+void require_none_wrong(std::size_t wrong, std::size_t values, const std::string& what) {
   if (wrong > 0)
     throw std::runtime_error(
         fmt::format("{} of {} values of {} are no finite 32-bit floats: emission or gates are too "
                     "extreme",
-                    wrong, image.data.size(), what));
+                    wrong, values, what));
 }
 
 }  // namespace isochron

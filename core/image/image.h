@@ -29,12 +29,14 @@ struct GatedImage {
 
 /// Throws std::runtime_error where a value is not finite, or would not be as a 32-bit float; `what` says of which image.
 void require_finite(const GatedImage& image, const std::string& what);
+/// The same where `wrong` values of so many are not.
+void require_none_wrong(std::size_t wrong, std::size_t values, const std::string& what);
 
 /// Texts by name for the header of an EXR file.
 using ExrNotes = std::vector<std::pair<std::string, std::string>>;
 
-/// Writes 32-bit float channels `gateNNN.R/G/B` (three channels) or `gateNNN.Y` (one), by temporary name and rename.
-/// Throws InputError when the file cannot be written.
+/// Writes 32-bit float channels `gateNNN.R/G/B` (three channels) or `gateNNN.Y` (one), by temporary name and rename, a
+/// part at a time. Throws InputError when the file cannot be written.
 void write_exr(const std::string& file, const GatedImage& image, const ExrNotes& notes = {});
 
 /// Writes derivative images: channels `COMPONENT.gateNNN.Y`, each the average over the image's channels.

@@ -21,9 +21,6 @@
 
 namespace isochron {
 
-/// Pixels that a partition takes at a turn.
-inline constexpr int kPixelsPerBlock = 8;
-
 /// One of `count` partitions of the work of a pass, a power of two. Blocks of pixels are dealt out to them in turn; where
 /// there are fewer blocks than partitions, several share a block, each with a part of its pixels' samples.
 struct Partition {
@@ -94,6 +91,13 @@ class Passes {
   /// What the partitions of a pass took when it was last run with as many; null: not known.
   PartitionCosts* partition_costs(PassKind kind, int partitions) const {
     return cache_ && rank_count() > 1 ? &cache_->partition_costs(kind, partitions) : nullptr;
+  }
+
+  /// The sum of what run(partition) makes of each.
+  template <class Sum, class Run>
+  Sum sum_of(PassKind kind, int partitions, Run&& run) const {
+    SharedPartitions shared(partitions, partition_costs(kind, partitions));
+    return sum_of_partitions<Sum>(shared, run);
   }
 
   /// Runs f(pixel) for the pixels of one partition, in a fixed order.

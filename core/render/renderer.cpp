@@ -7,6 +7,7 @@
 #include "core/base/partition_sum.h"
 #include "core/films/breakdown_sinks.h"
 #include "core/render/passes.h"
+#include "core/render/replicated.h"
 
 namespace isochron {
 namespace {
@@ -54,23 +55,21 @@ struct Renderer::Impl : Passes {
     shared.keep_costs();
   }
 
-  /// The sum of what run(partition) makes of each.
-  template <class Sum, class Run>
-  Sum sum_of(PassKind kind, int partitions, Run&& run) const {
-    SharedPartitions shared(partitions, partition_costs(kind, partitions));
-    return sum_of_partitions<Sum>(shared, run);
-  }
-
   /// Of a gradient. Partitions take turns at blocks of pixels.
   static int part_of(int pixel) { return pixel / kPixelsPerBlock % kGradientParts; }
 
+  /// The background of a pixel, and its degree of freedom.
+  std::pair<double, int> background_of(int pixel) const {
+    const Detector& detector = scene.scene.detector;
+    const int i = detector.background_of(scene.scene.capture, pixel);
+    return {detector.background[i], scene.layout.background(i)};
+  }
   /// f(pixel, background of the pixel, its degree of freedom)
   template <class F>
   void for_each_background(F&& f) const {
-    const Detector& detector = scene.scene.detector;
     for (int pixel = 0; pixel < scene.pixels(); ++pixel) {
-      const int i = detector.background_of(scene.scene.capture, pixel);
-      f(pixel, detector.background[i], scene.layout.background(i));
+      const auto [value, dof] = background_of(pixel);
+      f(pixel, value, dof);
     }
   }
   void add_background(GatedImage& image) const {
@@ -147,12 +146,13 @@ void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange
     return;
   }
   const int partitions = impl_->partitions_for(range, image.data.size());
-  const auto sum = impl_->sum_of<SparseSum>(PassKind::primal, partitions, [&](int partition) {
-    SparseSum own(image.data.size());
-    run({image, own, 0}, {partition, partitions});
+  const auto sum = impl_->sum_of<ListedSum>(PassKind::primal, partitions, [&](int partition) {
+    ListedSum own(image.data.size());
+    run({image.gates, image.channels, own, 0}, {partition, partitions});
+    own.finish();
     return own;
   });
-  sum.for_each(image.data.size(), [&](std::size_t i, double value) { image.data[i] += value; });
+  sum.for_each(0, image.data.size(), [&](std::size_t i, double value) { image.data[i] += value; });
 }
 
 std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, SampleRange range) const {
@@ -174,15 +174,63 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
   }
   const std::size_t size = images[0].data.size(), values = size * columns;
   const int partitions = impl_->partitions_for(range, values);
-  const auto sum = impl_->sum_of<SparseSum>(pass_kind(term), partitions, [&](int partition) {
-    SparseSum own(values);
+  const auto sum = impl_->sum_of<ListedSum>(pass_kind(term), partitions, [&](int partition) {
+    ListedSum own(values);
     std::vector<Film> films;
-    for (int column = 0; column < columns; ++column) films.emplace_back(images[column], own, column * size);
+    for (int column = 0; column < columns; ++column)
+      films.emplace_back(images[0].gates, images[0].channels, own, column * size);
     run(films, {partition, partitions});
+    own.finish();
     return own;
   });
-  sum.for_each(values, [&](std::size_t i, double value) { images[i / size].data[i % size] += value; });
+  sum.for_each(0, values, [&](std::size_t i, double value) { images[i / size].data[i % size] += value; });
   return images;
+}
+
+ReplicatedImage Renderer::render_replicates(const Stream& stream, const std::vector<SampleRange>& ranges) const {
+  const PassTimes::Timed timed(impl_->times(), PassKind::primal);
+  const ReplicatedPasses passes(*impl_, {.kind = PassKind::primal,
+                                         .columns = 1,
+                                         .stream = stream,
+                                         .ranges = ranges,
+                                         .lit = !impl_->scene.emitters.empty(),
+                                         .stay_in_pixels = pixels_are_independent() && impl_->has_many_pixels()});
+  std::vector<ReplicatedImage> images = passes.render(
+      [&](const Pass& pass, const std::vector<Film>& films, Partition partition) {
+        PrimalSink sink(impl_->gates, films[0]);
+        impl_->run_images(pass, partition, sink);
+      },
+      [&](int, int pixel) { return impl_->background_of(pixel).first; });
+  return std::move(images[0]);
+}
+
+std::vector<ReplicatedImage> Renderer::derive_replicates(Term term, const Stream& stream,
+                                                         const std::vector<SampleRange>& ranges) const {
+  if (!impl_->basis) throw std::logic_error("derive_replicates: the renderer was made without a tangent basis");
+  const TangentBasis& basis = *impl_->basis;
+  if (basis.columns == 0) return {};
+  const bool lit = impl_->has(term);
+  if (lit) impl_->prepare(term);
+  const PassTimes::Timed timed(impl_->times(), pass_kind(term));
+  const ReplicatedPasses passes(*impl_, {.kind = pass_kind(term),
+                                         .columns = basis.columns,
+                                         .stream = stream,
+                                         .ranges = ranges,
+                                         .lit = lit,
+                                         .stay_in_pixels = pixels_are_independent(term) && impl_->has_many_pixels()});
+  return passes.render(
+      [&](const Pass& pass, const std::vector<Film>& films, Partition partition) {
+        TangentSink sink(impl_->gates, impl_->scene.layout, basis, films);
+        impl_->run_term(term, pass, partition, impl_->every_gate, sink);
+      },
+      [&](int column, int pixel) {
+        double sum = 0;
+        if (term != Term::interior) return sum;
+        const int dof = impl_->background_of(pixel).second;
+        for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
+          if (basis.entries[e].column == column) sum += basis.entries[e].coefficient;
+        return sum;
+      });
 }
 
 void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
@@ -203,14 +251,14 @@ void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& 
     AdjointSink sink(impl_->gates, impl_->scene.layout, basis, adjoint, own);
     impl_->run_term(term, {stream, range}, {partition, partitions}, pick, sink);
     if (parts)
-      own.for_each(dof_gradient.size(), [&](std::size_t dof, double value) {
+      own.for_each(0, dof_gradient.size(), [&](std::size_t dof, double value) {
         for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
           by_partition[partition][basis.entries[e].column] += basis.entries[e].coefficient * value;
       });
     return own;
   });
   if (parts) all_gather_parts(shared.parts, by_partition);
-  sum.for_each(dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
+  sum.for_each(0, dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
   // Whatever the number of partitions, each part is of the same pixels, see part_of.
   const int pixels = impl_->scene.pixels();
   for (int i = 0; i < static_cast<int>(by_partition.size()); ++i)

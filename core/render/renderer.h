@@ -6,6 +6,7 @@
 
 #include "core/base/random.h"
 #include "core/films/breakdown.h"
+#include "core/films/replicates.h"
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/paths/options.h"
@@ -33,6 +34,12 @@ class Renderer {
 
   /// Unbiased estimate of one term of the images' derivative, one image per unknown (column of the basis).
   std::vector<GatedImage> derive(Term term, const Stream& stream, SampleRange range) const;
+
+  /// As `render` of each of several ranges of samples.
+  ReplicatedImage render_replicates(const Stream& stream, const std::vector<SampleRange>& ranges) const;
+  /// As `derive` of each.
+  std::vector<ReplicatedImage> derive_replicates(Term term, const Stream& stream,
+                                                 const std::vector<SampleRange>& ranges) const;
 
   /// Unbiased estimate of one term of sum(adjoint * dI), added to `dof_gradient` (size DofLayout::size()). Costs the
   /// same for any number of unknowns. `parts`, if given, receives the contributions of disjoint sets of pixels' samples,

@@ -90,7 +90,7 @@ bool has_histograms(const Experiment& experiment, const Scene& scene) {
 }
 
 bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
-                      const GatedImage& readings) {
+                      const StoredImage& readings) {
   if (!has_histograms(experiment, scene)) return false;
   const auto bins = grid_of(experiment.gates);
   const Capture& capture = *scene.capture;
@@ -113,11 +113,15 @@ bool write_histograms(const std::string& file, const Experiment& experiment, con
     g.laser_origin = capture.origin->laser * unit;
     g.sensor_origin = capture.origin->sensor * unit;
   }
-  out.counts = readings;
   out.delta_t = bins->width * unit;
   out.t_start = bins->start * unit;
-  write_capture(file, out);
+  write_capture(file, out, readings);
   return true;
+}
+
+bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
+                      const GatedImage& readings) {
+  return has_histograms(experiment, scene) && write_histograms(file, experiment, scene, StoredImage(readings));
 }
 
 }  // namespace isochron

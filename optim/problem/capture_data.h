@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "core/image/image.h"
+#include "core/image/stored_image.h"
 #include "core/scene/scene.h"
 #include "optim/experiment/experiment.h"
 
@@ -20,6 +20,8 @@ std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene
 bool has_histograms(const Experiment& experiment, const Scene& scene);
 
 /// Writes readings of a capture's bins as the HDF5 file of a measurement; false where they are none.
+bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
+                      const StoredImage& readings);
 bool write_histograms(const std::string& file, const Experiment& experiment, const Scene& scene,
                       const GatedImage& readings);
 

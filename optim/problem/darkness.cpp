@@ -12,6 +12,7 @@ namespace isochron {
 namespace {
 
 constexpr int kSamples = 16, kMostPixels = 32, kMostBounces = 16, kBins = 128;
+constexpr double kRounding = 1e-12;  ///< of the background, which halves of an image bring in parts
 
 /// The range narrowed to the bins of it that light falls into; empty where there are none.
 std::optional<std::pair<double, double>> narrowed(const Problem& problem, const Scene& scene, double low, double high) {
@@ -37,7 +38,6 @@ std::optional<std::pair<double, double>> narrowed(const Problem& problem, const 
 
 /// An image of readings at theta less their background: what light has brought, zero where there was none.
 GatedImage light_of(const Problem& problem, const std::vector<double>& theta, GatedImage image) {
-  constexpr double kRounding = 1e-12;  // of the background, which halves of an image bring in parts
   const Scene scene = problem.parameters().apply(theta);
   for (int p = 0; p < image.pixels(); ++p) {
     const double background = scene.detector.background[scene.detector.background_of(scene.capture, p)];
@@ -110,14 +110,10 @@ std::vector<double> point_of_target(const Problem& problem, const std::vector<do
 
 namespace {
 
-/// Of images of light.
-std::string warning_about(const Problem& problem, const std::vector<double>& theta,
-                          const std::vector<GatedImage>& images, const std::string& what) {
+/// Of gates that are `dark`.
+std::string warning_about(const Problem& problem, const std::vector<double>& theta, const std::vector<int>& dark,
+                          const std::string& what) {
   const int gates = problem.gates().size();
-  std::vector<int> dark;
-  for (int g = 0; g < gates; ++g)
-    if (std::all_of(images.begin(), images.end(), [&](const GatedImage& image) { return is_black(image, g); }))
-      dark.push_back(g);
   if (dark.empty()) return {};
   // The first bins of a histogram are often dark.
   if (static_cast<int>(dark.size()) < gates && problem.experiment().gates.kind == "bins") return {};
@@ -145,11 +141,34 @@ std::string warning_about(const Problem& problem, const std::vector<double>& the
   return text;
 }
 
+/// Those that are black in all images.
+std::vector<int> black_gates(const std::vector<GatedImage>& images) {
+  std::vector<int> dark;
+  for (int g = 0; g < images[0].gates; ++g)
+    if (std::all_of(images.begin(), images.end(), [&](const GatedImage& image) { return is_black(image, g); }))
+      dark.push_back(g);
+  return dark;
+}
+
 }  // namespace
 
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
                              const std::string& what) {
-  return warning_about(problem, theta, {light_of(problem, theta, image)}, what);
+  return warning_about(problem, theta, black_gates({light_of(problem, theta, image)}), what);
+}
+
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const std::vector<double>& means,
+                             const std::string& what) {
+  const Scene scene = problem.parameters().apply(theta);
+  const int pixels = problem.scene().camera.width * problem.scene().camera.height;
+  double background = 0;
+  for (int p = 0; p < pixels; ++p)
+    background += scene.detector.background[scene.detector.background_of(scene.capture, p)] / pixels;
+  constexpr double kOfSums = 1e-9;  // over all pixels
+  std::vector<int> dark;
+  for (std::size_t g = 0; g < means.size(); ++g)
+    if (std::abs(means[g] - background) <= kOfSums * background) dark.push_back(static_cast<int>(g));
+  return warning_about(problem, theta, dark, what);
 }
 
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
@@ -157,9 +176,9 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
   const std::vector<double> of_target = point_of_target(problem, theta);
   const GatedImage light = light_of(problem, theta, image), wanted = light_of(problem, of_target, target);
   const bool black_image = mean_square(light) == 0, black_target = mean_square(wanted) == 0;
-  if (black_target && !black_image) return warning_about(problem, of_target, {wanted}, "the target");
-  if (black_image && !black_target) return warning_about(problem, theta, {light}, "the image");
-  return warning_about(problem, theta, {light, wanted}, "the image and the target");
+  if (black_target && !black_image) return warning_about(problem, of_target, black_gates({wanted}), "the target");
+  if (black_image && !black_target) return warning_about(problem, theta, black_gates({light}), "the image");
+  return warning_about(problem, theta, black_gates({light, wanted}), "the image and the target");
 }
 
 }  // namespace isochron

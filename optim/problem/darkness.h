@@ -13,6 +13,9 @@ namespace isochron {
 /// histogram are often dark: of bins it tells only where all are.
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
                              const std::string& what);
+/// The same by an image's averages over pixels and channels.
+std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const std::vector<double>& means,
+                             const std::string& what);
 
 /// The same of a residual: gates that are dark in both, or one of the two images where it is dark as a whole. That a gate
 /// is dark in one of them alone can be what an optimisation is about.

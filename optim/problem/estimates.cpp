@@ -17,10 +17,26 @@ void require_replicates(const char* term, int samples) {
                                  samples, std::string_view(term) == "primal" ? "" : ", or 0 to leave the term out"));
 }
 
-/// Means and statistics of `count` images, which `estimate(range)` gives for parts of the samples.
-template <class Estimate>
+/// Means and statistics of the images that `render` makes of so many replicates, each from a part of the samples.
+template <class Render>
 DerivativeEstimate collect(const std::string& component, int samples, int replicates, bool pixels_are_independent,
-                           int count, const Poll& poll, Estimate&& estimate) {
+                           const Poll& poll, Render&& render) {
+  std::vector<SampleRange> ranges;
+  for (int r = 0; r < replicates; ++r) ranges.push_back(Share{r, replicates}.of(samples));
+  const ProgressStage stage("rendering the " + component, 1);
+  DerivativeEstimate result{component, {}, {}};
+  for (ReplicatedImage& image : render(ranges)) {
+    result.gates.push_back(gate_statistics(image.gates, image.mean.pixels(), pixels_are_independent));
+    result.images.push_back(std::move(image.mean));
+  }
+  poll();
+  return result;
+}
+
+/// The same of `count` images that estimate(range) makes one replicate of.
+template <class Estimate>
+DerivativeEstimate collect_whole(const std::string& component, int samples, int replicates, bool pixels_are_independent,
+                                 int count, const Poll& poll, Estimate&& estimate) {
   std::vector<ImageStatistics> statistics(count, ImageStatistics(pixels_are_independent));
   ProgressStage stage("rendering the " + component, replicates);
   for (int r = 0; r < replicates; ++r) {
@@ -32,7 +48,7 @@ DerivativeEstimate collect(const std::string& component, int samples, int replic
   }
   DerivativeEstimate result{component, {}, {}};
   for (ImageStatistics& of_image : statistics) {
-    result.images.push_back(of_image.mean());
+    result.images.emplace_back(of_image.mean());
     result.gates.push_back(of_image.gates());
     of_image = ImageStatistics(pixels_are_independent);  // its images are no longer needed
   }
@@ -47,9 +63,16 @@ DerivativeEstimate total_of(const std::vector<DerivativeEstimate>& terms) {
     std::vector<const Statistics*> of_terms;
     for (const DerivativeEstimate& term : terms) of_terms.push_back(&term.gates[i]);
     total.gates[i] = sum_of(of_terms);
-    for (std::size_t t = 1; t < terms.size(); ++t)
-      for (std::size_t k = 0; k < total.images[i].data.size(); ++k)
-        total.images[i].data[k] += terms[t].images[i].data[k];
+    StoredImage& image = total.images[i];
+    RowSum sum(image.values_of_pixel());
+    std::vector<StoredImage::Entry> entries;
+    for (int pixel = 0; terms.size() > 1 && pixel < image.pixels(); ++pixel) {
+      for (const DerivativeEstimate& term : terms)
+        term.images[i].for_each(pixel, [&](std::uint32_t place, float value) { sum.add(place, value); });
+      entries.clear();
+      sum.take([&](std::uint32_t place, double value) { entries.push_back({place, static_cast<float>(value)}); });
+      image.set(pixel, entries);
+    }
   }
   return total;
 }
@@ -71,8 +94,8 @@ std::vector<DerivativeEstimate> differences(const Problem& problem, int count, s
   const Stream stream = problem.stream(Pass::finite_difference, iteration);
   const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image == 0;
   const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
-  return {collect("total", samples, replicates, independent, count, poll,
-                  [&](SampleRange range) { return difference(stream, range); })};
+  return {collect_whole("total", samples, replicates, independent, count, poll,
+                        [&](SampleRange range) { return difference(stream, range); })};
 }
 
 /// Along each column of the basis.
@@ -93,8 +116,9 @@ std::vector<DerivativeEstimate> derivatives(const Problem& problem, const std::v
     const Stream stream = problem.stream(pass_of(term), iteration);
     const bool independent = renderer.pixels_are_independent(term);
     const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
-    components.push_back(collect(name(term), samples, replicates, independent, basis.columns, poll,
-                                 [&](SampleRange range) { return renderer.derive(term, stream, range); }));
+    components.push_back(collect(
+        name(term), samples, replicates, independent, poll,
+        [&](const std::vector<SampleRange>& ranges) { return renderer.derive_replicates(term, stream, ranges); }));
     stage.advance();
   }
   if (components.empty()) throw InputError("samples: every term of the derivative is left out (one above 0)");
@@ -113,9 +137,12 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
   const Stream stream = problem.stream(Pass::render, iteration);
   const bool independent = renderer.pixels_are_independent();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
-  DerivativeEstimate result = collect("image", samples, replicates, independent, 1, poll, [&](SampleRange range) {
-    return std::vector<GatedImage>{renderer.render(stream, range)};
-  });
+  DerivativeEstimate result =
+      collect("image", samples, replicates, independent, poll, [&](const std::vector<SampleRange>& ranges) {
+        std::vector<ReplicatedImage> images;
+        images.push_back(renderer.render_replicates(stream, ranges));
+        return images;
+      });
   return {std::move(result.images[0]), std::move(result.gates[0])};
 }
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "core/image/image.h"
+#include "core/image/stored_image.h"
 #include "optim/problem/problem.h"
 #include "optim/problem/statistics.h"
 
@@ -14,7 +14,7 @@ namespace isochron {
 inline constexpr int kMostReplicates = 8, kMostCheckReplicates = 16;
 
 struct ImageEstimate {
-  GatedImage image;
+  StoredImage image;
   Statistics gates;  ///< of the average over pixels and channels, one entry per gate
 };
 
@@ -24,9 +24,9 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
 
 /// One component of the derivative images of a range of unknowns.
 struct DerivativeEstimate {
-  std::string component;           ///< total, interior, visibility or path_length
-  std::vector<GatedImage> images;  ///< one per unknown
-  std::vector<Statistics> gates;   ///< one per unknown, as in ImageEstimate
+  std::string component;            ///< total, interior, visibility or path_length
+  std::vector<StoredImage> images;  ///< one per unknown
+  std::vector<Statistics> gates;    ///< one per unknown, as in ImageEstimate
 };
 
 /// Derivative images of the unknowns [first, first + count) at theta: `total` first, then the terms with

@@ -62,9 +62,31 @@ double limit(int resource, const std::string& used) {
   return static_cast<double>(most.rlim_cur) - kilobytes("/proc/self/status", used);
 }
 
-double image_bytes(const Problem& problem) {
+double values_of_image(const Problem& problem) {
   const Camera& camera = problem.scene().camera;
-  return 8.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
+  return 1.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
+}
+
+/// In double precision.
+double image_bytes(const Problem& problem) {
+  return sizeof(double) * values_of_image(problem);
+}
+
+/// As results are kept.
+double stored_bytes(const Problem& problem) {
+  return sizeof(float) * values_of_image(problem);
+}
+
+/// What samples bring of an image's values, as lists (core/base/listed_sum.h), of so many per pixel; `copies` of the image at
+/// most.
+double listed_bytes(const Problem& problem, int samples, double copies) {
+  constexpr double kEntry = 16, kEntriesPerVertex = 2;
+  const GateSet& gates = problem.gates();
+  int of_a_length = 0;
+  gates.for_each_value(gates.center(gates.size() / 2), [&](int, double) { ++of_a_length; });
+  const double entries = values_of_image(problem) / gates.size() * samples * kEntriesPerVertex *
+                         (problem.experiment().estimator.max_bounces + 1) * std::max(of_a_length, 1);
+  return std::min(copies * image_bytes(problem), kEntry * entries);
 }
 
 /// Standard sampling shares one image; what automatic sampling settles on is not known before its trial.
@@ -82,12 +104,9 @@ std::string amount(double bytes) {
   return bytes >= 1e9 ? fmt::format("{:.3g} GB", bytes / 1e9) : fmt::format("{:.0f} MB", std::ceil(bytes / 1e6));
 }
 
-/// `copies` of the images, and what their rendering takes.
-std::vector<MemoryUse> rendering_memory(const Problem& problem, double copies) {
-  const double image = image_bytes(problem);
-  std::vector<MemoryUse> parts = {{"images, their mean and their file", copies * image}};
-  if (!shares_one_image(problem)) parts.push_back({"images of work partitions", kPartialSums * image});
-  return parts;
+/// Of what partitions of work add up at a time: as large as all that they bring, and in part once more as they are added.
+double partial_bytes(const Problem& problem, int samples) {
+  return 2 * listed_bytes(problem, samples, kPartialSums / 2);
 }
 
 }  // namespace
@@ -100,24 +119,43 @@ double available_memory() {
 }
 
 std::vector<MemoryUse> image_memory(const Problem& problem) {
-  const Camera& camera = problem.scene().camera;
-  return rendering_memory(problem,
-                          2.5 + replicate_count(problem.experiment().samples.primal, camera.width * camera.height,
-                                                shares_one_image(problem), kMostReplicates));
+  constexpr double kWithFile = 1.5;
+  const int samples = problem.experiment().samples.primal;
+  std::vector<MemoryUse> parts = {{"images and their file", kWithFile * stored_bytes(problem)}};
+  if (!shares_one_image(problem))
+    parts.push_back({"images of work partitions",
+                     partial_bytes(problem, samples) + listed_bytes(problem, samples, kMostReplicates)});
+  return parts;
 }
 
-std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns, int images) {
-  const double image = image_bytes(problem);
-  return {
-      {fmt::format("derivative images of {} unknown{}", columns, columns == 1 ? "" : "s"), image * columns * images},
-      {"derivative images of work partitions", kPartialSums * image * columns}};
+std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns) {
+  constexpr int kComponents = 4;
+  const Experiment& experiment = problem.experiment();
+  if (experiment.gradient.method == GradientMethod::finite_difference)
+    return difference_memory(problem, kMostReplicates * columns);
+  const int samples =
+      std::max({experiment.samples.interior, experiment.samples.visibility, experiment.samples.path_length});
+  return {{fmt::format("derivative images of {} unknown{}", columns, columns == 1 ? "" : "s"),
+           kComponents * stored_bytes(problem) * columns},
+          {"derivative images of work partitions",
+           (partial_bytes(problem, samples) + listed_bytes(problem, samples, kMostReplicates)) * columns}};
+}
+
+std::vector<MemoryUse> difference_memory(const Problem& problem, int images) {
+  constexpr int kAtATime = 4;
+  return {{"finite differences", (images + kAtATime) * image_bytes(problem)},
+          {"images of work partitions", partial_bytes(problem, problem.experiment().samples.primal)}};
 }
 
 std::vector<MemoryUse> run_memory(const Problem& problem) {
-  std::vector<MemoryUse> parts = rendering_memory(problem, 4.5);
+  const Experiment& experiment = problem.experiment();
   const double image = image_bytes(problem), unknowns = problem.parameters().size();
+  std::vector<MemoryUse> parts = {{"images, their mean and their file", 4.5 * image}};
+  if (!shares_one_image(problem))
+    parts.push_back({"images of work partitions",
+                     partial_bytes(problem, std::max(experiment.samples.primal, experiment.target.samples))});
   parts.push_back({"target, residual and adjoint images", 3 * image});
-  const OptimizerMethod method = problem.experiment().optimizer.method;
+  const OptimizerMethod method = experiment.optimizer.method;
   if (method == OptimizerMethod::quasi_newton) parts.push_back({"images of a line search", 3 * image});
   if (method != OptimizerMethod::levenberg_marquardt) {
     const Camera& camera = problem.scene().camera;
@@ -128,7 +166,9 @@ std::vector<MemoryUse> run_memory(const Problem& problem) {
   parts.push_back(
       {fmt::format("two halves of the Jacobian of {:.0f} residuals by {:.0f} unknowns", image / 8, unknowns),
        2 * image * unknowns});
-  for (const MemoryUse& part : derivative_memory(problem, 1, 2)) parts.push_back(part);
+  parts.push_back(
+      {"derivative images of an unknown",
+       2 * image + partial_bytes(problem, std::max(experiment.samples.interior, experiment.samples.visibility))});
   return parts;
 }
 

@@ -17,10 +17,12 @@ struct MemoryUse {
   double bytes = 0;
 };
 
-/// Of gated images at the experiment's resolution: rendered, averaged, written as EXR.
+/// Of gated images at the experiment's resolution, with their errors, and written as EXR.
 std::vector<MemoryUse> image_memory(const Problem& problem);
-/// Of derivative images of `columns` unknowns at a time, `images` of them kept per unknown.
-std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns, int images);
+/// The same of derivative images of `columns` unknowns at a time.
+std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns);
+/// Of finite differences, `images` of which are kept.
+std::vector<MemoryUse> difference_memory(const Problem& problem, int images);
 /// Of an optimisation by the experiment's method, the target included.
 std::vector<MemoryUse> run_memory(const Problem& problem);
 

@@ -9,38 +9,12 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-std::vector<double> shares(const std::vector<double>& samples) {
-  double sum = 0;
-  for (double n : samples) sum += n;
-  std::vector<double> result;
-  for (double n : samples) result.push_back(n / sum);
-  return result;
+/// Deviations of `replicates` values from their mean are as if of one less.
+double effective_count(const Deviations& deviations, std::size_t replicates) {
+  const double n = static_cast<double>(replicates);
+  if (!(deviations.squares > 0)) return kInfinity;
+  return static_cast<double>(deviations.squares * (deviations.squares / deviations.fourth_powers) * (n - 1) / n);
 }
-
-/// Sums of the squares and fourth powers of weighted deviations from a mean over replicates.
-struct Deviations {
-  double squares = 0;
-  long double fourth_powers = 0;  ///< for its range of exponents
-
-  /// Adds those of value(0) ... value(n - 1); their weighted mean is returned.
-  template <class Value>
-  double add(const std::vector<double>& weight, Value&& value) {
-    double mean = 0;
-    for (std::size_t r = 0; r < weight.size(); ++r) mean += weight[r] * value(r);
-    for (std::size_t r = 0; r < weight.size(); ++r) {
-      const double d = weight[r] * (value(r) - mean);
-      squares += d * d;
-      fourth_powers += static_cast<long double>(d) * d * d * d;
-    }
-    return mean;
-  }
-  /// Deviations of `replicates` values from their mean are as if of one less.
-  double effective_count(std::size_t replicates) const {
-    const double n = static_cast<double>(replicates);
-    if (!(squares > 0)) return kInfinity;
-    return static_cast<double>(squares * (squares / fourth_powers) * (n - 1) / n);
-  }
-};
 
 /// Variance of the weighted mean, from the sum of the squares of its weighted deviations.
 double variance(double squares, std::size_t replicates) {
@@ -89,7 +63,7 @@ Statistics ReplicateStatistics::result() const {
     if (has_parts)
       for (std::size_t p = 0; p < parts_.front().size(); ++p)
         of_parts.add(weight, [&](std::size_t r) { return parts_[r][p][i]; });
-    append(result, mean, whole.squares, count, (has_parts ? of_parts : whole).effective_count(count),
+    append(result, mean, whole.squares, count, effective_count(has_parts ? of_parts : whole, count),
            static_cast<double>(count - 1));
   }
   return result;
@@ -109,27 +83,29 @@ GatedImage ImageStatistics::mean() const {
 }
 
 Statistics ImageStatistics::gates() const {
-  const std::vector<double> weight = shares(samples_);
-  const std::size_t count = weight.size();
   const GatedImage& first = images_.front();
+  GateSums sums(first.gates, first.channels, shares(samples_));
+  std::vector<double> values(first.channels * images_.size()), mean(first.channels);
+  for (int pixel = 0; pixel < first.pixels(); ++pixel)
+    for (int g = 0; g < first.gates; ++g) {
+      for (std::size_t r = 0; r < images_.size(); ++r)
+        std::copy_n(&images_[r].data[first.index(pixel, g)], first.channels, &values[r * first.channels]);
+      sums.add(g, values.data(), first.channels, mean.data());
+    }
+  return gate_statistics(sums, first.pixels(), independent_);
+}
+
+Statistics gate_statistics(const GateSums& sums, int pixels, bool pixels_are_independent) {
+  const std::size_t count = sums.weight().size();
+  const double n = pixels;
   Statistics result;
   result.replicates = static_cast<int>(count);
-  const auto grey = [&](std::size_t r, int pixel, int g) {
-    double sum = 0;
-    for (int c = 0; c < first.channels; ++c) sum += images_[r].at(pixel, g, c);
-    return sum / first.channels;
-  };
-  for (int g = 0; g < first.gates; ++g) {
-    Deviations whole, of_pixels;
-    const double mean = whole.add(weight, [&](std::size_t r) { return images_[r].mean(g); });
-    for (int pixel = 0; pixel < first.pixels(); ++pixel)
-      of_pixels.add(weight, [&](std::size_t r) { return grey(r, pixel, g); });
-    const double pixels = first.pixels();
-    if (independent_)
-      append(result, mean, of_pixels.squares / (pixels * pixels), count, of_pixels.effective_count(count),
-             pixels * static_cast<double>(count - 1));
-    else
-      append(result, mean, whole.squares, count, of_pixels.effective_count(count), static_cast<double>(count - 1));
+  for (int g = 0; g < sums.gates(); ++g) {
+    Deviations whole;
+    const double mean = whole.add(sums.weight(), [&](std::size_t r) { return sums.sum(g, r) / n; });
+    const Deviations& of_pixels = sums.deviations(g);
+    append(result, mean, pixels_are_independent ? of_pixels.squares / (n * n) : whole.squares, count,
+           effective_count(of_pixels, count), (pixels_are_independent ? n : 1) * static_cast<double>(count - 1));
   }
   return result;
 }

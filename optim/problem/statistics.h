@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/films/replicates.h"
 #include "core/image/image.h"
 
 namespace isochron {
@@ -35,21 +36,22 @@ class ReplicateStatistics {
   std::vector<double> samples_;
 };
 
-/// Replicates of an image.
+/// Of the averages over pixels and channels, one per gate, from at least two replicates.
+/// Where pixels are independent (Renderer::pixels_are_independent) the variance of a mean over pixels is a sum of those of
+/// the pixels: two replicates then give as many degrees of freedom as there are pixels.
+Statistics gate_statistics(const GateSums& sums, int pixels, bool pixels_are_independent);
+
+/// Replicates of an image, where each is made as a whole.
 class ImageStatistics {
  public:
-  /// Where pixels are independent (Renderer::pixels_are_independent) the variance of a mean over pixels is a sum of those of
-  /// the pixels: two replicates then give as many degrees of freedom as there are pixels.
   explicit ImageStatistics(bool pixels_are_independent) : independent_(pixels_are_independent) {}
 
   void add(GatedImage image, int samples);
   GatedImage mean() const;
-  /// Of the averages over pixels and channels, one per gate. At least two replicates.
+  /// As gate_statistics().
   Statistics gates() const;
 
  private:
-  std::vector<double> weights() const;
-
   bool independent_;
   std::vector<GatedImage> images_;
   std::vector<double> samples_;

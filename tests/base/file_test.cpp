@@ -73,6 +73,49 @@ TEST(WriteFileAtomically, NamesPathAndReason) {
   EXPECT_EQ(folder.entries(), 1);
 }
 
+TEST(NewFile, IsWrittenInPartsWholeOrNotAtAll) {
+  TemporaryFolder folder;
+  folder.write("f", "old");
+  {
+    NewFile file(folder.path("f"));
+    file.write("??part ");
+    file.write(std::string(3'000'000, 'x'));
+    EXPECT_EQ(file.position(), 3'000'007u);
+    file.seek(0);
+    file.write("a ");
+    EXPECT_EQ(file.position(), 2u);
+    file.seek(3'000'007);
+    file.write("end");
+    EXPECT_EQ(folder.read("f"), "old");
+    file.finish();
+  }
+  EXPECT_EQ(folder.read("f"), "a part " + std::string(3'000'000, 'x') + "end");
+  {
+    NewFile file(folder.path("f"));
+    file.write("never finished");
+  }
+  EXPECT_EQ(folder.read("f").size(), 3'000'010u);
+  EXPECT_EQ(folder.entries(), 1);
+}
+
+// OpenEXR keeps to itself what goes wrong while it ends.
+TEST(NewFile, FinishTellsOfEarlierFailures) {
+  TemporaryFolder folder;
+  std::string message;
+  {
+    const FileSizeLimit limit(4096);
+    NewFile file(folder.path("f"));
+    EXPECT_THROW(file.write(std::string(3'000'000, 'x')), std::runtime_error);
+    try {
+      file.finish();
+    } catch (const std::runtime_error& error) {
+      message = error.what();
+    }
+  }
+  EXPECT_EQ(message, folder.path("f") + ": cannot be written: File too large");
+  EXPECT_EQ(folder.entries(), 0);
+}
+
 TEST(ReadRegularFile, ReadsWholeFiles) {
   TemporaryFolder folder;
   const std::string large = std::string(300'000, 'x') + std::string("\0\n", 2);

@@ -162,7 +162,7 @@ void BM_AdjointScatter(benchmark::State& state) {
     i = (i + 1) % four.paths.size();
   }
   double sum = 0;
-  gradient.for_each(static_cast<std::size_t>(four.prepared.layout.size()), [&](std::size_t, double x) { sum += x; });
+  gradient.for_each(0, static_cast<std::size_t>(four.prepared.layout.size()), [&](std::size_t, double x) { sum += x; });
   benchmark::DoNotOptimize(sum);
 }
 BENCHMARK(BM_AdjointScatter)->ArgName("large")->Arg(0)->Arg(1);

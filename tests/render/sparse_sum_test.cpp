@@ -26,7 +26,7 @@ TEST(SparseSum, AddsLikeAVector) {
         }
         whole.add(sparse);
       }
-      whole.for_each(size, [&](std::size_t i, double value) { sum[i] += value; });
+      whole.for_each(0, size, [&](std::size_t i, double value) { sum[i] += value; });
       EXPECT_EQ(sum, expected) << size << ", " << additions;
     }
 }
@@ -36,7 +36,7 @@ TEST(SparseSum, GivesNeighboursAcrossBlocks) {
   for (int i = 0; i < 3; ++i) sum.at(62, 3)[i] += i + 1;
   sum.add(64, 10);
   std::vector<double> found(200, 0.0), expected(200, 0.0);
-  sum.for_each(200, [&](std::size_t i, double value) { found[i] = value; });
+  sum.for_each(0, 200, [&](std::size_t i, double value) { found[i] = value; });
   expected[62] = 1, expected[63] = 2, expected[64] = 13;
   EXPECT_EQ(found, expected);
 }

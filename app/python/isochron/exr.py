@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -73,6 +73,24 @@ def _inflate(block, size):
     return out.tobytes()
 
 
+def _inflate_some(block, planes, columns, wanted):
+    """Of a block of so many planes (a line of a channel) of 32-bit floats the wanted ones, planes x columns: the others are not
+    taken apart."""
+    width = 2 * columns  # bytes of a plane among the even bytes of the block, as many among the odd ones
+    raw = np.frombuffer(zlib.decompress(block, bufsize=4 * columns * planes), dtype=np.uint8)
+    if len(raw) != 4 * columns * planes:
+        raise ExrError("a block of pixels has the wrong size")
+    raw = raw.reshape(2 * planes, width)
+    before = np.cumsum(raw.sum(axis=1, dtype=np.uint8), dtype=np.uint8)
+    before = np.concatenate([[np.uint8(0)], before[:-1]])
+    out = np.empty((len(wanted), width, 2), dtype=np.uint8)
+    for half in (0, 1):
+        rows = np.asarray(wanted) + half * planes
+        out[..., half] = np.cumsum(raw[rows], axis=1, dtype=np.uint8) + before[rows, None]
+    out[:, 1::2] += 128
+    return out.reshape(len(wanted), 2 * width).view("<f4")
+
+
 def _blocks(data, position, width, height, step):
     """Of scanlines: first column and row, columns, rows, and the stored pixels of each block."""
     for start in struct.unpack_from(f"<{-(-height // step)}Q", data, position):
@@ -93,15 +111,17 @@ def _tiles(data, position, width, height, tiles):
         yield x * across, y * down, min(across, width - x * across), down, data[start + 20 : start + 20 + size]
 
 
-def _parse(data):
+def _parse(data, wanted):
     attributes, position = _header(data)
     channels = _channels(attributes["channels"])
+    asked = [i for i, (name, _) in enumerate(channels) if wanted is None or name in wanted]
+    alike = all(kind == SAMPLE_TYPES[2] for _, kind in channels)
     compression = attributes["compression"][0]
     if compression not in LINES_PER_BLOCK:
         raise ExrError(f"compression {compression} is not supported; allowed: none, ZIPS, ZIP")
     x0, y0, x1, y1 = struct.unpack("<iiii", attributes["dataWindow"])
     width, height = x1 - x0 + 1, y1 - y0 + 1
-    images = {name: np.empty((height, width), dtype=kind.newbyteorder("=")) for name, kind in channels}
+    images = {name: np.empty((height, width), dtype=kind.newbyteorder("=")) for name, kind in (channels[i] for i in asked)}
     if struct.unpack_from("<I", data, 4)[0] & 0x200:
         blocks = _tiles(data, position, width, height, attributes["tiles"])
     else:
@@ -112,23 +132,30 @@ def _parse(data):
             raise ExrError("a block of pixels lies outside the image")
         lines = min(lines, height - row)
         size = lines * columns * sum(kind.itemsize for _, kind in channels)
+        if alike and len(asked) < len(channels) and compression and len(block) < size:
+            planes = [line * len(channels) + i for line in range(lines) for i in asked]
+            values = _inflate_some(block, lines * len(channels), columns, planes)
+            for at, (line, i) in enumerate((line, i) for line in range(lines) for i in asked):
+                images[channels[i][0]][row + line, column : column + columns] = values[at]
+            continue
         # A block that compression would have made larger is stored as it is.
         if compression and len(block) < size:
             block = _inflate(block, size)
         at = 0
         for line in range(lines):
             for name, kind in channels:
-                images[name][row + line, column : column + columns] = np.frombuffer(block, kind, columns, at)
+                if name in images:
+                    images[name][row + line, column : column + columns] = np.frombuffer(block, kind, columns, at)
                 at += columns * kind.itemsize
     return images
 
 
-def read(path: Any) -> dict[str, np.ndarray]:
-    """All channels: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
+def read(path: Any, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
+    """All channels, or those of some names: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
     with open(path, "rb") as file:
         data = file.read()
     try:
-        return _parse(data)
+        return _parse(data, names)
     except ExrError:
         raise
     except (IndexError, KeyError, ValueError, struct.error, zlib.error) as error:
@@ -137,14 +164,20 @@ def read(path: Any) -> dict[str, np.ndarray]:
 
 def attributes(path: Any) -> dict[str, bytes]:
     """The header: name -> value as bytes. Raises ExrError, OSError."""
+    most = 1 << 24  # bytes of a header, by far
     with open(path, "rb") as file:
-        data = file.read()
+        data = file.read(most)
     try:
         return _header(data)[0]
     except ExrError:
         raise
     except (IndexError, ValueError, struct.error) as error:
         raise ExrError(f"damaged file ({error})") from error
+
+
+def channel_names(path: Any) -> list[str]:
+    """In the order in which they are stored. Raises ExrError, OSError."""
+    return [name for name, _ in _channels(attributes(path)["channels"])]
 
 
 def write(path: Any, images: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> None:

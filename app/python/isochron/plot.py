@@ -17,14 +17,15 @@ import re
 import sys
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("Agg")
 from isochron import exr
 from isochron.errors import InputError
 from isochron.pictures.curves import plot_log, plot_pixel, plot_row
-from isochron.pictures.reading import Folder, read_stack
-from isochron.pictures.scales import scale_of
-from isochron.pictures.sheets import plot_derivatives, plot_images, plot_signed
+from isochron.pictures.reading import Folder, peaks, read_stack
+from isochron.pictures.scales import pick_by_peaks, scale_of
+from isochron.pictures.sheets import MOST_COLUMNS, MOST_IMAGES, plot_derivatives, plot_images, plot_signed
 
 RUN_IMAGES = ["target", "initial", "final"]  # share one scale, to be compared
 
@@ -32,7 +33,8 @@ RUN_IMAGES = ["target", "initial", "final"]  # share one scale, to be compared
 class Pictures:
     """Pictures of one folder; what goes wrong with one of them is kept, a line each, and does not stop the others."""
 
-    def __init__(self, directory):
+    def __init__(self, directory, choose):
+        """`choose`: of images of very many gates only those that sheets show are read."""
         self.directory, self.failures, self.stacks, self.gates = directory, [], {}, {}
         if not directory.is_dir():
             self.failures.append(f"{directory}: no such folder")
@@ -45,13 +47,26 @@ class Pictures:
         self.folder = self.attempt(Folder, directory / "experiment.yaml", directory)
         if self.folder is None:
             return
+        largest = {path: self.attempt(peaks, path, path) for path in paths} if choose else {}
         for path in paths:
-            stacks = self.attempt(read_stack, path, path)
+            chosen = self.choice(path, largest) if largest.get(path) else None
+            stacks = self.attempt(read_stack, path, path, chosen)
             if stacks is None:
                 continue
             gates = self.attempt(self.folder.gates, path, path, max(len(s) for s in stacks.values()))
             if gates is not None:
+                gates.read = chosen
                 self.stacks[path], self.gates[path] = stacks, gates
+
+    @staticmethod
+    def choice(path, largest):
+        """Gates of one file, by the largest values of all. The images of a run show the same."""
+        own = largest[path]
+        most = MOST_IMAGES if set(own) == {""} else MOST_COLUMNS
+        together = list(own.values())
+        if path.stem in RUN_IMAGES:
+            together += [p[""] for other, p in largest.items() if other.stem in RUN_IMAGES and p and "" in p]
+        return pick_by_peaks(most, *(p for p in together if len(p) == len(together[0])))
 
     def attempt(self, action, path, *arguments):
         try:
@@ -67,11 +82,11 @@ class Pictures:
         return name if what == name else f"{name}: {what}"
 
     def draw(self):
-        together = [s[""] for p, s in self.stacks.items() if p.stem in RUN_IMAGES and set(s) == {""}]
+        together = [self.gates[p].known(s[""]) for p, s in self.stacks.items() if p.stem in RUN_IMAGES and set(s) == {""}]
         for path, stacks in self.stacks.items():
             png, gates = path.with_suffix(".png"), self.gates[path]
             if set(stacks) == {""}:
-                scale = scale_of(*together) if path.stem in RUN_IMAGES else scale_of(stacks[""])
+                scale = scale_of(*together) if path.stem in RUN_IMAGES else scale_of(gates.known(stacks[""]))
                 self.attempt(plot_images, path, png, self.title(path.stem), stacks[""], scale, gates)
             else:
                 title = self.title(f"derivative by {path.stem}")
@@ -104,7 +119,10 @@ class Pictures:
             return
         path = self.directory / "final.exr"
         gates = self.gates[path]
-        rows = {"": final - target}
+        difference = np.zeros(final.shape)
+        read = slice(None) if gates.read is None else gates.read
+        difference[read] = final[read] - target[read]
+        rows = {"": difference}
         self.attempt(plot_signed, path, self.directory / "residual.png", self.title("final - target"), rows,
                      f"difference of {gates.quantity}", gates)
 
@@ -140,7 +158,7 @@ def main(arguments):
     parser.add_argument("--pixel", type=pixel_of)
     parser.add_argument("--row", type=int)
     options = parser.parse_args(arguments)
-    pictures = Pictures(options.directory)
+    pictures = Pictures(options.directory, choose=options.pixel is None and options.row is None)
     if not pictures.failures or pictures.stacks:
         if options.pixel is None and options.row is None:
             pictures.draw()

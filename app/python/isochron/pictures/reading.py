@@ -10,6 +10,7 @@ from isochron import exr
 from isochron.errors import InputError
 
 LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # in Python alone, a number per sensor point takes seconds
+PEAKS = "isochron.peaks"
 CHANNEL = re.compile(r"(?:(?P<component>.+)\.)?gate(?P<gate>\d+)\.(?P<channel>[RGBY])")
 
 
@@ -33,9 +34,11 @@ def numbers(values):
 
 
 class Gates:
-    """Centres of an image's gates (None where unknown), their unit, and what a pixel's value is."""
+    """Centres of an image's gates (None where unknown), their unit, and what a pixel's value is. `read`: those whose images were
+    read, where that are not all."""
 
     def __init__(self, count, centers=None, unit="", quantity="pixel value"):
+        self.read = None
         self.count, self.unit, self.quantity = count, unit, quantity
         self.centers = centers if centers is not None and len(centers) == count else None
 
@@ -49,6 +52,10 @@ class Gates:
     @property
     def positions(self):
         return np.arange(self.count) if self.centers is None else np.asarray(self.centers)
+
+    def known(self, stack):
+        """Of a stack the images that were read."""
+        return stack if self.read is None else stack[self.read]
 
     def label(self, gate):
         """Enough digits to tell neighbours apart."""
@@ -96,25 +103,42 @@ class Folder:
         return Gates(count, self.centers, self.unit, self.quantity)
 
 
-def read_stack(path):
-    """component ('' for images) -> array of gates x height x width (grey) or gates x height x width x 3."""
-    stacks = {}
-    for name, image in exr.read(path).items():
+def peaks(path):
+    """component ('' for images) -> largest magnitude of each gate, as far as the file's header names them."""
+    try:
+        notes = {k: v.decode("utf-8") for k, v in exr.attributes(path).items() if k.startswith(PEAKS)}
+        return {name[len(PEAKS) :].lstrip("."): np.array([float(p) for p in text.split()]) for name, text in notes.items()}
+    except ValueError as error:
+        raise PlotError(f"{path}: the largest values of the gates cannot be read: {error}") from error
+
+
+def read_stack(path, chosen=None):
+    """component ('' for images) -> array of gates x height x width (grey) or gates x height x width x 3. Of the gates that were
+    not `chosen`, where some were, it holds zeros."""
+    found = {}
+    for name in exr.channel_names(path):
         match = CHANNEL.fullmatch(name)
         if match:
-            gates = stacks.setdefault(match["component"] or "", {})
-            gates.setdefault(int(match["gate"]), {})[match["channel"]] = image.astype(float)
-    if not stacks:
+            gates = found.setdefault(match["component"] or "", {})
+            gates.setdefault(int(match["gate"]), {})[match["channel"]] = name
+    if not found:
         raise PlotError(f"{path}: no channels named gateNNN.R/G/B, gateNNN.Y or COMPONENT.gateNNN.Y")
-    out = {}
-    for component, gates in stacks.items():
-        layers = [gates[g] for g in sorted(gates)]
-        if sorted(gates) != list(range(len(gates))) or any(set(l) not in ({"Y"}, set("RGB")) for l in layers):
+    for gates in found.values():
+        if sorted(gates) != list(range(len(gates))) or any(set(l) not in ({"Y"}, set("RGB")) for l in gates.values()):
             raise PlotError(f"{path}: incomplete gates or channels")
-        if len({len(l) for l in layers}) != 1:
+        if len({len(l) for l in gates.values()}) != 1:
             raise PlotError(f"{path}: grey and colour gates in one file")
-        grey = "Y" in layers[0]
-        out[component] = np.stack([l["Y"] if grey else np.stack([l[c] for c in "RGB"], -1) for l in layers])
+    wanted = lambda gates: range(len(gates)) if chosen is None else chosen
+    names = [name for gates in found.values() for g in wanted(gates) for name in gates[g].values()]
+    images = exr.read(path, None if chosen is None else set(names))
+    height, width = next(iter(images.values())).shape
+    out = {}
+    for component, gates in found.items():
+        grey = "Y" in gates[0]
+        # The system gives memory to what is not zero alone.
+        stack = out[component] = np.zeros((len(gates), height, width) if grey else (len(gates), height, width, 3))
+        for g in wanted(gates):
+            stack[g] = images[gates[g]["Y"]] if grey else np.stack([images[gates[g][c]] for c in "RGB"], -1)
     return out
 
 

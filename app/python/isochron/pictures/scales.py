@@ -20,12 +20,29 @@ def srgb(x):
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
 
 
-def pick_gates(most, *stacks):
-    """At most so many gates, evenly spread from the first to the last in which anything exceeds a hundredth of the scale."""
+def spread(most, first, last):
+    """At most so many numbers, evenly spread from first to last."""
+    return sorted({int(round(g)) for g in np.linspace(first, last, min(most, last - first + 1))})
+
+
+def pick_gates(most, *stacks, among=None):
+    """At most so many gates, evenly spread from the first to the last in which anything exceeds a hundredth of the scale; or of
+    those `among` which one has to choose."""
+    if among is not None:
+        return [among[i] for i in spread(most, 0, len(among) - 1)]
     count = len(stacks[0])
     if count <= most:
         return list(range(count))
     peaks = np.max([np.abs(np.nan_to_num(s)).reshape(count, -1).max(1) for s in stacks], axis=0)
     lit = np.flatnonzero(peaks > 0.01 * scale_of(*stacks))
-    first, last = (lit[0], lit[-1]) if len(lit) else (0, count - 1)
-    return sorted({int(round(g)) for g in np.linspace(first, last, min(most, last - first + 1))})
+    return spread(most, lit[0], lit[-1]) if len(lit) else spread(most, 0, count - 1)
+
+
+def pick_by_peaks(most, *peaks):
+    """As pick_gates, by the largest magnitudes of each gate alone; None where all can be had."""
+    count = len(peaks[0])
+    if count <= most:
+        return None
+    largest = np.max(peaks, axis=0)
+    lit = np.flatnonzero(largest > 0.01 * np.percentile(largest[largest > 0], 90)) if largest.any() else []
+    return spread(most, lit[0], lit[-1]) if len(lit) else spread(most, 0, count - 1)

@@ -91,22 +91,22 @@ def plot_images(path, *what):
 
 def draw_images(title, stack, scale, gates):
     """A figure of gated images: grey scenes in false colour, RGB scenes in their own, equally exposed."""
-    shown = pick_gates(MOST_IMAGES, stack)
+    shown = pick_gates(MOST_IMAGES, stack, among=gates.read)
     height, width = stack.shape[1:3]
     columns = len(shown) if len(shown) <= 6 else int(np.ceil(np.sqrt(1.4 * len(shown))))
     sheet = Sheet(-(-len(shown) // columns), columns, width / height, [title, *about_gates(gates, shown)])
     norm = colors.Normalize(0, scale)
     if stack.ndim == 4:
-        picture = srgb(np.nan_to_num(stack / scale, nan=0, posinf=1, neginf=0))
-        picture[~np.isfinite(stack).all(-1)] = colors.to_rgb(NON_FINITE)
+        picture = srgb(np.nan_to_num(stack[shown] / scale, nan=0, posinf=1, neginf=0))
+        picture[~np.isfinite(stack[shown]).all(-1)] = colors.to_rgb(NON_FINITE)
         cmap = colors.ListedColormap(np.repeat(srgb(np.linspace(0, 1, 256))[:, None], 3, axis=1))
     else:
-        picture = np.ma.masked_invalid(stack)
+        picture = np.ma.masked_invalid(stack[shown])
         cmap = matplotlib.colormaps["inferno"].copy()
         cmap.set_bad(NON_FINITE)
     for i, g in enumerate(shown):
         axes = sheet.cell(*divmod(i, columns), gates.label(g), stack[g])
-        axes.imshow(picture[g], cmap=cmap, norm=norm, interpolation="nearest")
+        axes.imshow(picture[i], cmap=cmap, norm=norm, interpolation="nearest")
     extend = "max" if np.nanmax(np.nan_to_num(stack[shown]), initial=0) > scale else "neither"
     sheet.colorbar(ScalarMappable(norm, cmap), gates.quantity, extend)
     return sheet.figure
@@ -122,25 +122,26 @@ def draw_signed(title, rows, quantity, gates):
 
     Rows that are zero everywhere are named instead of drawn.
     """
-    zero = [name for name, stack in rows.items() if not np.any(np.nan_to_num(stack, nan=1))]
+    zero = [name for name, stack in rows.items() if not np.any(np.nan_to_num(gates.known(stack), nan=1))]
     drawn = {name: stack for name, stack in rows.items() if name not in zero} or dict(list(rows.items())[:1])
-    shown = pick_gates(MOST_COLUMNS, *drawn.values())
+    shown = pick_gates(MOST_COLUMNS, *drawn.values(), among=gates.read)
     height, width = next(iter(drawn.values())).shape[1:3]
     lines = [title, *about_gates(gates, shown)]
     if zero:
-        lines.append(f"zero everywhere: {', '.join(name or 'all' for name in zero)}")
+        where = "everywhere" if gates.read is None else "in these gates"
+        lines.append(f"zero {where}: {', '.join(name or 'all' for name in zero)}")
     sheet = Sheet(len(drawn), len(shown), width / height, lines, left=0.4)
-    drawn = {name: stack.mean(-1) if stack.ndim == 4 else stack for name, stack in drawn.items()}
-    scale = scale_of(*(stack[shown] for stack in drawn.values()))
+    drawn = {name: stack[shown].mean(-1) if stack.ndim == 4 else stack[shown] for name, stack in drawn.items()}
+    scale = scale_of(*drawn.values())
     norm = colors.Normalize(-scale, scale)
     cmap = matplotlib.colormaps["RdBu_r"].copy()
     cmap.set_bad(NON_FINITE)
     beyond = False
     for row, (name, stack) in enumerate(drawn.items()):
-        beyond |= bool(np.abs(np.nan_to_num(stack[shown])).max() > scale)
+        beyond |= bool(np.abs(np.nan_to_num(stack)).max() > scale)
         for column, g in enumerate(shown):
-            axes = sheet.cell(row, column, gates.label(g) if row == 0 else "", stack[g])
-            axes.imshow(np.ma.masked_invalid(stack[g]), cmap=cmap, norm=norm, interpolation="nearest")
+            axes = sheet.cell(row, column, gates.label(g) if row == 0 else "", stack[column])
+            axes.imshow(np.ma.masked_invalid(stack[column]), cmap=cmap, norm=norm, interpolation="nearest")
             if column == 0 and name:
                 axes.set_ylabel(name, fontsize=9)
     sheet.colorbar(ScalarMappable(norm, cmap), quantity, "both" if beyond else "neither")
