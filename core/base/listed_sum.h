@@ -20,6 +20,7 @@ class ListedSum {
     if (!listed_) all_ = SparseSum(size);
   }
 
+  std::size_t size() const { return size_; }
   /// The sums i ... i + count - 1, to be added to until this is called again; count is at most 64.
   double* at(std::size_t i, int count) {
     if (!listed_) return all_.at(i, count);

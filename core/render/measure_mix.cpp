@@ -4,6 +4,9 @@
 #include <optional>
 #include <vector>
 
+#include "core/base/listed_sum.h"
+#include "core/image/stored_image.h"
+
 namespace isochron {
 namespace {
 
@@ -51,9 +54,10 @@ double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;
 }
 
-/// The camera's image in at most so many pixels.
+/// The camera's image in at most so many pixels, without background, which does not vary.
 Scene reduced(const Scene& scene, double pixels) {
   Scene small = scene;
+  small.detector.background.assign(small.detector.background.size(), 0.0);
   const double factor = std::sqrt(pixels / pixels_of(scene));
   if (factor < 1) {
     // Whole pixels, so that the fields of view still agree across the width; the height may lose part of a
@@ -73,12 +77,12 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
 }
 
 /// Sums over square blocks of pixels.
-GatedImage blocks_of(const GatedImage& image, int size) {
+GatedImage blocks_of(const StoredImage& image, int size) {
   GatedImage sums((image.width + size - 1) / size, (image.height + size - 1) / size, image.gates, image.channels);
   for (int pixel = 0; pixel < image.pixels(); ++pixel) {
     const int block = pixel / image.width / size * sums.width + pixel % image.width / size;
-    for (int g = 0; g < image.gates; ++g)
-      for (int c = 0; c < image.channels; ++c) sums.at(block, g, c) += image.at(pixel, g, c);
+    double* const values = &sums.data[sums.index(block, 0)];
+    image.for_each(pixel, [&](std::uint32_t place, float value) { values[place] += value; });
   }
   return sums;
 }
@@ -92,28 +96,35 @@ int block_size(const Scene& small, Purpose purpose) {
 class BlockVariance {
  public:
   explicit BlockVariance(int block) : block_(block) {}
-  void add(const GatedImage& whole) {
-    const GatedImage image = blocks_of(whole, block_);
-    mean_.resize(image.data.size());
-    squares_.resize(image.data.size());
-    ++count_;
-    for (std::size_t i = 0; i < image.data.size(); ++i) {
-      const double d = image.data[i] - mean_[i];
-      mean_[i] += d / count_;
-      squares_[i] += d * (image.data[i] - mean_[i]);
+  void add(const StoredImage& image) {
+    if (count_++ == 0) sums_ = squares_ = ListedSum(image.values_of_pixel() * image.pixels());
+    const auto take = [&](std::size_t i, double value) {
+      *sums_.at(i, 1) += value;
+      *squares_.at(i, 1) += value * value;
+    };
+    if (block_ == 1) {  // most values may be zero
+      for (int pixel = 0; pixel < image.pixels(); ++pixel)
+        image.for_each(pixel,
+                       [&](std::uint32_t place, float value) { take(pixel * image.values_of_pixel() + place, value); });
+      return;
     }
+    const GatedImage blocks = blocks_of(image, block_);
+    for (std::size_t i = 0; i < blocks.data.size(); ++i) take(i, blocks.data[i]);
   }
-  /// Of one image, summed over blocks and gates.
-  double sum() const {
+  /// Of one image, summed over blocks and gates. Ends the adding.
+  double sum() {
+    sums_.finish();
+    squares_.finish();
     double sum = 0;
-    for (double s : squares_) sum += s;
+    squares_.for_each(0, squares_.size(), [&](std::size_t, double value) { sum += value; });
+    sums_.for_each(0, sums_.size(), [&](std::size_t, double value) { sum -= value * value / count_; });
     return sum / (count_ - 1);
   }
 
  private:
   const int block_;
   int count_ = 0;
-  std::vector<double> mean_, squares_;
+  ListedSum sums_, squares_;  ///< of an image of blocks, or of pixels
 };
 
 /// The better rates of connections for a term's derivative along one column, in sums over a quarter of the width. `budget`:
@@ -131,7 +142,7 @@ ConnectionRates measure_rates(const Scene& scene, const GateSet& gates, Estimato
     if (!renderer.has(term)) return 0.0;
     BlockVariance variance(block_size(small, purpose));
     for (int b = 0; b < kRateBatches; ++b)
-      variance.add(renderer.derive(term, stream, {b * kRateSamples, (b + 1) * kRateSamples})[0]);
+      variance.add(renderer.derive_replicates(term, stream, {{b * kRateSamples, (b + 1) * kRateSamples}})[0].mean);
     work += renderer.work();
     return variance.sum() * renderer.work();
   };
@@ -176,7 +187,8 @@ struct Trial {
       double spent = 0, cheapest = INFINITY;  // per sample and pixel
       for (int i = 0; i < 3; ++i) {
         const SampleRange range{b * per_batch[i], (b + 1) * per_batch[i]};
-        variances[i].add(term ? renderers[i]->derive(*term, stream, range)[0] : renderers[i]->render(stream, range));
+        variances[i].add(term ? renderers[i]->derive_replicates(*term, stream, {range})[0].mean
+                              : renderers[i]->render_replicates(stream, {range}).mean);
         spent += renderers[i]->work();
         cheapest = std::min(cheapest, renderers[i]->work() / (range.end * pixels_of(small)));
       }

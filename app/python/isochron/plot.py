@@ -25,7 +25,7 @@ from isochron.errors import InputError
 from isochron.pictures.curves import plot_log, plot_pixel, plot_row
 from isochron.pictures.reading import Folder, peaks, read_stack
 from isochron.pictures.scales import pick_by_peaks, scale_of
-from isochron.pictures.sheets import MOST_COLUMNS, MOST_IMAGES, plot_derivatives, plot_images, plot_signed
+from isochron.pictures.sheets import MOST_CHOSEN, MOST_COLUMNS, MOST_IMAGES, plot_derivatives, plot_images, plot_signed
 
 RUN_IMAGES = ["target", "initial", "final"]  # share one scale, to be compared
 
@@ -62,7 +62,8 @@ class Pictures:
     def choice(path, largest):
         """Gates of one file, by the largest values of all. The images of a run show the same."""
         own = largest[path]
-        most = MOST_IMAGES if set(own) == {""} else MOST_COLUMNS
+        count = max(map(len, own.values()))
+        most = MOST_COLUMNS if set(own) != {""} else MOST_IMAGES if count <= MOST_IMAGES else MOST_CHOSEN
         together = list(own.values())
         if path.stem in RUN_IMAGES:
             together += [p[""] for other, p in largest.items() if other.stem in RUN_IMAGES and p and "" in p]
