@@ -97,7 +97,8 @@ class BlockVariance {
  public:
   explicit BlockVariance(int block) : block_(block) {}
   void add(const StoredImage& image) {
-    if (count_++ == 0) sums_ = squares_ = ListedSum(image.values_of_pixel() * image.pixels());
+    if (count_++ == 0)
+      for (ListedSum* sum : {&sums_, &squares_}) *sum = ListedSum(image.values_of_pixel() * image.pixels());
     const auto take = [&](std::size_t i, double value) {
       *sums_.at(i, 1) += value;
       *squares_.at(i, 1) += value * value;

@@ -49,6 +49,18 @@ class ExrTest(unittest.TestCase):
                     for channel, name in enumerate(NAMES):
                         self.assert_same_bits(images[name], pixels(kind.startswith("smooth"), channel))
 
+    def test_reads_some_channels(self):
+        subprocess.run([self.program, str(self.folder)], check=True)
+        for compression in ("none", "zips", "zip"):
+            for kind in ("smooth", "rough", "smooth_tiles", "rough_tiles"):
+                for chosen in ({NAMES[1]}, {NAMES[0], NAMES[2]}, set()):
+                    with self.subTest(compression=compression, kind=kind, chosen=chosen):
+                        images = exr.read(self.folder / f"{compression}_{kind}.exr", chosen)
+                        self.assertEqual(set(images), chosen)
+                        for name, image in images.items():
+                            self.assert_same_bits(image, pixels(kind.startswith("smooth"), NAMES.index(name)))
+        self.assertEqual(exr.channel_names(self.folder / "zip_smooth.exr"), NAMES)
+
     def test_reads_what_it_writes(self):
         for smooth in (True, False):
             images = {name: pixels(smooth, channel) for channel, name in enumerate(NAMES)}

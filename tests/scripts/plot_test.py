@@ -12,7 +12,7 @@ sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent / "app/python")]
 from isochron import exr
 import matplotlib.image
 import numpy as np
-from isochron.pictures import curves, reading, sheets
+from isochron.pictures import curves, reading, scales, sheets
 
 HEADER = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,height\n"
 NOTES = {"isochron.gateCenters": "12 12.5 13 14", "isochron.gateUnit": "ns", "isochron.quantity": "radiance"}
@@ -70,6 +70,24 @@ class PlotTest(unittest.TestCase):
             self.assertLess(max(height, width), 2000)
         self.assertEqual(sheets.pick_gates(5, np.ones((1200, 2, 2)) * (np.arange(1200) // 500 == 1)[:, None, None]),
                          [500, 625, 750, 874, 999])
+
+    def test_of_very_many_gates_those_are_read_that_are_shown(self):
+        # Gates that are not named as bright are damaged: pictures that read them would say so.
+        stack = images(300)
+        lit = range(100, 201)
+        for g in set(range(300)) - set(lit):
+            stack[f"gate{g:03d}.Y"] = np.full((6, 8), np.nan)
+        largest = " ".join(str(g + 1.0 if g in lit else 1e-9) for g in range(300))
+        exr.write(self.folder / "render.exr", stack, {"isochron.peaks": largest})
+        self.assert_drawn("render.png")
+        found = reading.peaks(self.folder / "render.exr")
+        chosen = scales.pick_by_peaks(5, *found.values())
+        self.assertEqual(chosen, [100, 125, 150, 175, 200])
+        read = reading.read_stack(self.folder / "render.exr", chosen)[""]
+        self.assertEqual([read[g, 0, 0] for g in (*chosen, 0, 101)], [g + 1 for g in chosen] + [0, 0])
+        self.assertIsNone(scales.pick_by_peaks(300, *found.values()))
+        self.assertEqual(scales.pick_by_peaks(3, np.zeros(9)), [0, 4, 8])
+        self.assertEqual(scales.pick_gates(2, None, among=chosen), [100, 200])
 
     def test_rows_of_zero_terms_are_not_drawn(self):
         stack = {**images(2, component="total"), **images(2, component="interior"), **images(2, component="visibility")}

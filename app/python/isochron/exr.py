@@ -77,18 +77,26 @@ def _inflate_some(block, planes, columns, wanted):
     """Of a block of so many planes (a line of a channel) of 32-bit floats the wanted ones, planes x columns: the others are not
     taken apart."""
     width = 2 * columns  # bytes of a plane among the even bytes of the block, as many among the odd ones
-    raw = np.frombuffer(zlib.decompress(block, bufsize=4 * columns * planes), dtype=np.uint8)
-    if len(raw) != 4 * columns * planes:
+    rows = np.concatenate([np.asarray(wanted, dtype=int) + half * planes for half in (0, 1)])
+    kept, sums = np.empty((len(rows), width), np.uint8), np.empty(2 * planes, np.uint8)
+    stream = zlib.decompressobj()
+    step = max(1, (1 << 19) // width)  # what stays in the cache
+    for first in range(0, 2 * planes, step):
+        count = min(step, 2 * planes - first)
+        part = stream.decompress(block, count * width)
+        block = stream.unconsumed_tail
+        if len(part) != count * width:
+            raise ExrError("a block of pixels has the wrong size")
+        part = np.frombuffer(part, np.uint8).reshape(count, width)
+        sums[first : first + count] = part.sum(axis=1, dtype=np.uint8)
+        low, high = np.searchsorted(rows, (first, first + count))
+        kept[low:high] = part[rows[low:high] - first]
+    if stream.decompress(block, 1):
         raise ExrError("a block of pixels has the wrong size")
-    raw = raw.reshape(2 * planes, width)
-    before = np.cumsum(raw.sum(axis=1, dtype=np.uint8), dtype=np.uint8)
-    before = np.concatenate([[np.uint8(0)], before[:-1]])
-    out = np.empty((len(wanted), width, 2), dtype=np.uint8)
-    for half in (0, 1):
-        rows = np.asarray(wanted) + half * planes
-        out[..., half] = np.cumsum(raw[rows], axis=1, dtype=np.uint8) + before[rows, None]
-    out[:, 1::2] += 128
-    return out.reshape(len(wanted), 2 * width).view("<f4")
+    before = np.cumsum(sums, dtype=np.uint8) - sums
+    bytes_ = np.cumsum(kept, axis=1, dtype=np.uint8) + before[rows, None]
+    bytes_[:, 1::2] += 128
+    return np.stack(np.split(bytes_, 2), axis=-1).reshape(len(wanted), 2 * width).view("<f4")
 
 
 def _blocks(data, position, width, height, step):

@@ -47,7 +47,7 @@ class Pictures:
         self.folder = self.attempt(Folder, directory / "experiment.yaml", directory)
         if self.folder is None:
             return
-        largest = {path: self.attempt(peaks, path, path) for path in paths} if choose else {}
+        largest = {path: peaks(path) for path in paths} if choose else {}
         for path in paths:
             chosen = self.choice(path, largest) if largest.get(path) else None
             stacks = self.attempt(read_stack, path, path, chosen)
@@ -66,7 +66,7 @@ class Pictures:
         most = MOST_COLUMNS if set(own) != {""} else MOST_IMAGES if count <= MOST_IMAGES else MOST_CHOSEN
         together = list(own.values())
         if path.stem in RUN_IMAGES:
-            together += [p[""] for other, p in largest.items() if other.stem in RUN_IMAGES and p and "" in p]
+            together += [p[""] for other, p in largest.items() if other.stem in RUN_IMAGES and "" in p]
         return pick_by_peaks(most, *(p for p in together if len(p) == len(together[0])))
 
     def attempt(self, action, path, *arguments):

@@ -104,12 +104,13 @@ class Folder:
 
 
 def peaks(path):
-    """component ('' for images) -> largest magnitude of each gate, as far as the file's header names them."""
+    """component ('' for images) -> largest magnitude of each gate, as far as the file's header names them. Of files that cannot
+    be read it names none: reading them tells why."""
     try:
         notes = {k: v.decode("utf-8") for k, v in exr.attributes(path).items() if k.startswith(PEAKS)}
         return {name[len(PEAKS) :].lstrip("."): np.array([float(p) for p in text.split()]) for name, text in notes.items()}
-    except ValueError as error:
-        raise PlotError(f"{path}: the largest values of the gates cannot be read: {error}") from error
+    except (OSError, ValueError):
+        return {}
 
 
 def read_stack(path, chosen=None):
