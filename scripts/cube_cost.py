@@ -43,7 +43,7 @@ def write_scene(folder, colour):
 def usage(command, experiment, folder, *options):
     """CPU seconds of the program and its pictures, and the most memory that one process had, in bytes."""
     time = ["/usr/bin/env", "time", "-f", "%U %S %M"]
-    arguments = [str(PROGRAM), command, str(experiment), "-o", str(folder / "out"), "--quiet", *options]
+    arguments = [str(PROGRAM), command, str(experiment), "-o", str(folder / "out"), "--quiet", "--threads", "1", *options]
     least = None
     for _ in range(RUNS):
         result = subprocess.run(time + arguments, capture_output=True, text=True, check=True)

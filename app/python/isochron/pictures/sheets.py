@@ -13,7 +13,7 @@ from isochron.pictures.scales import NON_FINITE, pick_gates, scale_of, srgb
 
 COMPONENTS = ["total", "interior", "visibility", "path_length"]
 MOST_IMAGES, MOST_COLUMNS = 40, 10  # cells of a sheet of images, columns of a sheet with a row per component
-MOST_CHOSEN = 20  # cells of a sheet of images of more gates, each of which takes time
+MOST_CHOSEN = 12  # cells of a sheet of images of more gates, each of which takes time
 
 
 def save(figure, path):
