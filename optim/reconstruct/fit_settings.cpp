@@ -5,7 +5,6 @@
 #include <limits>
 #include <numeric>
 
-#include "optim/problem/dark_bins.h"
 #include "optim/problem/loss.h"
 #include "optim/problem/problem.h"
 
@@ -37,23 +36,26 @@ Range distances(const Vec3& from, const std::vector<Vec3>& places) {
   return range;
 }
 
-/// What the dark bins of each sensor point say; those whose readings do not count are left out.
-std::vector<double> point_levels(const GatedImage& counts, const Readings& readings, int points) {
-  std::vector<double> levels = dark_levels(counts, readings, points);
-  std::erase_if(levels, [](double level) { return !std::isfinite(level); });
-  return levels;
+/// Whether Poisson numbers of one mean scatter less than these, by five standard deviations.
+bool vary(const std::vector<double>& numbers) {
+  if (numbers.size() < 2) return false;
+  const auto n = static_cast<double>(numbers.size());
+  const double mean = std::accumulate(numbers.begin(), numbers.end(), 0.0) / n;
+  double squares = 0;
+  for (const double number : numbers) squares += (number - mean) * (number - mean);
+  return mean > 0 && squares / (n - 1) > mean * (1 + 5 * std::sqrt(2 / (n - 1) + 1 / (n * mean)));
 }
 
-/// Whether they scatter more than Poisson numbers of one mean do, by five standard deviations.
-bool vary(const std::vector<double>& levels, double readings_each) {
-  if (levels.size() < 2) return false;
-  const auto n = static_cast<double>(levels.size());
-  const double mean = std::accumulate(levels.begin(), levels.end(), 0.0) / n;
-  double squares = 0;
-  for (const double level : levels) squares += (level - mean) * (level - mean);
-  // Half of the readings are dark at least, else the level says little.
-  const double expected = 2 * mean / readings_each;
-  return squares / (n - 1) > expected * (1 + 5 * std::sqrt(2 / (n - 1)));
+/// What each sensor point counts before light of the surface can arrive at any. Dark bins after that hold tails of light.
+std::vector<double> counted_before(const GatedImage& counts, const Problem& problem, double time, int points) {
+  std::vector<double> sums(points, 0.0);
+  const Readings& readings = problem.readings();
+  for (int p = 0; p < counts.pixels(); ++p)
+    for (int g = 0; g < counts.gates && readings.uses_pixel(p); ++g)
+      if (readings.uses_gate(g) && problem.gates().center(g) < time) sums[p % points] += counts.at(p, g);
+  for (int p = points - 1; p >= 0; --p)
+    if (!readings.uses_pixel(p)) sums.erase(sums.begin() + p);
+  return sums;
 }
 
 /// Sums over the points, of each gate that counts.
@@ -104,8 +106,8 @@ FitSettings fit_settings(const Mesh& start, double edge_length, int histograms, 
   return settings;
 }
 
-std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
-                                  double depth_resolution) {
+TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
+                       double depth_resolution) {
   const std::vector<Vec3>& spots = geometry.confocal ? geometry.sensor : geometry.laser;
   Range all;
   for (const Vec3& p : mesh.positions) {
@@ -124,7 +126,7 @@ std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geome
     all.most += response->upper();
   }
   const double margin = std::max(8 * depth_resolution, 0.25 * (all.most - all.least));
-  return {all.least - margin, all.most + margin};
+  return {all.least - margin, all.most + margin, all.least - 0.25 * margin};
 }
 
 void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
@@ -133,9 +135,7 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
   const GatedImage counts = problem.make_target([] {});
   const Readings& readings = problem.readings();
   const int points = static_cast<int>(problem.scene().capture->sensor.size());
-  const std::vector<double> levels = point_levels(counts, readings, points);
-  const double readings_each = readings.count(counts) / points;
-  settings.background_per_point = vary(levels, readings_each);
+  settings.background_per_point = vary(counted_before(counts, problem, settings.window.dark_until, points));
   std::vector<double> theta = problem.parameters().initial();
   for (const Parameters::Block& block : problem.parameters().blocks())
     if (block.name == "background") std::fill_n(theta.begin() + block.begin, block.count, 0.0);

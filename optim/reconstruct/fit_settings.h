@@ -1,6 +1,5 @@
 // What a reconstruction's experiment says that follows from the capture and its start.
 #pragma once
-#include <array>
 #include <functional>
 #include <string>
 
@@ -9,6 +8,12 @@
 #include "optim/reconstruct/time_filter.h"
 
 namespace isochron {
+
+/// Optical paths.
+struct TimeWindow {
+  double first = 0, last = 1;
+  double dark_until = 0;  ///< no light of the surface comes before
+};
 
 /// Lengths in metres. The defaults make a valid experiment of nothing.
 struct FitSettings {
@@ -20,8 +25,8 @@ struct FitSettings {
   double motion = 0, albedo = 0;  ///< weights of slopes
   double gain = 1;
   bool background_per_point = false;
-  double bin = 0;                      ///< width; 0: not known yet
-  std::array<double, 2> window{0, 1};  ///< optical paths
+  double bin = 0;  ///< width; 0: not known yet
+  TimeWindow window;
 };
 
 /// Levels, the first of which has edges as long as that, and samples for a fit of so many seconds on two cores.
@@ -29,8 +34,8 @@ FitSettings fit_settings(const Mesh& start, double edge_length, int histograms, 
 
 /// Times, as optical paths, at which light of the mesh may be counted at any point, and a quarter as much before and after, for the
 /// background.
-std::array<double, 2> time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
-                                  double depth_resolution);
+TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
+                       double depth_resolution);
 
 /// Gain, background and weights of slopes, by the counts and a rendering of the start under a gain of 1: `experiment` is the file of
 /// such a one.

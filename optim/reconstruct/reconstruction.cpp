@@ -75,8 +75,9 @@ output: {{histogram_samples: {primal}}}
       fmt::arg("edge", set.edge_length), fmt::arg("albedo", set.albedo), fmt::arg("gain", set.gain),
       fmt::arg("low", 0.999 * set.gain), fmt::arg("high", 1.001 * set.gain),
       fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
-      fmt::arg("capture", quoted_path(spec.capture)), fmt::arg("first", set.window[0]), fmt::arg("last", set.window[1]),
-      fmt::arg("primal", set.samples), fmt::arg("interior", std::max(2, set.samples / 2)));
+      fmt::arg("capture", quoted_path(spec.capture)), fmt::arg("first", set.window.first),
+      fmt::arg("last", set.window.last), fmt::arg("primal", set.samples),
+      fmt::arg("interior", std::max(2, set.samples / 2)));
 }
 
 std::string scene_text(const std::string& capture) {
