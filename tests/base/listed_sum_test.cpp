@@ -33,7 +33,7 @@ std::vector<double> values_of(const Sum& sum, std::size_t size) {
   return values;
 }
 
-struct Case {
+struct ListCase {
   std::size_t size;
   int additions;
   std::size_t spread;
@@ -41,8 +41,9 @@ struct Case {
 
 // The bits of a vector of all sums, whether few are listed, many (1500 additions and more are sorted on the way), or all kept.
 TEST(ListedSum, HasTheBitsOfAVectorOfAll) {
-  for (const Case& c : {Case{1, 5, 1}, Case{1000, 50, 100}, Case{kSize, 0, 1}, Case{kSize, 20, 7},
-                        Case{kSize, 5000, 300}, Case{kSize, 30'000, 100'000}, Case{kSize, 400'000, 200'000}}) {
+  for (const ListCase& c :
+       {ListCase{1, 5, 1}, ListCase{1000, 50, 100}, ListCase{kSize, 0, 1}, ListCase{kSize, 20, 7},
+        ListCase{kSize, 5000, 300}, ListCase{kSize, 30'000, 100'000}, ListCase{kSize, 400'000, 200'000}}) {
     ListedSum listed(c.size);
     SparseSum all(c.size);
     listed.finish();

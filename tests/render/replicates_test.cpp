@@ -7,7 +7,7 @@
 namespace isochron::testing {
 namespace {
 
-constexpr Stream kStream{.seed = 4};
+constexpr Stream kReplicated{.seed = 4};
 const std::vector<SampleRange> kRanges = {{0, 3}, {3, 5}, {5, 8}};
 
 /// Few gates, whose sums are all kept, and so many that they are listed.
@@ -63,13 +63,13 @@ class Replicates : public ::testing::TestWithParam<std::tuple<Sampling, int>> {
 
 TEST_P(Replicates, AreThoseOfEachRange) {
   std::vector<GatedImage> images;
-  for (const SampleRange& range : kRanges) images.push_back(renderer_.render(kStream, range));
-  expect_mean_of(renderer_.render_replicates(kStream, kRanges), images);
+  for (const SampleRange& range : kRanges) images.push_back(renderer_.render(kReplicated, range));
+  expect_mean_of(renderer_.render_replicates(kReplicated, kRanges), images);
   for (const Term term : kTerms) {
-    const std::vector<ReplicatedImage> found = renderer_.derive_replicates(term, kStream, kRanges);
+    const std::vector<ReplicatedImage> found = renderer_.derive_replicates(term, kReplicated, kRanges);
     std::vector<std::vector<GatedImage>> columns(found.size());
     for (const SampleRange& range : kRanges) {
-      std::vector<GatedImage> derived = renderer_.derive(term, kStream, range);
+      std::vector<GatedImage> derived = renderer_.derive(term, kReplicated, range);
       ASSERT_EQ(derived.size(), found.size());
       for (std::size_t i = 0; i < derived.size(); ++i) columns[i].push_back(std::move(derived[i]));
     }
@@ -92,9 +92,9 @@ TEST_P(Replicates, DoNotDependOnThreads) {
         numbers.push_back(static_cast<double>(image.gates.deviations(g).fourth_powers));
       }
     };
-    append(renderer_.render_replicates(kStream, kRanges));
+    append(renderer_.render_replicates(kReplicated, kRanges));
     for (const Term term : kTerms)
-      for (const ReplicatedImage& image : renderer_.derive_replicates(term, kStream, kRanges)) append(image);
+      for (const ReplicatedImage& image : renderer_.derive_replicates(term, kReplicated, kRanges)) append(image);
     return numbers;
   };
   set_thread_count(1);
