@@ -80,7 +80,8 @@ TEST_F(Reconstruct, FindsAPlate) {
 }
 
 TEST_F(Reconstruct, TheSameBitsForAnyThreadsAndAfterAKill) {
-  ASSERT_EQ(run(command("one", {"--threads", "1"})).status, 0);
+  const Result first = run(command("one", {"--threads", "1"}));
+  ASSERT_EQ(first.status, 0) << first.errors;
   ASSERT_EQ(run(command("two", {"--threads", "2"})).status, 0);
   expect_same("one", "two");
   const std::vector<std::function<bool()>> moments = {[&] { return folder_.has("killed0/levels/1/log.csv"); },

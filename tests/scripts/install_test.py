@@ -113,7 +113,7 @@ class InstallTest(unittest.TestCase):
         return result.returncode, " ".join(result.stderr.split())
 
     def test_components(self):
-        core_alone = ["find_package(isochron 0.2 REQUIRED)", "add_executable(x x.cpp)", "target_link_libraries(x isochron::core)"]
+        core_alone = ["find_package(isochron 0.3 REQUIRED)", "add_executable(x x.cpp)", "target_link_libraries(x isochron::core)"]
         self.assertEqual(self.configure(*core_alone), (0, ""))
         status, errors = self.configure("find_package(isochron REQUIRED COMPONENTS rendering)")
         self.assertNotEqual(status, 0)
