@@ -172,7 +172,7 @@ class RanksTest(unittest.TestCase):
                 self.kill(signal_number, rank, folder)
                 complaint = shared.communicate(timeout=60)[1]
                 self.assertNotEqual(shared.returncode, 0)
-                self.assertTrue(f"rank {rank}" in complaint or "go on with" in complaint, complaint)
+                self.assertTrue(f"rank {rank}" in complaint or "continue with" in complaint, complaint)
                 self.assertFalse(ended(folder))
                 self.run_program(after, "resume", folder, "--no-plots", "--quiet")
                 self.same(expected[name], folder)
