@@ -14,7 +14,7 @@ namespace isochron {
 /// permission, a folder of that name), else, as on a full disk, std::runtime_error.
 void write_file_atomically(const std::string& path, const std::string& contents);
 
-/// The same in parts, for what is too large to be held twice; on rank 0 alone (on_first_rank). Throws as above.
+/// The same in parts, for contents too large to be held twice. Only on rank 0 (on_first_rank). Throws as above.
 class NewFile {
  public:
   explicit NewFile(std::string path);
@@ -27,7 +27,7 @@ class NewFile {
   void write(std::string_view bytes);
   void seek(std::uint64_t position);
   std::uint64_t position() const { return written_ + buffer_.size(); }
-  /// Throws what went wrong before, too, where whoever wrote kept it to himself.
+  /// Also throws an error of an earlier write that a library between caught.
   void finish();
 
  private:

@@ -1,5 +1,5 @@
-// Sums over so many numbers that a pass may touch a small part of them alone, far from each other: the values of an image of
-// many gates.
+// Sums over so many numbers that a pass may touch only a few of them, far from each other: the values of an image of many
+// gates.
 #pragma once
 #include <algorithm>
 #include <array>

@@ -22,8 +22,8 @@ inline int place_in_part(int pixel, int log_parts) {
 class Film {
  public:
   Film(GatedImage& image) : channels_(image.channels), gates_(image.gates), values_(image.data.data()) {}
-  /// An image of so many gates and channels in a sum, where its values begin at `offset`; or the pixels alone that one of `parts`
-  /// sets has, see place_in_part().
+  /// An image of so many gates and channels in a sum, where its values begin at `offset`; or only the pixels of one of `parts`
+  /// sets, see place_in_part().
   Film(int gates, int channels, ListedSum& sum, std::size_t offset, int parts = 1)
       : channels_(channels),
         gates_(gates),

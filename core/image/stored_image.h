@@ -1,5 +1,5 @@
-// Gated images as results are kept and written: in single precision, as files hold no more, and of each pixel those values alone
-// that are not zero, while they are few. Of a thousand time bins a few samples fill hardly any.
+// Gated images as results are kept and written: in single precision, as files hold no more. While few values of a pixel are not
+// zero, only those are kept: of a thousand time bins a few samples fill hardly any.
 #pragma once
 #include <algorithm>
 #include <cstdint>

@@ -20,7 +20,7 @@ struct Replicates {
   const Stream& stream;
   const std::vector<SampleRange>& ranges;
   bool lit;             ///< whether there is any light
-  bool stay_in_pixels;  ///< whether samples add to their own pixel alone, and there are enough pixels to share
+  bool stay_in_pixels;  ///< whether samples add only to their own pixel, and there are enough pixels to share
 };
 
 class ReplicatedPasses {

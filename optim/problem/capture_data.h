@@ -11,8 +11,8 @@
 namespace isochron {
 
 /// Counts of the file that the target names, for the bins of the experiment's gates, each of which holds one or several of the
-/// file's; gates without bins of their own get those of the file that `target.window` leaves. Empty where the target is none of a capture. Throws InputError where
-/// bins or sensor points do not fit. `warning`, unless empty, receives a line for what the file lacks.
+/// file's; gates without bins of their own get those of the file that `target.window` leaves. Empty where the target is none of a
+/// capture. Throws InputError where bins or sensor points do not fit. `warning`, unless empty, receives a line for what the file lacks.
 std::optional<GatedImage> read_counts(Experiment& experiment, const Scene& scene,
                                       const std::function<void(const std::string&)>& warning = {});
 

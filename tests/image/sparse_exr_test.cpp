@@ -35,10 +35,7 @@ GatedImage sparse(int width, int height, int gates, int channels, double share) 
 }
 
 void expect_same(const GatedImage& found, const GatedImage& expected) {
-  ASSERT_EQ(found.width, expected.width);
-  ASSERT_EQ(found.height, expected.height);
-  ASSERT_EQ(found.gates, expected.gates);
-  ASSERT_EQ(found.channels, expected.channels);
+  ASSERT_TRUE(found.same_shape(expected));
   EXPECT_EQ(found.data, expected.data);
 }
 

@@ -136,7 +136,7 @@ def read_stack(path, chosen=None):
     out = {}
     for component, gates in found.items():
         grey = "Y" in gates[0]
-        # The system gives memory to what is not zero alone.
+        # The system gives memory only to what is not zero.
         stack = out[component] = np.zeros((len(gates), height, width) if grey else (len(gates), height, width, 3))
         for g in wanted(gates):
             stack[g] = images[gates[g]["Y"]] if grey else np.stack([images[gates[g][c]] for c in "RGB"], -1)

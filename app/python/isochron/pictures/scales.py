@@ -25,6 +25,11 @@ def spread(most, first, last):
     return sorted({int(round(g)) for g in np.linspace(first, last, min(most, last - first + 1))})
 
 
+def spread_over(most, lit, count):
+    """The same from the first to the last of the gates that are `lit`; of all `count` where none is."""
+    return spread(most, lit[0], lit[-1]) if len(lit) else spread(most, 0, count - 1)
+
+
 def pick_gates(most, *stacks, among=None):
     """At most so many gates, evenly spread from the first to the last in which anything exceeds a hundredth of the scale; or of
     those `among` which one has to choose."""
@@ -34,15 +39,14 @@ def pick_gates(most, *stacks, among=None):
     if count <= most:
         return list(range(count))
     peaks = np.max([np.abs(np.nan_to_num(s)).reshape(count, -1).max(1) for s in stacks], axis=0)
-    lit = np.flatnonzero(peaks > 0.01 * scale_of(*stacks))
-    return spread(most, lit[0], lit[-1]) if len(lit) else spread(most, 0, count - 1)
+    return spread_over(most, np.flatnonzero(peaks > 0.01 * scale_of(*stacks)), count)
 
 
 def pick_by_peaks(most, *peaks):
-    """As pick_gates, by the largest magnitudes of each gate alone; None where all can be had."""
+    """As pick_gates, by the largest magnitude of each gate, read from the header; None where all gates can be read."""
     count = len(peaks[0])
     if count <= most:
         return None
     largest = np.max(peaks, axis=0)
     lit = np.flatnonzero(largest > 0.01 * np.percentile(largest[largest > 0], 90)) if largest.any() else []
-    return spread(most, lit[0], lit[-1]) if len(lit) else spread(most, 0, count - 1)
+    return spread_over(most, lit, count)
