@@ -111,10 +111,7 @@ std::optional<std::string> read_here(const std::string& path, std::string& probl
 
 }  // namespace
 
-NewFile::NewFile(std::string path) : path_(std::move(path)) {
-  descriptor_ = create_beside(path_, temporary_);
-  if (descriptor_ < 0) fail_to_write(path_, errno);
-}
+NewFile::NewFile(std::string path) : path_(std::move(path)) {}
 
 NewFile::~NewFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
@@ -128,6 +125,8 @@ void NewFile::fail(int error) {
 
 void NewFile::flush() {
   if (error_ != 0) fail(error_);
+  // Not before there is much to write, so that a process that is killed rarely leaves a part of a file.
+  if (descriptor_ < 0 && (descriptor_ = create_beside(path_, temporary_)) < 0) fail(errno);
   if (const int error = write_all(descriptor_, buffer_); error != 0) fail(error);
   written_ += buffer_.size();
   buffer_.clear();
