@@ -80,7 +80,7 @@ def read(folder):
 
 def store(rows):
     """Rows of experiments that were not measured now stay."""
-    file = ROOT / "experiments" / "measured" / "compare.csv"
+    file = ROOT / "build/compare/compare.csv"
     table = {name: None for name in NAMES}
     if file.exists():
         with open(file) as old:

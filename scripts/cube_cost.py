@@ -2,19 +2,23 @@
 """What many time bins take: `render` and `derive` (one unknown) of the cube, 256 x 256 pixels and 16 samples, with 10 bins and with
 1000 over the same lengths, grey and in colour.
 
-    scripts/cube_cost.py   some minutes; prints a table in Markdown, CPU seconds and peak memory
+    scripts/cube_cost.py measure CSV   some minutes: CPU seconds, those of the pictures with them, and peak memory
+    scripts/cube_cost.py table CSV     a table in Markdown
 """
 
 import pathlib
 import re
 import subprocess
+import sys
 import tempfile
 
 from reproduction.measure import PROGRAM, ROOT
+from reproduction.tables import read_rows, run_action, write_rows
 
 BINS = (10, 1000)
 FROM, TO = 4, 10  # path lengths
 RUNS = 3  # the least counts
+COLUMNS = ("command", "channels", "pictures", "seconds_10_bins", "seconds_1000_bins", "peak_bytes")
 
 EXPERIMENT = """\
 name: bins
@@ -53,8 +57,8 @@ def usage(command, experiment, folder, *options):
     return least
 
 
-def main():
-    print("| | pictures | 10 bins | 1000 bins | ratio | memory | of the result |\n|---|---|---|---|---|---|---|")
+def measure(file):
+    rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for colour in (False, True):
@@ -64,14 +68,27 @@ def main():
                 experiments[count] = folder / f"bins{colour:d}_{count}.yaml"
                 experiments[count].write_text(
                     EXPERIMENT.format(scene=scene, start=FROM, width=(TO - FROM) / count, count=count))
-            result = 4 * 256 * 256 * BINS[1] * (3 if colour else 1)
             for command in ("render", "derive"):
-                for options in ([], ["--no-plots"]):
-                    few, many = (usage(command, experiments[count], folder, *options) for count in BINS)
-                    print(f"| `{command}`, {'colour' if colour else 'grey'} | {'no' if options else 'yes'} | {few[0]:.2f} s "
-                          f"| {many[0]:.2f} s | {many[0] / few[0]:.2f} | {many[1] / 1e6:.0f} MB | {many[1] / result:.2f} |",
-                          flush=True)
+                for pictures in ("yes", "no"):
+                    options = [] if pictures == "yes" else ["--no-plots"]
+                    (few, _), (many, memory) = (usage(command, experiments[count], folder, *options) for count in BINS)
+                    rows.append((command, 3 if colour else 1, pictures, f"{few:.3f}", f"{many:.3f}", f"{memory:.0f}"))
+                    write_rows(file, COLUMNS, rows)
+
+
+def table_of(rows):
+    lines = ["| | pictures | 10 bins | 1000 bins | ratio | memory | of the result |", "|---|---|---|---|---|---|---|"]
+    for row in rows:
+        few, many, memory = (float(row[key]) for key in ("seconds_10_bins", "seconds_1000_bins", "peak_bytes"))
+        result = 4 * 256 * 256 * BINS[1] * int(row["channels"])
+        lines.append(f"| `{row['command']}`, {'colour' if row['channels'] == '3' else 'grey'} | {row['pictures']} | {few:.2f} s "
+                     f"| {many:.2f} s | {many / few:.2f} | {memory / 1e6:.0f} MB | {memory / result:.2f} |")
+    return "\n".join(lines)
+
+
+def table(file):
+    print(table_of(read_rows(file)))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(run_action(__doc__, sys.argv[1:], measure, table))

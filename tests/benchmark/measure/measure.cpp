@@ -265,8 +265,8 @@ void measure_threads(const NamedScene& s, int rounds, Report& report) {
       return 1.0;
     };
     const Pair pair = measure_pair(rounds, CLOCK_MONOTONIC, with_one, with_two);
-    report.add("one thread / two, least times", s.name + " " + what, pair.least_ratio, "", goal);
-    report.add("one thread / two, median", s.name + " " + what, pair.ratio, "");
+    report.add("one thread / two (least times)", s.name + " " + what, pair.least_ratio, "", goal);
+    report.add("one thread / two (median)", s.name + " " + what, pair.ratio, "");
     report.add("two threads at work", s.name + " " + what, median(busy), "of their time");
   };
   const SampleRange samples{0, 64};

@@ -1,0 +1,70 @@
+"""What is measured: one step after the other, each with its commands and where a reader finds what came of it."""
+
+import os
+import pathlib
+from dataclasses import dataclass
+
+from reproduction.catalogue import RECONSTRUCTIONS
+from reproduction.measure import ROOT
+
+# What the numbers depend on: the version of a measurement is that of the last commit that changed any of these.
+SOURCES = ("CMakeLists.txt", "app", "core", "optim", "scenes", "experiments/*.yaml", "experiments/validation", "tests/benchmark",
+           ":!*.md")
+CHARTED = ("cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa")
+BY_CHANCE = ("cube", "cube_standard")  # runs that noise alone can lead away, so that there are many of them
+
+
+@dataclass(frozen=True)
+class Step:
+    commands: tuple  # words each; from the top of the repository
+    environment: tuple = ()  # pairs
+
+
+def _built(name, *arguments):
+    return (f"build/isochron_{name}", *arguments)
+
+
+def _script(name, *arguments):
+    return (f"scripts/{name}", *arguments)
+
+
+def _csv(name):
+    return f"experiments/measured/{name}.csv"
+
+
+def _reproduce(name):
+    return Step((_script("reproduce", name, "--seeds", *map(str, range(1, 11 if name in BY_CHANCE else 3))),))
+
+
+def _chart(name):
+    return Step((_script("charts", name),), (("SECONDS_EACH", "40"),))
+
+
+STEPS = {
+    "speed": Step((_built("measure", _csv("performance"), "9"),)),
+    "set_up": Step((_built("set_up", _csv("set_up"), "9"),)),
+    "cubes": Step((_script("cube_cost.py", "measure", _csv("cube_cost")),)),
+    **{f"figure{n}": Step((_script("figure", n),)) for n in ("1", "8", "9")},
+    **{f"reconstructions/{name}": _reproduce(name) for name in RECONSTRUCTIONS},
+    **{f"charts/{name}": _chart(name) for name in (*CHARTED, "solvers", "stability")},
+    "gate_width": Step((_built("gate_width", "cost", _csv("gate_width"), "8"),
+                        _script("plot_gate_width.py", _csv("gate_width"), "experiments/figures/gate_width.png"),
+                        _built("gate_width", "growth", _csv("width_growth"), "24"),
+                        _script("plot_gate_width.py", _csv("width_growth"), "experiments/figures/width_growth.png"))),
+    "boundary": Step((_built("boundary", _csv("boundary"), "24"),)),
+    "contact": Step((_built("contact", _csv("contact"), "1"),)),
+    "hidden_share": Step((_built("hidden_share", _csv("hidden_share"), "8"),)),
+    "capture_cost": Step((_script("capture_cost.py", "measure", _csv("capture_cost")),)),
+    "stated_errors": Step((_script("error_coverage.py", "measure", _csv("error_coverage")),)),
+    "checks": Step((_script("check_experiments.py", _csv("checks")),)),
+}
+
+
+def egg(folder):
+    """The public scene of "Differentiable Transient Rendering" (Yi et al. 2021), which is not part of this repository."""
+    return {"egg": Step((_script("egg.py", os.fspath(pathlib.Path(folder).resolve()), _csv("egg")),))}
+
+
+def path(word):
+    """Of a command's first word."""
+    return ROOT / word
