@@ -164,8 +164,9 @@ void check_remesh(const ParameterSpec& remeshed, const std::vector<ParameterSpec
     if (other.remesh.levels > 0) other.fail("remesh", "another parameter has it already", "one of them");
     const bool turns = other.type == ParameterType::rotation || other.type == ParameterType::vertices ||
                        other.selection.kind != Selection::Kind::all;
-    if (other.shape == remeshed.shape && turns)
-      other.fail("shape", fmt::format("'{}' is remeshed by '{}'", other.shape, remeshed.name),
+    const std::vector<std::string> shapes = other.shapes();
+    if (turns && std::find(shapes.begin(), shapes.end(), remeshed.shape) != shapes.end())
+      other.fail("shape", fmt::format("'{}' is remeshed by '{}'", remeshed.shape, remeshed.name),
                  "translations of the whole shape beside it");
   }
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "optim/experiment/choices.h"
 #include "optim/experiment/description.h"
@@ -66,9 +67,36 @@ Field pivot(ParameterSpec& spec) {
     return spec.pivot_kind == PivotKind::follow ? "{follow: " + point + "}" : point;
   };
   return {"[x, y, z], a word or {follow: [x, y, z]}", "`center`", read, write,
-          "A list is a point of the world; `center`: the mean of the vertices that turn, as loaded; `follow`: a point "
-          "of the "
-          "shape, where it is in the scene file"};
+          "A list is a point of the world; `center`: the mean of the vertices that turn, as loaded, of all shapes; "
+          "`follow`: "
+          "a point of the shape, where it is in the scene file"};
+}
+
+/// The name of one shape, or several, which change alike.
+Field shapes(ParameterSpec& spec) {
+  const auto read = [&spec](const YamlValue& value) {
+    spec.further_shapes.clear();
+    if (!value.is_list()) {
+      spec.shape = value.text();
+      return;
+    }
+    using enum ParameterType;
+    if (spec.type != translation && spec.type != rotation && spec.type != emission)
+      value.fail(fmt::format("a parameter of type {} changes one shape", type_name(spec)),
+                 "a name; lists for translation, rotation and emission");
+    std::vector<std::string> names;
+    field::names(names).read(value);
+    std::set<std::string> known;
+    for (const std::string& name : names)
+      if (!known.insert(name).second) value.fail(fmt::format("'{}' is listed twice", name));
+    spec.shape = names[0];
+    spec.further_shapes.assign(names.begin() + 1, names.end());
+  };
+  const auto write = [&spec] {
+    std::vector<std::string> names = spec.shapes();
+    return spec.further_shapes.empty() ? field::text(spec.shape).write() : field::names(names).write();
+  };
+  return {"text, or a list of names", "a list: translation, rotation, emission", read, write};
 }
 
 /// The quantities of materials are types of their own.
@@ -118,6 +146,13 @@ std::string type_name(const ParameterSpec& spec) {
   return spec.type == ParameterType::material ? spec.quantity : name_of(spec.type);
 }
 
+std::vector<std::string> ParameterSpec::shapes() const {
+  std::vector<std::string> all;
+  if (!shape.empty()) all.push_back(shape);
+  all.insert(all.end(), further_shapes.begin(), further_shapes.end());
+  return all;
+}
+
 void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool target_required) {
   using enum ParameterType;
   const auto of = [&](std::initializer_list<ParameterType> types) {
@@ -146,10 +181,15 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   const bool of_light = !spec.light.empty();
   Only with_shape = of({translation, rotation, vertices, emission, texture});
   if (of_light && with_shape.here) with_shape = {false, "parameters of shapes", "one of a light"};
-  keys.value("shape", field::text(spec.shape), "whose vertices, emission or albedo changes",
+  keys.value("shape", shapes(spec), "whose vertices, emission or albedo changes; those of a list change alike",
              {.required = true, .only = with_shape});
   keys.value("material", field::text(spec.material), "which changes", {.required = true, .only = of_materials(spec)});
-  keys.value("selection", selection(spec.selection), "the vertices that move: by number, or inside a box of the world",
+  const auto check_selection = [&](const YamlValue& value) {
+    if (spec.selection.kind == Selection::Kind::list && !spec.further_shapes.empty())
+      value.fail("counts the vertices of one shape, and there are several", "a box");
+  };
+  keys.value("selection", field::checked(selection(spec.selection), check_selection),
+             "the vertices that move: by number, or inside a box of the world",
              {.only = of({translation, rotation, vertices}),
               .unset = spec.selection.kind == Selection::Kind::all,
               .otherwise = "all"});

@@ -48,10 +48,11 @@ struct RemeshSpec {
 struct ParameterSpec {
   std::string name;
   ParameterType type = ParameterType::translation;
-  std::string shape;     ///< translation, rotation, vertices, emission, texture
-  std::string light;     ///< translation and rotation in place of a shape, intensity
-  std::string material;  ///< material
-  std::string quantity;  ///< material: which of its quantities, as `type` in the file
+  std::string shape;                        ///< translation, rotation, vertices, emission, texture
+  std::vector<std::string> further_shapes;  ///< of translation, rotation and emission: that change alike
+  std::string light;                        ///< translation and rotation in place of a shape, intensity
+  std::string material;                     ///< material
+  std::string quantity;                     ///< material: which of its quantities, as `type` in the file
   Per per = Per::all;
   Selection selection;
   VertexDirection direction_kind = VertexDirection::fixed;
@@ -78,6 +79,8 @@ struct ParameterSpec {
 
   /// Where the file gives each key (and, under "", the parameter): for checks that need the scene.
   std::map<std::string, YamlValue> where;
+  /// All shapes that it changes, none where it changes something else.
+  std::vector<std::string> shapes() const;
   /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
   [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
 };

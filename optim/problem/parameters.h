@@ -4,7 +4,7 @@
 // tangents of earlier parameters are carried through it. Directions (also `normal`: the area-weighted vertex
 // normals of the loaded mesh) and axes are fixed in the world, and so are pivots unless they move with the shape
 // (PivotKind): those are carried along by the translations and rotations listed before that act on every vertex
-// that this rotation turns.
+// that this rotation turns. Several shapes of one rotation turn about one pivot.
 //
 // Scales: what counts as one unit of each parameter where parameters of different units are compared, as optimisers
 // and param_rmse do. Values, bounds, gradients, checkpoints and logs are in units of the parameter. Default: 1 for
@@ -137,16 +137,18 @@ class Parameters {
     std::vector<int> listed;  ///< the one that each value of a list is of, as the mesh's file counts vertices; -1: none
   };
 
-  /// Throw InputError where there is none.
+  /// Throw InputError where there is none. Of several shapes, find_shape is the first.
   int find_shape(const ParameterSpec& spec) const;
+  std::vector<int> find_shapes(const ParameterSpec& spec) const;
   int find_light(const ParameterSpec& spec) const;
   /// Of a parameter that moves something, else false.
   bool bind_move(const ParameterSpec& spec, int first, Unknowns& unknowns);
   void bind_light(const ParameterSpec& spec, int first);
   void bind_value(const ParameterSpec& spec, int first, double gate_unit, Unknowns& unknowns);
   void bind_motion(const ParameterSpec& spec, Motion& motion, int shape, Unknowns& unknowns);
-  /// Sets the pivot in the scene as loaded, and what carries it.
-  void bind_pivot(const ParameterSpec& spec, Motion& motion, int shape) const;
+  /// Set the pivot in the scene as loaded, and what carries it: the same of all shapes that turn about it.
+  void bind_pivot(const ParameterSpec& spec, const std::vector<int>& shapes, std::vector<Motion>& motions) const;
+  void bind_carriers(const std::vector<int>& shapes, std::vector<Motion>& motions) const;
   void bind_values(const ParameterSpec& spec, const Unknowns& unknowns);
   /// Turns `p` and what `tangent`, if given, holds about the pivot.
   static void turn(const Motion& rotation, const CarriedPoint& pivot, const std::vector<double>& theta, Vec3& p,

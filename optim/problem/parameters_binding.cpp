@@ -46,8 +46,11 @@ double default_scale(const ParameterSpec& spec) {
 
 void make_room(Scene& scene, const std::vector<ParameterSpec>& specs) {
   for (const ParameterSpec& spec : specs) {
+    for (const std::string& name : spec.shapes()) {
+      const int changed = scene.find_shape(name);
+      if (changed >= 0) scene.shapes[changed].hidden = true;
+    }
     const int index = scene.find_shape(spec.shape);
-    if (index >= 0) scene.shapes[index].hidden = true;
     if (spec.per == Per::pixel) {
       if (!scene.capture)
         spec.fail("per", "the scene has a camera", fmt::format("only captures have a {} per pixel", type_name(spec)));
@@ -101,7 +104,14 @@ Parameters::Parameters(const Scene& scene, const std::vector<ParameterSpec>& spe
 }
 
 int Parameters::find_shape(const ParameterSpec& spec) const {
-  return found(scene_.find_shape(spec.shape), spec, "shape", spec.shape, scene_.shapes);
+  return find_shapes(spec)[0];
+}
+
+std::vector<int> Parameters::find_shapes(const ParameterSpec& spec) const {
+  std::vector<int> indices;
+  for (const std::string& name : spec.shapes())
+    indices.push_back(found(scene_.find_shape(name), spec, "shape", name, scene_.shapes));
+  return indices;
 }
 
 int Parameters::find_light(const ParameterSpec& spec) const {
@@ -115,6 +125,12 @@ void Parameters::bind_value(const ParameterSpec& spec, int first, double gate_un
     value.dof = dof;
     value.numbers = 3;
     value.count = scene_.grey ? 1 : 3;
+  };
+  const auto add = [&] {
+    for (const Value& other : values_)
+      if (other.dof == value.dof)
+        spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
+    values_.push_back(value);
   };
   switch (spec.type) {
     case ParameterType::material: {
@@ -130,8 +146,12 @@ void Parameters::bind_value(const ParameterSpec& spec, int first, double gate_un
       break;
     }
     case ParameterType::emission:
-      colour(layout.emission(find_shape(spec), 0));
-      break;
+      for (const int shape : find_shapes(spec)) {
+        colour(layout.emission(shape, 0));
+        add();
+      }
+      unknowns.count = value.count;
+      return;
     case ParameterType::intensity:
       colour(layout.light_intensity(find_light(spec), 0));
       break;
@@ -160,10 +180,7 @@ void Parameters::bind_value(const ParameterSpec& spec, int first, double gate_un
     default:
       throw std::logic_error("no value: " + type_name(spec));
   }
-  for (const Value& other : values_)
-    if (other.dof == value.dof)
-      spec.fail("type", fmt::format("another parameter sets the same {} already", type_name(spec)));
-  values_.push_back(value);
+  add();
   unknowns.count = value.count;
 }
 

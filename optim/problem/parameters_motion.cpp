@@ -81,11 +81,14 @@ bool Parameters::bind_move(const ParameterSpec& spec, int first, Unknowns& unkno
     case ParameterType::rotation:
     case ParameterType::vertices:
       if (spec.light.empty()) {
-        Motion motion;
-        motion.first_component = first;
-        const int shape = find_shape(spec);
-        bind_motion(spec, motion, shape, unknowns);
-        motions_[shape].push_back(std::move(motion));
+        const std::vector<int> shapes = find_shapes(spec);
+        std::vector<Motion> motions(shapes.size());
+        for (std::size_t i = 0; i < shapes.size(); ++i) {
+          motions[i].first_component = first;
+          bind_motion(spec, motions[i], shapes[i], unknowns);
+        }
+        if (spec.type == ParameterType::rotation) bind_pivot(spec, shapes, motions);
+        for (std::size_t i = 0; i < shapes.size(); ++i) motions_[shapes[i]].push_back(std::move(motions[i]));
       } else {
         bind_light(spec, first);
       }
@@ -116,7 +119,6 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
   motion.direction_kind = spec.direction_kind;
   motion.direction = spec.type == ParameterType::rotation ? normalize(spec.axis) : spec.direction;
   const std::vector<int> places = select(spec, scene_, shape, motion.slot);
-  if (spec.type == ParameterType::rotation) bind_pivot(spec, motion, shape_index);
   if (spec.type != ParameterType::vertices) return;
   const int selected = selected_count(motion.slot), stride = spec.direction_kind == VertexDirection::free ? 3 : 1;
   unknowns.count = stride * selected;
@@ -136,25 +138,46 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
   }
 }
 
-void Parameters::bind_pivot(const ParameterSpec& spec, Motion& motion, int shape_index) const {
-  motion.pivot = spec.pivot;
-  if (spec.pivot_kind == PivotKind::fixed) return;
+void Parameters::bind_pivot(const ParameterSpec& spec, const std::vector<int>& shapes,
+                            std::vector<Motion>& motions) const {
+  Vec3 pivot = spec.pivot;
   if (spec.pivot_kind == PivotKind::center) {
     Vec3 sum;
     int count = 0;
-    for (std::size_t v = 0; v < motion.slot.size(); ++v) {
-      if (motion.slot[v] < 0) continue;
-      sum += scene_.positions[scene_.shapes[shape_index].first_vertex + v];
-      ++count;
-    }
-    motion.pivot = sum / count;
+    for (std::size_t i = 0; i < shapes.size(); ++i)
+      for (std::size_t v = 0; v < motions[i].slot.size(); ++v) {
+        if (motions[i].slot[v] < 0) continue;
+        sum += scene_.positions[scene_.shapes[shapes[i]].first_vertex + v];
+        ++count;
+      }
+    pivot = sum / count;
   }
-  const std::vector<Motion>& earlier = motions_[shape_index];
-  for (std::size_t m = 0; m < earlier.size(); ++m) {
-    if (earlier[m].type == ParameterType::vertices) continue;
-    bool of_all = true;
-    for (std::size_t v = 0; v < motion.slot.size(); ++v) of_all &= motion.slot[v] < 0 || earlier[m].slot[v] >= 0;
-    if (of_all) motion.carriers.push_back(static_cast<int>(m));
+  for (Motion& motion : motions) motion.pivot = pivot;
+  if (spec.pivot_kind != PivotKind::fixed) bind_carriers(shapes, motions);
+}
+
+void Parameters::bind_carriers(const std::vector<int>& shapes, std::vector<Motion>& motions) const {
+  const auto moves_all = [&](const Motion& earlier, const Motion& motion) {
+    for (std::size_t v = 0; v < motion.slot.size(); ++v)
+      if (motion.slot[v] >= 0 && earlier.slot[v] < 0) return false;
+    return true;
+  };
+  // Motions of several shapes are one parameter's where they have the same first component.
+  const auto carries = [&](int first_component) {
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      const std::vector<Motion>& earlier = motions_[shapes[i]];
+      if (std::none_of(earlier.begin(), earlier.end(), [&](const Motion& each) {
+            return each.first_component == first_component && moves_all(each, motions[i]);
+          }))
+        return false;
+    }
+    return true;
+  };
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    const std::vector<Motion>& earlier = motions_[shapes[i]];
+    for (std::size_t m = 0; m < earlier.size(); ++m)
+      if (earlier[m].type != ParameterType::vertices && carries(earlier[m].first_component))
+        motions[i].carriers.push_back(static_cast<int>(m));
   }
 }
 

@@ -17,6 +17,11 @@ METRES_PER_PS = 299792458e-12
 METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time; light's way in it
 
 
+def names_of(shape):
+    """Of a parameter's key `shape`: one name, several or none."""
+    return [str(name) for name in shape] if isinstance(shape, list) else [] if shape is None else [str(shape)]
+
+
 class Surface:
     """A shape as the fit left it: vertices in the wall's frame; for each of them, or None, an albedo and the standard error of its
     place along the normal, in metres."""
@@ -149,7 +154,7 @@ class CaptureRun:
             name = path.stem.removeprefix("final_")
             shape = next((s for s in paints if name_in_files(s) == name), name)
             self._add_surface(path, shape, read_run_mesh(path), paints.pop(shape, None))
-        moved = {str(spec.get("shape")) for spec in self.specs.values() if spec.get("type") != "albedo"}
+        moved = {name for spec in self.specs.values() if spec.get("type") != "albedo" for name in names_of(spec.get("shape"))}
         for shape, paint in paints.items():
             path, transform = self._find_shape(shape)
             if path is not None and shape not in moved:
