@@ -64,6 +64,55 @@ class SessionTest(unittest.TestCase):
         with self.assertRaisesRegex(isochron.InputError, "samples"):
             isochron.Experiment(self.file, {"samples.primal": -1})
 
+    def test_captures_of_several_spots(self):
+        """As grids and in no order, written, read and rendered; counts of known gain are fitted."""
+        spots = np.array([[-0.15, 0.1, 0], [0.1, 0.12, 0], [0.0, -0.1, 0]])
+        layouts = {"grids": (WALL, spots[:, np.newaxis], (3, 1, 6, 5)), "spots in no order": (WALL, spots, (3, 6, 5)),
+                   "none in order": (WALL.reshape(-1, 3), spots, (3, 30)), "one spot": (WALL, spots[0], (6, 5)),
+                   "one spot, points in no order": (WALL.reshape(-1, 3), spots[0], (30,))}
+        images = {}
+        for name, (points, laser, shape) in layouts.items():
+            counts = np.arange(20 * np.prod(shape)).reshape(20, *shape)
+            path = self.folder / "capture.h5"
+            isochron.write_capture(path, counts, 64 * METRES_PER_PS, 3000 * METRES_PER_PS, points, [0, 0, 1], laser,
+                                   laser_normal=[0, 0.1, 1])
+            read = isochron.read_capture(path)
+            np.testing.assert_array_equal(read.counts.ravel(), counts.ravel(), err_msg=name)
+            np.testing.assert_allclose(read.laser.reshape(-1, 3), np.reshape(laser, (-1, 3)))
+            np.testing.assert_array_equal(read.laser_normals.reshape(-1, 3)[-1], [0, 0.1, 1])
+            before = path.read_bytes()
+            read.write(path)  # what was read is written the same
+            self.assertEqual(len(path.read_bytes()), len(before))
+            experiment = isochron.Experiment(self.file, {"max_bounces": 1})
+            images[name] = experiment.render(samples=256)
+            where = images[name].coordinates
+            for spot in range(0, images[name].shape[1], images[name].shape[1] // max(1, np.size(laser) // 3)):
+                self.assertTrue((np.abs(spots - where.spots[spot, 0]).sum(axis=1) < 1e-9).any(), name)
+        np.testing.assert_array_equal(images["grids"], images["spots in no order"])
+        # A pixel's random numbers are its own, and points in no order are other pixels.
+        flat = images["none in order"].reshape(20, 3, 30).sum(axis=(0, 2))
+        np.testing.assert_allclose(images["grids"].reshape(20, 3, 30).sum(axis=(0, 2)), flat, rtol=0.05)
+
+    def test_several_spots_are_fitted(self):
+        spots = np.array([[-0.15, 0.1, 0], [0.1, 0.12, 0]])
+        write = lambda counts: isochron.write_capture(self.folder / "capture.h5", counts, 64 * METRES_PER_PS, 3000 * METRES_PER_PS,
+                                                      WALL, [0, 0, 1], spots)
+        write(np.zeros((20, 2, 6, 5)))
+        truth = isochron.Experiment(self.file).render({"paint": 0.5}, samples=4096)  # [bin, spots x 5 rows, 6 columns, 1]
+        write(np.asarray(truth).reshape(20, 2, 5, 6).transpose(0, 1, 3, 2))
+        fit = isochron.Experiment(self.file, {"target.capture": "capture.h5", "parameters[0].initial": 0.8,
+                                              "optimizer": {"method": "levenberg_marquardt", "iterations": 6}})
+        np.testing.assert_allclose(np.asarray(fit.target), np.asarray(truth), rtol=1e-6)
+        self.assertAlmostEqual(float(fit.run(self.folder / "run").values["paint"]), 0.5, delta=0.02)
+
+    def test_captures_that_do_not_fit_are_refused(self):
+        for counts, points, laser, wrong in (((20, 6, 5), WALL[:5], None, "do not fit points"),
+                                             ((20, 2, 6, 5), WALL, np.zeros((3, 3)), r"do not fit points of \(6, 5\) and spots of \(3, 1\)"),
+                                             ((20, 2, 6, 5), WALL, None, "do not fit"), ((20, 6, 5), WALL, np.zeros((2, 2)), "spots of the laser of"),
+                                             ((20, 6, 5), WALL[..., :2], None, "points of")):
+            with self.assertRaisesRegex(isochron.InputError, "^.*capture.h5: .*" + wrong):
+                isochron.write_capture(self.folder / "capture.h5", np.zeros(counts), 0.01, 0, points, [0, 0, 1], laser)
+
     def test_threads_share_a_target(self):
         """Several threads ask for the first evaluation at once, while another keeps taking the interpreter's lock."""
         expected = isochron.Experiment(self.file, {"parameters[0].target": 0.4}).evaluate()

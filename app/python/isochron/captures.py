@@ -45,20 +45,25 @@ class Capture:
 
     def write(self, path: Any) -> None:
         """As a file that experiments can read, counts with 32 bits. Raises CaptureError."""
-        counts, points = np.asarray(self.counts), _grid(self.points)
-        laser = None if self.laser is None else _grid(self.laser)
-        shape = (*(laser.shape[:2] if laser is not None and counts.ndim > np.ndim(self.points) else ()), *points.shape[:2])
-        if np.prod(shape) == counts[0].size:  # points in no order get an axis more
-            counts = counts.reshape(-1, *shape)
-        normals = np.broadcast_to(self.normals, np.shape(self.points)).reshape(points.shape)
-        of_laser = None if laser is None or self.laser_normals is None else np.reshape(self.laser_normals, laser.shape)
-        write_capture(path, counts, self.delta_t, self.t_start, points, normals, laser, laser_normal=of_laser, origins=self.origins)
+        write_capture(path, self.counts, self.delta_t, self.t_start, self.points, self.normals, self.laser,
+                      laser_normal=self.laser_normals, origins=self.origins)
 
 
-def _grid(points: Any) -> np.ndarray:
-    """[Sx, Sy, xyz]; points in no order are a grid of one row."""
+def _grid(points: Any, what: str) -> np.ndarray:
+    """[Sx, Sy, xyz]; points in no order are a grid of one row, a single one is a grid of one. Raises CaptureError."""
     found = np.asarray(points, float)
-    return found[:, np.newaxis] if found.ndim == 2 else found
+    found = found[np.newaxis, np.newaxis] if found.ndim == 1 else found[:, np.newaxis] if found.ndim == 2 else found
+    if found.ndim != 3 or found.shape[2] != 3 or not found.size:
+        raise CaptureError(f"{what} of {np.shape(points)} (allowed: [Sx, Sy, xyz], or [N, xyz])")
+    return found
+
+
+def _normals_of(normal: Any, points: Any, grid: np.ndarray, what: str) -> np.ndarray:
+    """One for all, or one each. Raises CaptureError."""
+    try:
+        return np.broadcast_to(np.asarray(normal, float), np.shape(points)).reshape(grid.shape)
+    except ValueError:
+        raise CaptureError(f"{what} of {np.shape(normal)} do not fit points of {np.shape(points)}") from None
 
 
 def _find(file: h5py.File, name: str) -> np.ndarray | None:
@@ -153,28 +158,51 @@ def write_array(path: pathlib.Path, values: np.ndarray) -> None:
         np.save(file, values)
 
 
-def write_capture(path: Any, counts: np.ndarray, delta_t: float, t_start: float, points: np.ndarray, normal: Any, laser: Any = None,
+def _histograms(counts: Any, points: np.ndarray, spots: np.ndarray | None) -> tuple[np.ndarray, bool]:
+    """Counts as files hold them, and whether several spots go with every point. Raises CaptureError."""
+    counts, grid = np.asarray(counts), points.shape[:2]
+    sizes = counts.shape[1:]
+    flat = (grid, (points.size // 3,)) if 1 in grid else (grid,)
+    if sizes in flat and (spots is None or spots.size in (3, points.size)):
+        return counts.reshape(-1, *grid), False
+    if spots is not None:
+        of_laser = spots.shape[:2]
+        lasers = (of_laser, (spots.size // 3,)) if 1 in of_laser else (of_laser,)
+        if sizes in [one + other for one in lasers for other in flat]:
+            return counts.reshape(-1, *of_laser, *grid), True
+    raise CaptureError(f"counts of {counts.shape} do not fit points of {grid} and spots of {None if spots is None else spots.shape[:2]}")
+
+
+def write_capture(path: Any, counts: np.ndarray, delta_t: float, t_start: float, points: Any, normal: Any, laser: Any = None,
                   original_format: str = "arrays", *, laser_normal: Any = None, origins: Any = None) -> None:
-    """Writes a measurement that experiments can read. counts [bin, Sx, Sy], of several spots [bin, Lx, Ly, Sx, Sy]; points [Sx, Sy, xyz] in
-    metres, as are the bins' width and start (optical path); normal: of the wall, or [Sx, Sy, xyz]; laser is one point,
-    [Lx, Ly, xyz], or None: confocal, as where it is `points`; laser_normal like `normal`, which it is where it is None; origins of laser and sensor, where
-    times include the ways from and to there. Raises CaptureError."""
+    """Writes a measurement that experiments can read.
+
+    counts: [bin, Sx, Sy], of several spots [bin, Lx, Ly, Sx, Sy]; sensor points and spots in no order have one axis for two,
+    [bin, N], [bin, M, N] or [bin, M, Sx, Sy]. points: [Sx, Sy, xyz] or [N, xyz], in metres, as are the bins' width and start
+    (optical path). normal: of the wall, or one for each point. laser: one spot, several, [Lx, Ly, xyz] or [M, xyz], each of which
+    goes with every point, or None: confocal, as where the spots are `points` and the counts have one histogram for each.
+    laser_normal: like `normal`, which it is where it is None. origins of laser and sensor, where times include the ways from and
+    to there. Raises CaptureError.
+    """
     path = pathlib.Path(path)
-    spots = points if laser is None else np.asarray(laser, float).reshape(np.shape(laser) if np.ndim(laser) == 3 else (1, 1, 3))
-    several = np.ndim(counts) == 5
-    expected = (*spots.shape[:2], *points.shape[:2]) if several else points.shape[:2]
-    if np.shape(counts)[1:] != expected or (several and laser is None) or (not several and spots.size not in (3, points.size)):
-        raise CaptureError(f"{path}: counts of {np.shape(counts)} do not fit {points.shape[:2]} points and {spots.shape[:2]} spots")
-    if laser_normal is None:
-        wall = np.asarray(normal, float)
-        laser_normal = wall if laser is None or wall.ndim == 1 else wall.reshape(-1, 3)[0]
+    try:
+        sensor = _grid(points, "points")
+        spots = sensor if laser is None else _grid(laser, "spots of the laser")
+        normals = _normals_of(normal, points, sensor, "normals")
+        if laser_normal is None:
+            wall = np.asarray(normal, float)
+            laser_normal = wall if laser is None or wall.ndim == 1 else wall.reshape(-1, 3)[0]
+        spot_normals = _normals_of(laser_normal, points if laser is None else np.atleast_2d(laser), spots, "normals of the laser's spots")
+        counts, several = _histograms(counts, sensor, None if laser is None else spots)
+    except CaptureError as error:
+        raise CaptureError(f"{path}: {error}") from None
     # In memory: where a disk is full, HDF5 fails in ways that cannot be caught.
     with h5py.File("capture", "w", driver="core", backing_store=False) as file:
         file.create_dataset("H", data=counts, dtype="f4", compression="gzip", shuffle=True)
         _write_enumeration(file, "H_format", H_FORMATS, "T_Lx_Ly_Sx_Sy" if several else "T_Sx_Sy")
-        for name, xyz, of_wall in (("sensor", points, normal), ("laser", spots, laser_normal)):
+        for name, xyz, of_wall in (("sensor", sensor, normals), ("laser", spots, spot_normals)):
             file[f"{name}_grid_xyz"] = xyz
-            file[f"{name}_grid_normals"] = np.broadcast_to(np.asarray(of_wall, float), xyz.shape)
+            file[f"{name}_grid_normals"] = of_wall
             _write_enumeration(file, f"{name}_grid_format", GRID_FORMATS, "X_Y_3")
         file["laser_xyz"], file["sensor_xyz"] = (np.zeros(3), np.zeros(3)) if origins is None else origins
         file["delta_t"] = delta_t
