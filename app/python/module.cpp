@@ -39,9 +39,10 @@ PYBIND11_MODULE(_core, module) {
   module.def("version", program_version);
   module.def("use_threads", use_threads, "count"_a);
   module.def("used_threads", used_threads);
+  module.def("watch_progress", watch_progress, "watcher"_a);
   module.def("reconstruct", reconstruct_session, "capture"_a, "response"_a, "folder"_a, "seconds"_a, "seed"_a,
              "force"_a, "row"_a);
-  module.def("resume", resume_session, "folder"_a, "row"_a);
+  module.def("resume", resume_session, "folder"_a, "row"_a, "loss"_a, "loss_name"_a);
   module.def("back_project", back_project_arrays, "counts"_a, "points"_a, "normals"_a, "laser"_a, "delta_t"_a,
              "t_start"_a, "origins"_a, "response"_a, "used"_a, "false_alarms"_a);
   py::class_<Session>(module, "Session")
@@ -56,5 +57,5 @@ PYBIND11_MODULE(_core, module) {
       .def("evaluate", &Session::evaluate, "theta"_a, "iteration"_a)
       .def("gradient", &Session::gradient, "theta"_a, "samples"_a, "seed"_a)
       .def("target", &Session::target)
-      .def("run", &Session::run, "folder"_a, "start"_a, "row"_a, "force"_a);
+      .def("run", &Session::run, "folder"_a, "start"_a, "row"_a, "force"_a, "loss"_a, "loss_name"_a);
 }

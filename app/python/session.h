@@ -41,8 +41,10 @@ class Session {
   pybind11::array target();
 
   /// An optimisation in a folder (empty: that of the command), which is returned. `row` is called after every row of the log.
-  std::string run(const std::string& folder, const std::optional<Array>& start, const pybind11::object& row,
-                  bool force);
+  /// `loss` is None, or what is minimised in place of the experiment's loss: of an image, its value and its derivative
+  /// by the image [row, column, gate, channel]. `loss_name` is for messages.
+  std::string run(const std::string& folder, const std::optional<Array>& start, const pybind11::object& row, bool force,
+                  const pybind11::object& loss, const std::string& loss_name);
 
  private:
   /// Throws InputError where theta has another size or leaves its bounds.
@@ -70,7 +72,8 @@ std::optional<std::string> reconstruct_session(const std::string& capture, const
                                                const std::string& folder, double seconds, std::uint64_t seed,
                                                bool force, const pybind11::object& row);
 
-/// Goes on with the run in a folder.
-void resume_session(const std::string& folder, const pybind11::object& row);
+/// Goes on with the run in a folder. `loss` as of Session::run.
+void resume_session(const std::string& folder, const pybind11::object& row, const pybind11::object& loss,
+                    const std::string& loss_name);
 
 }  // namespace isochron

@@ -7,6 +7,7 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 #include "core/base/parallel.h"
 #include "core/base/progress.h"
@@ -19,11 +20,14 @@ namespace {
 
 /// Between looks at whether a signal has come.
 constexpr std::chrono::milliseconds kPause{20};
+/// Between calls of a watcher.
+constexpr std::chrono::milliseconds kShown{100};
 
 std::timed_mutex busy;              // held by the one task that is under way
 thread_local int calls_inside = 0;  // of Work::call that this thread is in: what holds `busy` waits for it
 int threads = 0;
 thread_local Work* current = nullptr;  // whose task this thread runs
+thread_local PyObject* watcher = nullptr;
 
 /// Runs f with the interpreter's lock; what Python raised in it.
 template <class F>
@@ -42,6 +46,11 @@ std::unique_ptr<py::error_already_set> raised_by(F&& f) {
 
 void run_handlers_of_signals() {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+}
+
+void call_watcher() {
+  const std::optional<WorkProgress> now = work_progress();
+  if (now) py::reinterpret_borrow<py::object>(watcher)(now->name, now->fraction, now->seconds);
 }
 
 class ThreadedWork : public Work {
@@ -93,6 +102,7 @@ class ThreadedWork : public Work {
   /// Until the task has ended.
   std::unique_ptr<py::error_already_set> serve() {
     std::unique_ptr<py::error_already_set> raised;
+    auto shown = std::chrono::steady_clock::now();
     std::unique_lock lock(mutex_);
     while (!ended_) {
       changed_.wait_for(lock, kPause, [&] { return ended_ || call_; });
@@ -106,6 +116,11 @@ class ThreadedWork : public Work {
         --calls_inside;
       } else if (!raised) {
         now = raised_by(run_handlers_of_signals);
+        const auto time = std::chrono::steady_clock::now();
+        if (!now && watcher && time - shown >= kShown) {
+          shown = time;
+          now = raised_by(call_watcher);
+        }
         if (now) request_stop();
       }
       if (now && !raised) raised = std::move(now);
@@ -164,6 +179,11 @@ void share_hdf5() {
 
 void run_work(const std::function<void(Work&)>& task) {
   ThreadedWork().run(task);
+}
+
+py::object watch_progress(const py::object& next) {
+  PyObject* const before = std::exchange(watcher, next.is_none() ? nullptr : next.ptr());
+  return before ? py::reinterpret_borrow<py::object>(before) : py::none();
 }
 
 void warn_python(const std::vector<std::string>& lines) {

@@ -1,5 +1,7 @@
 // Long work for Python: without the interpreter's lock, and ended by signals such as Ctrl-C.
 #pragma once
+#include <pybind11/pybind11.h>
+
 #include <functional>
 #include <memory>
 #include <optional>
@@ -31,6 +33,11 @@ auto run_work_for(F&& task) {
   run_work([&](Work&) { result.emplace(task()); });
   return std::move(*result);
 }
+
+/// While tasks run that this thread starts, watcher(name, fraction, seconds) is called in it about ten times a second: of the
+/// work under way, its part that is done, in [0, 1], and the time since it began. None: nothing is called. What it raises ends
+/// the task. The caller keeps a reference. Returns the watcher before.
+pybind11::object watch_progress(const pybind11::object& watcher);
 
 /// Makes tasks read and write HDF5 in the thread that Python called from, with the interpreter's lock and h5py's, where that is
 /// loaded: both may stand on the same library, which serves one thread at a time.

@@ -338,11 +338,15 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
 std::vector<double> Problem::transpose_apply(const std::vector<double>& theta, const GatedImage& image,
                                              std::uint32_t iteration, const Poll& poll) const {
   const SampleSpec& samples = experiment_.samples;
-  if (experiment_.gradient.method == GradientMethod::finite_difference) {
+  const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
+  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
+  ProgressStage stage("differentiating", differences ? parameters_->size() : static_cast<int>(terms));
+  if (differences) {
     std::vector<double> product;
     for (int i = 0; i < parameters_->size(); ++i) {
       product.push_back(inner_product(
           image, finite_difference(theta, i, stream(Pass::finite_difference, iteration), {0, samples.primal})));
+      stage.advance();
       poll();
     }
     return product;
@@ -354,6 +358,7 @@ std::vector<double> Problem::transpose_apply(const std::vector<double>& theta, c
   for (Term term : kTerms) {
     if (samples.term(term) == 0) continue;
     renderer.add_gradient(term, image, stream(pass_of(term), iteration), {0, samples.term(term)}, dof_gradient);
+    stage.advance();
     poll();
   }
   return basis.transpose_apply(dof_gradient);

@@ -32,9 +32,14 @@ class RenderedObjective : public Objective {
                                       int probe) const override;
   std::vector<Coupling> couplings() const override;
 
- private:
+ protected:
+  /// The image of an iteration, in halves.
   SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;
+  const Problem& problem() const { return problem_; }
+  const GatedImage& target() const { return target_; }
+  const Poll& poll() const { return poll_; }
 
+ private:
   const Problem& problem_;
   const GatedImage& target_;
   Poll poll_;

@@ -5,9 +5,12 @@
 
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 
+#include "core/base/description.h"
 #include "core/base/error.h"
 #include "core/base/file.h"
 #include "core/base/ranks.h"
@@ -51,6 +54,22 @@ long long peak_memory() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return 1024LL * usage.ru_maxrss;
+}
+
+/// In the folder of a run whose loss is not the experiment's.
+constexpr const char* kOwnLossFile = "own_loss.yaml";
+
+/// Throws InputError where a run is to go on with another loss than it began with.
+void require_same_loss(const RunOptions& options) {
+  const std::string file = options.folder + "/" + kOwnLossFile;
+  const bool had = file_exists(file);
+  if (had && !options.loss)
+    throw InputError(fmt::format(
+        "{}: this run minimises a loss of its own, {} (allowed: isochron.resume(folder, loss=...) in Python)",
+        options.folder, open_yaml(file).map().require("loss").text()));
+  if (!had && options.loss)
+    throw InputError(fmt::format("{}: this run began with the experiment's loss (allowed: to resume it without loss=)",
+                                 options.folder));
 }
 
 /// What a resumption says that made no step.
@@ -105,14 +124,24 @@ class Run {
   void load_target() {
     const std::string file = path("target.exr");
     const Clock::time_point start = Clock::now();
+    if (!aims_at_images_) {
+      target_ = problem_.blank();
+      return;
+    }
     if (!file_exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
     target_ = problem_.read_target(file);
     target_seconds_ = seconds_since(start);
   }
 
+  std::unique_ptr<const Objective> make_objective() const {
+    const Poll poll = [this] { this->poll(); };
+    if (options_.loss) return std::make_unique<OwnLossObjective>(problem_, target_, poll, options_.loss);
+    return std::make_unique<RenderedObjective>(problem_, target_, poll);
+  }
+
   LoopResult optimise() {
     const OptimizerSpec& spec = problem_.experiment().optimizer;
-    const RenderedObjective objective(problem_, target_, [this] { poll(); });
+    const std::unique_ptr<const Objective> objective = make_objective();
     const auto optimizer = make_optimizer(spec, problem_.preconditioner(), parameters_.scales());
     const GeometryFiles geometry(options_.folder, problem_.experiment().output, parameters_);
     if (state_.iteration == 0) geometry.write("target", parameters_.target());
@@ -124,20 +153,22 @@ class Run {
     const int first = state_.iteration;
     LoopOptions loop;
     loop.iterations = spec.iterations;
-    loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_, problem_.readings()));
+    if (!options_.loss) loop.converged_rmse = spec.tolerance * std::sqrt(mean_square(target_, problem_.readings()));
     loop.warning = options_.warning;
     loop.row = [&](const Evaluation& now, const std::vector<double>& theta, bool closing) {
-      last_ = {state_.iteration + (closing ? 1 : 0),
-               state_.seconds + seconds_since(iteration_start),
-               now.loss,
-               root_mean_square_error(now.mean_squared_error),
-               parameters_.distance_to_target(theta),
-               scaled_norm(now.gradient),
-               now.loss_noise};
+      last_ = {
+          state_.iteration + (closing ? 1 : 0),
+          state_.seconds + seconds_since(iteration_start),
+          now.loss,
+          std::isnan(now.mean_squared_error) ? now.mean_squared_error : root_mean_square_error(now.mean_squared_error),
+          parameters_.distance_to_target(theta),
+          scaled_norm(now.gradient),
+          now.loss_noise};
       if (last_.iteration == 0) {
         write_exr(path("initial.exr"), now.image, notes_);
         geometry.write("initial", theta);
-        if (const std::string dark = darkness_warning(problem_, theta, now.image, target_);
+        if (const std::string dark = aims_at_images_ ? darkness_warning(problem_, theta, now.image, target_)
+                                                     : darkness_warning(problem_, theta, now.image, "the image");
             options_.warning && !dark.empty())
           options_.warning(dark);
         state_.image_rmse_initial = last_.image_rmse;
@@ -166,9 +197,9 @@ class Run {
       save();
       stage.advance();
     };
-    LoopResult result = run_loop(objective, *optimizer, spec.window(), loop, state_);
+    LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
     std::vector<double> of_surfaces;
-    if (options_.errors) of_surfaces = find_errors(*optimizer, final);
+    if (options_.errors && !options_.loss) of_surfaces = find_errors(*optimizer, final);
     geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);
@@ -206,7 +237,8 @@ class Run {
   /// What the final parameters make of the counts, with far less noise than an iteration's image.
   void judge_expected_counts() {
     const Experiment& experiment = problem_.experiment();
-    const bool counts = has_fit(problem_, target_), histograms = has_histograms(experiment, problem_.scene());
+    const bool counts = !options_.loss && has_fit(problem_, target_),
+               histograms = has_histograms(experiment, problem_.scene());
     if ((!counts && !histograms) || !problem_.can_render(state_.theta)) return;
     SplitImage expected;
     if (counts)
@@ -237,8 +269,9 @@ class Run {
   const Parameters& parameters_;
   const RunOptions& options_;
   const ExrNotes notes_ = exr_notes(problem_.experiment().gates);
+  const bool aims_at_images_ = !options_.loss || has_target(problem_);
   Checkpoint state_;
-  GatedImage target_;
+  GatedImage target_;  ///< black where there is none
   double target_seconds_ = 0;
   LogRow last_;
   ParameterErrors errors_;
@@ -249,7 +282,8 @@ class Run {
 
 /// Goes on in a locked folder that holds a run.
 RunStatus go_on(const RunOptions& options, const std::function<void(const std::string&)>& warning_of_scene) {
-  const Experiment experiment = load_experiment(options.folder + "/experiment.yaml");
+  require_same_loss(options);
+  const Experiment experiment = load_experiment(options.folder + "/experiment.yaml", {}, !options.loss);
   if (remeshed_parameter(experiment)) {
     return run_levels(experiment, options, [](const RunOptions& level) {
       std::optional<FolderLock> lock;
@@ -275,6 +309,7 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     require_jacobian_fits(problem);
     require_memory(problem, run_memory(problem));
     require_levels(problem);
+    if (options.loss) require_for_own_loss(problem);
     // Here, so that a message names the user's file and not the run's copy of it.
     if (!experiment.target.images.empty()) problem.read_target(experiment.target.images);
     for (const ParameterSpec& spec : experiment.parameters)
@@ -294,6 +329,11 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
     const std::vector<FileCopy> inputs = collect_inputs(experiment);  // before a folder is cleared that may hold them
     lock.emplace(prepare_run_folder(options.folder, options.force, options.warning));
     write_inputs(options.folder, inputs, copied);
+    const std::string own_loss = options.folder + "/" + kOwnLossFile;
+    if (options.loss)
+      write_file_atomically(own_loss, fmt::format("loss: {}\n", yaml_text(options.loss_name)));
+    else
+      std::filesystem::remove(own_loss);
     for (const auto& [name, contents] : options.files) write_file_atomically(options.folder + "/" + name, contents);
     write_file_atomically(options.folder + "/experiment.yaml", resolved_yaml(copied, options.folder));
   });

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "optim/experiment/experiment.h"
+#include "optim/problem/own_loss.h"
 #include "optim/run/log.h"
 #include "optim/run/loop.h"
 
@@ -35,6 +36,10 @@ struct RunOptions {
   /// Name and contents of files that are put beside experiment.yaml as the run begins. What is in a `start.yaml` a summary of levels has,
   /// too.
   std::map<std::string, std::string> files;
+  /// What is minimised in place of the experiment's loss, where there is one, and its name for messages. The experiment needs no
+  /// target then. A run remembers that it had one: it is not resumed without.
+  OwnLoss loss;
+  std::string loss_name;
   std::function<bool()> stop;                     ///< asked between passes; true: leave a checkpoint and return
   std::function<void(const Progress&)> progress;  ///< after every row of the log
   /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends
@@ -55,7 +60,7 @@ struct RunOptions {
 RunStatus start_run(const Experiment& experiment, const RunOptions& options);
 
 /// Goes on from the last checkpoint of options.folder, or from the start when there is none yet. Throws
-/// InputError when the folder holds no run.
+/// InputError when the folder holds no run, or one whose loss was not the experiment's and options.loss is missing.
 RunStatus resume_run(const RunOptions& options);
 
 }  // namespace isochron

@@ -19,8 +19,8 @@ namespace {
 /// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run.
 void clear_run(const std::string& folder) {
   for (const char* file : {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml",
-                           "target.exr", "initial.exr", "final.exr", "final.h5", "target.png", "initial.png",
-                           "final.png", "residual.png", "rmse.png", "capture.png", "report.html"})
+                           "own_loss.yaml", "target.exr", "initial.exr", "final.exr", "final.h5", "target.png",
+                           "initial.png", "final.png", "residual.png", "rmse.png", "capture.png", "report.html"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
   for (const char* part : {"inputs", "geometry", "frames", "report", "levels"})
     std::filesystem::remove_all(std::filesystem::path(folder) / part);

@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from isochron.errors import InputError
-from isochron.experiment import Evaluation, Experiment, Gradient, Iteration, Parameter, resume
+from isochron.experiment import Experiment, resume
 from isochron.exr import read as read_exr
 from isochron.exr import write as write_exr
 from isochron.image import Coordinates, Image
 from isochron.parallel import set_threads, threads
 from isochron.reconstruction import reconstruct
+from isochron.records import Evaluation, Gradient, Iteration, Parameter
 from isochron.runs import Run, read_image, read_run
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from isochron.errors import InputError
+from isochron.progress import Progress, showing
 
 if TYPE_CHECKING:
     from isochron.captures import Capture
@@ -87,18 +88,19 @@ def _response(response: Any, unit: str) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def back_project(capture: Any, response: Any = None, *, unit: str = "ps", used: Any = None,
-                 false_alarms: float = 0.01) -> BackProjection:
+                 false_alarms: float = 0.01, progress: Progress = None) -> BackProjection:
     """capture: a file or what read_capture gives. response: how much later than it arrives light is counted, a file (`offset,value`) or a
     pair of arrays, offsets in `unit` (ps, ns, m). used: [Sx, Sy], zero for dead points. false_alarms: the probability that noise makes
-    anything significant. Raises InputError."""
+    anything significant. progress: as of Experiment. Raises InputError."""
     from isochron import _core, captures
 
     if isinstance(capture, (str, os.PathLike)):
         capture = captures.read_capture(capture)
     spots = _spots(capture)
     counts = np.reshape(capture.counts, (len(capture.counts), -1)).T
-    fields = _core.back_project(counts, np.reshape(capture.points, (-1, 3)),
-                                np.reshape(np.broadcast_to(capture.normals, capture.points.shape), (-1, 3)), spots, capture.delta_t,
-                                capture.t_start, None if capture.origins is None else np.reshape(capture.origins, (2, 3)),
-                                _response(response, unit), None if used is None else np.ravel(used), false_alarms)
+    normals = np.reshape(np.broadcast_to(capture.normals, capture.points.shape), (-1, 3))
+    with showing(progress, _core):
+        fields = _core.back_project(counts, np.reshape(capture.points, (-1, 3)), normals, spots, capture.delta_t, capture.t_start,
+                                    None if capture.origins is None else np.reshape(capture.origins, (2, 3)),
+                                    _response(response, unit), None if used is None else np.ravel(used), false_alarms)
     return BackProjection(**fields)

@@ -99,6 +99,16 @@ class DictionaryFiles:
         except OSError as error:
             raise InputError(f"{self.folder}: cannot be written: {error.strerror or error}") from None
 
+    def contents(self) -> tuple[dict[str, bytes], dict[str, str]]:
+        """Name -> bytes of each file, and name -> key of those that hold arrays."""
+        return {path.name: path.read_bytes() for path in self.folder.iterdir()}, {path.name: key for path, key in self._keys.items()}
+
+    def restore(self, contents: Mapping[str, bytes], keys: Mapping[str, str]) -> None:
+        """What contents() of others gave."""
+        for name, data in contents.items():
+            (self.folder / name).write_bytes(data)
+        self._keys = {self.folder / name: key for name, key in keys.items()}
+
     def save(self, folder: Any) -> pathlib.Path:
         """Copies them, over files of the same names. Raises InputError."""
         folder = pathlib.Path(folder)

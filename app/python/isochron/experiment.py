@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import importlib
 import json
 import os
@@ -16,6 +15,9 @@ import numpy as np
 from isochron.dictionary import DictionaryFiles
 from isochron.errors import InputError
 from isochron.image import Coordinates, Image
+from isochron.own_loss import Loss, name_of, own_loss
+from isochron.progress import Progress, showing
+from isochron.records import Callback, Evaluation, Gradient, Parameter, row_callback
 from isochron.runs import Run, read_run
 
 Path = str | os.PathLike[str]
@@ -32,89 +34,6 @@ def extension() -> Any:
             raise
         raise ImportError("isochron: Experiment, resume and threads need the package's extension, which is not beside it: scripts/build "
                           "makes it, for PYTHONPATH=build/python; without it there are only the readers") from None
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Parameter:
-    """One named parameter of an experiment. Values are in its unit; arrays have its shape."""
-
-    name: str
-    type: str
-    """As in the experiment's file: translation, rotation, vertices, albedo, emission, time_offset, ..."""
-    unit: str
-    """'scene units' (of the offset along a direction of length one), 'degrees', the gates' unit; '' for what has none."""
-    scale: float
-    """The unit in which optimisers see the parameter, in units of `unit`."""
-    shape: tuple[int, ...]
-    """() for one value, (3,) for a colour, (n,) or (n, 3) for vertices."""
-    slice: slice
-    """The indices of its values in theta."""
-    initial: np.ndarray
-    target: np.ndarray
-    """NaN where unknown."""
-    lower: np.ndarray
-    """-inf where there is no bound."""
-    upper: np.ndarray
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Evaluation:
-    """Estimates of one iteration. All are unbiased, so that `loss` can lie below 0 where the least possible is 0."""
-
-    loss: float
-    loss_noise: float
-    """Standard error of the loss."""
-    mean_squared_error: float
-    """Of the image against the target."""
-    gradient: np.ndarray
-    """[unknown]: of the loss, per unit of each parameter."""
-    image: Image
-    """[gate, row, column, channel]"""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Gradient:
-    """Of the loss, with errors; arrays are [unknown], per unit of each parameter."""
-
-    gradient: np.ndarray
-    standard_error: np.ndarray
-    degrees_of_freedom: np.ndarray
-    """Of the standard errors, for Student's law."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Iteration:
-    """The argument of callbacks, after each row of a run's log."""
-
-    iteration: int
-    closing: bool
-    """Whether the row is of final parameters that no iteration had, such as an average."""
-    seconds: float
-    """Spent in iterations so far."""
-    loss: float
-    loss_noise: float
-    """Standard error of the loss."""
-    image_rmse: float
-    """Root mean square error of the image against the target; 0 where its square is estimated below 0."""
-    param_rmse: float
-    """Distance to the parameters' target values, in units of their scales; NaN where these are unknown."""
-    gradient_norm: float
-    """Of the gradient by parameters in units of their scales."""
-    theta: np.ndarray
-    """[unknown]"""
-    gradient: np.ndarray
-    """[unknown]"""
-    image: np.ndarray
-    """[gate, row, column, channel]"""
-
-
-Callback = Callable[[Iteration], Any]
-
-
-def row_callback(callback: Callback | None) -> Callable[[dict[str, Any]], bool] | None:
-    if callback is None:
-        return None
-    return lambda values: bool(callback(Iteration(**values)))
 
 
 def _overrides(overrides: Overrides) -> list[str]:
@@ -169,12 +88,26 @@ class Experiment:
     `iteration`, not on the number of threads. Give each iteration of an optimisation another `iteration`;
     with another `seed`, automatic sampling repeats its trials, which takes time.
 
+    `progress` of calls: True shows it on stderr or below a notebook's cell, False does not; None, the default, shows it in
+    notebooks and on terminals, of calls that take more than half a second. A callable is told of it:
+    progress(done, total, loss), of runs the iterations done and in all and the loss, else the part done of what is under way (the
+    choice of how to sample may come before the rendering), 1 and NaN.
+
     Calls render without Python's lock. Ctrl-C ends them. Raises InputError.
+
+    Pickled, an experiment is the path of its file, which has to be there where it is unpickled, or, of from_dict, what it
+    was made of.
     """
 
     def __init__(self, path: Path, overrides: Overrides = ()) -> None:
         self._files: DictionaryFiles | None = None
+        self._source = (os.path.abspath(path), _overrides(overrides))
         self._read(path, overrides)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self._files is None:
+            return Experiment, self._source
+        return _unpickled, self._files.contents()
 
     @classmethod
     def from_dict(cls, description: Mapping[str, Any]) -> Experiment:
@@ -186,11 +119,16 @@ class Experiment:
         Arrays are copied now. Images and counts have 32 bits, all else keeps its own. Raises InputError, which names
         keys, such as scene.shapes[0].vertices.
         """
+        files = DictionaryFiles()
+        return cls._of_files(files, lambda: files.write(description))
+
+    @classmethod
+    def _of_files(cls, files: DictionaryFiles, write: Callable[[], None]) -> Experiment:
         experiment = cls.__new__(cls)
-        experiment._files = files = DictionaryFiles()
+        experiment._files = files
         try:
             with files:
-                files.write(description)
+                write()
                 experiment._read(files.experiment)
         except BaseException:
             files.remove()
@@ -251,7 +189,7 @@ class Experiment:
     def target(self) -> Image:
         """[gate, row, column, channel]: the target of optimisations, rendered at the target values or read from a file; as runs
         use it, rounded to 32 bits. Computed when first asked for."""
-        with self._naming():
+        with self._naming(), self._showing(None):
             return Image(self._session.target(), self._coordinates)
 
     def theta(self, values: Theta = None) -> np.ndarray:
@@ -274,16 +212,17 @@ class Experiment:
         flat = self.theta(theta)
         return {name: flat[p.slice].reshape(p.shape) for name, p in self._parameters.items()}
 
-    def render(self, theta: Theta = None, samples: int | None = None, seed: int | None = None, iteration: int = 0) -> Image:
+    def render(self, theta: Theta = None, samples: int | None = None, seed: int | None = None, iteration: int = 0,
+               progress: Progress = None) -> Image:
         """Gated images [gate, row, column, channel] in the unit of `coordinates.quantity`, those that `isochron render` writes.
 
         samples: per pixel, at least 2; default: samples.primal of the experiment.
         """
-        with self._naming():
+        with self._naming(), self._showing(progress):
             return Image(self._session.render(self.theta(theta), samples, seed, iteration), self._coordinates)
 
     def jvp(self, theta: Theta, tangent: Theta, samples: int | None = None, seed: int | None = None,
-            iteration: int = 0) -> Image:
+            iteration: int = 0, progress: Progress = None) -> Image:
         """Derivative [gate, row, column, channel] of the images along `tangent`, the Jacobian times it; with one 1 and else
         zeros in it what `isochron derive --parameter NAME` writes as `total`.
 
@@ -292,11 +231,11 @@ class Experiment:
         if isinstance(tangent, Mapping):
             tangent = self.theta({**{name: 0.0 for name in self._parameters}, **tangent})
         along = np.asarray(tangent, dtype=float).reshape(-1)
-        with self._naming():
+        with self._naming(), self._showing(progress):
             return Image(self._session.jvp(self.theta(theta), along, samples, seed, iteration), self._coordinates)
 
     def vjp(self, theta: Theta, adjoint: Any, samples: int | None = None, seed: int | None = None,
-            iteration: int = 0) -> np.ndarray:
+            iteration: int = 0, progress: Progress = None) -> np.ndarray:
         """[unknown]: the transposed Jacobian of the images times `adjoint`, an array that broadcasts to
         [gate, row, column, channel]. With the derivative of a loss by the image it is the loss's gradient, whatever the number
         of unknowns for the price of about one image. Its samples go where the adjoint is large."""
@@ -304,13 +243,13 @@ class Experiment:
             full = np.broadcast_to(np.asarray(adjoint, dtype=float), self._shape)
         except ValueError:
             raise InputError(f"adjoint: shape {np.shape(adjoint)} (allowed: {self._shape}, or what broadcasts to it)") from None
-        with self._naming():
+        with self._naming(), self._showing(progress):
             return np.asarray(self._session.vjp(self.theta(theta), np.moveaxis(full, 0, 2), samples, seed, iteration))
 
-    def evaluate(self, theta: Theta = None, iteration: int = 0) -> Evaluation:
+    def evaluate(self, theta: Theta = None, iteration: int = 0, progress: Progress = None) -> Evaluation:
         """Loss, its gradient and the image: exactly what the experiment's optimiser evaluates in an iteration at theta. The
         same iteration has the same random numbers, so that differences between its thetas are far less noisy than the loss."""
-        with self._naming():
+        with self._naming(), self._showing(progress):
             found = self._session.evaluate(self.theta(theta), iteration)
         found["image"] = Image(found["image"], self._coordinates)
         return Evaluation(**found)
@@ -324,23 +263,32 @@ class Experiment:
         """For optimisers of others, which know neither scales of unknowns nor that of the loss."""
         return Scaled(self, start, iteration)
 
-    def gradient(self, theta: Theta = None, samples: int | None = None, seed: int | None = None) -> Gradient:
+    def gradient(self, theta: Theta = None, samples: int | None = None, seed: int | None = None,
+                 progress: Progress = None) -> Gradient:
         """The loss's gradient with standard errors, what `isochron gradient` writes."""
-        with self._naming():
+        with self._naming(), self._showing(progress):
             return Gradient(**self._session.gradient(self.theta(theta), samples, seed))
 
     def run(self, folder: Path | None = None, *, start: Theta = None, callback: Callback | None = None,
-            force: bool = False) -> Run:
+            force: bool = False, loss: Loss | None = None, progress: Progress = None) -> Run:
         """Optimises, as `isochron run` does, into a folder (default: runs/NAME), and reads it.
 
+        loss: what is minimised in place of the experiment's loss: loss(image) returns its value and its derivative by the image
+        [gate, row, column, channel], or what broadcasts to it. The optimiser must be adam or lbfgs; no target is needed. It is
+        called three times per iteration, with the image and with two of half of its samples each, which together cancel the
+        bias that noise of the image gives a curved loss. So it should not call what is random.
         start: theta to begin at, in place of the initial values.
         callback: called with an Iteration after every row of the log; the run stops, and can be resumed, where it returns
         something true or raises.
         force: an earlier run in the folder is deleted, not moved aside.
         """
         first = None if start is None else self.theta(start)
-        with self._naming():
-            return read_run(self._session.run("" if folder is None else os.fspath(folder), first, row_callback(callback), force))
+        with self._naming(), self._showing(progress, of_run=True) as shown:
+            return read_run(self._session.run("" if folder is None else os.fspath(folder), first, row_callback(callback, shown), force,
+                                              own_loss(loss, self._coordinates), name_of(loss)))
+
+    def _showing(self, progress: Progress, of_run: bool = False) -> contextlib.AbstractContextManager[Any]:
+        return showing(progress, extension(), of_run)
 
     def _naming(self) -> contextlib.AbstractContextManager[Any]:
         """Within it, errors name what the user gave."""
@@ -351,7 +299,16 @@ class Experiment:
         return np.concatenate(parts) if parts else np.empty(0)
 
 
-def resume(folder: Path, callback: Callback | None = None) -> Run:
-    """Goes on from the last checkpoint of a run, to the same result bit for bit, and reads it. callback: as of Experiment.run."""
-    extension().resume(os.fspath(folder), row_callback(callback))
+def _unpickled(contents: dict[str, bytes], keys: dict[str, str]) -> Experiment:
+    files = DictionaryFiles()
+    return Experiment._of_files(files, lambda: files.restore(contents, keys))
+
+
+def resume(folder: Path, callback: Callback | None = None, *, loss: Loss | None = None, progress: Progress = None) -> Run:
+    """Goes on from the last checkpoint of a run, to the same result bit for bit, and reads it. callback, loss, progress: as of
+    Experiment.run; loss is to be the one that the run began with."""
+    file = pathlib.Path(folder) / "experiment.yaml"
+    coordinates = Experiment(file).coordinates if loss is not None and file.exists() else None
+    with showing(progress, extension(), of_run=True) as shown:
+        extension().resume(os.fspath(folder), row_callback(callback, shown), own_loss(loss, coordinates), name_of(loss))
     return read_run(folder)

@@ -42,6 +42,14 @@ class Image(np.ndarray):
     def __array_wrap__(self, values: np.ndarray, context: Any = None) -> Any:
         return values[()] if values.ndim == 0 else super().__array_wrap__(values, context)
 
+    def __reduce__(self) -> Any:
+        make, arguments, state = super().__reduce__()
+        return make, arguments, (state, self.coordinates)
+
+    def __setstate__(self, state: Any) -> None:
+        values, self.coordinates = state
+        super().__setstate__(values)
+
     def _repr_png_(self) -> bytes | None:
         """How notebooks show it: a cell per gate, as the program's pictures; of what has values below zero red above, blue below it."""
         if self.coordinates is None or not self.size:
