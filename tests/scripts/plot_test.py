@@ -140,6 +140,17 @@ class PlotTest(unittest.TestCase):
         exr.write(self.folder / "broken.exr", broken)
         self.assert_drawn("black.png", "broken.png")
 
+    def test_dim_gates_are_brighter_and_say_so(self):
+        levels = (1.0, 0.5, 0.09, 0.002, 0.0)
+        self.assertEqual([sheets.brightening(np.full((4, 5), level), 1.0) for level in levels], [1, 1, 10, 100, 1])
+        for channels in ((), (3,)):
+            stack = np.stack([np.full((4, 5, *channels), level) for level in levels])
+            figure = sheets.draw_images("dim", stack, 1.0, reading.Gates(5, [1.0, 2.0, 3.0, 4.0, 5.0], "ns", "radiance"))
+            self.assertEqual([axes.get_title() for axes in figure.axes[:5]], ["1", "2", "3, × 10", "4, × 100", "5"])
+            shown = [np.ravel(axes.images[0].get_array())[0] for axes in figure.axes[:5]]
+            expected = np.array([1, 0.5, 0.9, 0.2, 0])
+            np.testing.assert_allclose(shown, scales.srgb(expected) if channels else expected)
+
     def test_sign_shows_in_the_colour(self):
         for name, value in (("plus", 1.0), ("minus", -1.0)):
             exr.write(self.folder / f"{name}.exr", images(1, component="total", value=value))

@@ -85,28 +85,38 @@ def about_gates(gates, shown):
     return [line for line in (what, left_out) if line]
 
 
+def brightening(image, scale):
+    """1, 10 or 100: by how much an image may be brighter without leaving the scale, where it would else use a tenth of it."""
+    own = scale_of(image) if np.any(np.nan_to_num(image)) else scale
+    return 10 ** int(np.clip(np.floor(np.log10(scale / own)), 0, 2)) if own > 0 and scale > 0 else 1
+
+
 def plot_images(path, *what):
     """See draw_images."""
     save(draw_images(*what), path)
 
 
 def draw_images(title, stack, scale, gates):
-    """A figure of gated images: grey scenes in false colour, RGB scenes in their own, equally exposed."""
+    """A figure of gated images: grey scenes in false colour, RGB scenes in their own, equally exposed. Gates that would be nearly
+    black are brighter by a power of ten, which their labels give."""
     shown = pick_gates(MOST_IMAGES, stack, among=gates.read)
     height, width = stack.shape[1:3]
     columns = len(shown) if len(shown) <= 6 else int(np.ceil(np.sqrt(1.4 * len(shown))))
     sheet = Sheet(-(-len(shown) // columns), columns, width / height, [title, *about_gates(gates, shown)])
     norm = colors.Normalize(0, scale)
+    factors = [brightening(stack[g], scale) for g in shown]
+    bright = stack[shown] * np.reshape(factors, (-1,) + (1,) * (stack.ndim - 1))
     if stack.ndim == 4:
-        picture = srgb(np.nan_to_num(stack[shown] / scale, nan=0, posinf=1, neginf=0))
+        picture = srgb(np.nan_to_num(bright / scale, nan=0, posinf=1, neginf=0))
         picture[~np.isfinite(stack[shown]).all(-1)] = colors.to_rgb(NON_FINITE)
         cmap = colors.ListedColormap(np.repeat(srgb(np.linspace(0, 1, 256))[:, None], 3, axis=1))
     else:
-        picture = np.ma.masked_invalid(stack[shown])
+        picture = np.ma.masked_invalid(bright)
         cmap = matplotlib.colormaps["inferno"].copy()
         cmap.set_bad(NON_FINITE)
     for i, g in enumerate(shown):
-        axes = sheet.cell(*divmod(i, columns), gates.label(g), stack[g])
+        label = gates.label(g) + (f", × {factors[i]}" if factors[i] > 1 else "")
+        axes = sheet.cell(*divmod(i, columns), label, stack[g])
         axes.imshow(picture[i], cmap=cmap, norm=norm, interpolation="nearest")
     extend = "max" if np.nanmax(np.nan_to_num(stack[shown]), initial=0) > scale else "neither"
     sheet.colorbar(ScalarMappable(norm, cmap), gates.quantity, extend)

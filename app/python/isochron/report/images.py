@@ -206,7 +206,8 @@ def derivative_of(run, name, stacks):
             pictures.append(element("figure", element("img", src=scale.uri(values), style=style,
                                                       alt=f"derivative by {name}, {component.replace('_', ' ')}, {label}"),
                                     element("figcaption", label)))
-        rows.append(element("div", element("p", component.replace("_", " "), class_="term"), *pictures, class_="row"))
+        rows.append(element("div", element("p", component.replace("_", " "), class_="term"), *pictures,
+                            class_="row" if len(pictures) > 1 else "row one"))
     words += f"Zero everywhere: {', '.join(z.replace('_', ' ') for z in zero)}." if zero else ""
     return element("article", element("h3", f"By {name}"), *rows, scale.bar(f"d({run.quantity}) / d({name})"),
                    element("p", words, class_="note") if words else None, class_="card wide")
