@@ -229,7 +229,7 @@ def table(csv):
     """The rows in Markdown."""
     lines = ["| | samples per pixel, all frames | CPU | memory | error of a frame's pixels | of a frame's mean |", "|---|---|---|---|---|---|"]
     for row in read_rows(csv):
-        errors = (f"{100 * float(row[name]):.2g} %" for name in ("pixel_error", "mean_error"))
+        errors = (f"{float(f'{100 * float(row[name]):.2g}'):g} %" for name in ("pixel_error", "mean_error"))
         lines.append(f"| {WORDS[row['what']]} | {row['samples']} | {row['cpu_seconds']} s | "
                      f"{row['peak_mib']} MiB | " + " | ".join(errors) + " |")
     return "\n".join(lines)
