@@ -71,8 +71,9 @@ class Coated:
         if not largest > 0:
             return f"{{type: diffuse, albedo: {colour_text(albedo)}{sides}}}"
         roughness, ior = phong_roughness(exponent), index_of(largest)
-        if not albedo.max() > 0:
-            self.report.note(node.place, f"{node}: a rough_conductor of the same width of its lobe, roughness {roughness:.4g}")
+        if albedo.max() <= max(largest - MOST_REFLECTED, 0):  # more of the lobe would be lost under a coat
+            without = f", without its diffuse part of {albedo.max():.4g}" if albedo.max() > 0 else ""
+            self.report.note(node.place, f"{node}: a rough_conductor of the same width of its lobe, roughness {roughness:.4g}{without}")
             return (f"{{type: rough_conductor, roughness: {roughness:.9g}, reflectance: {colour_text(gloss)}{sides}}}")
         self.report.note(node.place, f"{node}: plastic of the same width of its lobe, roughness {roughness:.4g}, whose coat "
                          f"reflects {min(largest, MOST_REFLECTED):.4g} at normal incidence, ior {ior:.4g}")

@@ -18,6 +18,8 @@ class Film:
     width: int
     height: int
     bins: tuple | None = None  # start, width, count
+    pulse: float = 0  # length of a flash of constant power, as path length
+    counted_by: str = ""  # the renderer whose values are ours times the bins' width
 
 
 def film_of(sensor, report):
@@ -37,8 +39,9 @@ def film_of(sensor, report):
         node.fail("sample_border", "sample_border")
     if node.type == "transient_hdr_film":
         film.bins = node.number("start_opl", 0.0), node.number("bin_width_opl", 0.003), node.integer("temporal_bins", 2048)
+        film.counted_by = "mitransient"
     else:
-        film.bins = bins_of_peers(node, report)
+        take_bins_of_peers(node, film)
     if film.bins and not (film.bins[1] > 0 and film.bins[2] > 0):
         node.fail("has no bins")
     if min(film.width, film.height) < 1:
@@ -46,21 +49,23 @@ def film_of(sensor, report):
     return film
 
 
-def bins_of_peers(node, report):
+def take_bins_of_peers(node, film):
     """Bins in the films of MitsubaToF (path lengths) and of dtransient (nanoseconds, a scene unit being a metre)."""
     if node.text("decomposition", "none").lower().startswith("transient"):
-        start, end, width = (node.number(name, 0.0) for name in ("min_bound", "max_bound", "bin_width"))
-        return start, width, round((end - start) / width) if width > 0 else 0
+        film.bins = bins_between(*(node.number(name, 0.0) for name in ("min_bound", "max_bound", "bin_width")))
+        return
     node.ignore("min_bound", "max_bound", "bin_width")
     if node.boolean("transient"):
-        start, end, width = (node.number(name, 0.0) for name in ("path_min", "path_max", "path_sample"))
-        return start, width, round((end - start) / width) if width > 0 else 0
-    if "tresolution" not in node.values:
-        return None
-    width, pulse = node.number("tresolution") * METRES_PER_NS, node.number("tresolution_light", 0.0)
-    if pulse > 0:
-        report.note(node.place, f"{node}: flashes are short here; a pulse of {pulse:g} ns is a `response` of the gates")
-    return node.number("tstart", 0.0) * METRES_PER_NS, width, node.integer("duration", 1)
+        film.bins = bins_between(*(node.number(name, 0.0) for name in ("path_min", "path_max", "path_sample")))
+    elif "tresolution" in node.values:
+        start, width = (METRES_PER_NS * node.number(name, 0.0) for name in ("tstart", "tresolution"))
+        film.bins = start, width, node.integer("duration", 1)
+        film.pulse = METRES_PER_NS * max(node.number("tresolution_light", 0.0), 0)
+        film.counted_by = "dtransient"
+
+
+def bins_between(start, end, width):
+    return start, width, round((end - start) / width) if width > 0 else 0
 
 
 def crop_of(sensor, film, report):
@@ -101,7 +106,7 @@ def slope(sensor, film, report):
 
 def camera(sensor, film, report):
     """Our camera's lines."""
-    if film.bins:
+    if film.counted_by == "mitransient":
         near = sensor.number("near_clip", 0.01)
         report.note(sensor.place, f"{sensor}: paths begin at the pinhole here; mitransient itself counts from the near "
                     f"plane, {near:g} less in the middle of the image")

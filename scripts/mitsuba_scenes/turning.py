@@ -43,7 +43,9 @@ def files_of(document, path, options, report):
         more, shining = {}, lights(scene, report, colours, found.lamps)
         if not shining and not any(shape.emission for shape in found.found):
             report.note(scene.place, f"{scene}: nothing lights it")
-        comments = [f"Times {film.bins[1]:.10g}, the bins' width, these are mitransient's values."] if film.bins else []
+        comments = []
+        if film.counted_by:
+            comments.append(f"Times {film.bins[1]:.10g}, the bins' width, these are {film.counted_by}'s values.")
     report.refuse_rest(sensor)
     report.refuse_rest(sensor.only("film")) if sensor.only("film") else None
     report.refuse_rest(scene)
@@ -134,7 +136,8 @@ def experiment_text(path, title, film, most, comments):
     gates = "{kind: steady}"
     if film.bins:
         start, width, count = film.bins
-        gates = f"{{kind: bins, start: {start:.10g}, width: {width:.10g}, count: {count}}}"
+        pulse = f", response: {{offsets: [0, {film.pulse:.10g}], values: [1, 1]}}" if film.pulse else ""
+        gates = f"{{kind: bins, start: {start:.10g}, width: {width:.10g}, count: {count}{pulse}}}"
     lines = [f"# Made {title}. Nothing is unknown yet: add `parameters`, see experiments/README.md."]
     lines += [f"# {comment}" for comment in comments]
     lines += [f"name: {name}", "scene: scene.yaml", f"max_bounces: {most}", f"gates: {gates}"]

@@ -128,8 +128,9 @@ class DocumentTest(FieldTest):
         self.assertEqual(found, {"kind": "bins", "start": 1, "width": 0.25, "count": 4})
         found = gates(value("integer", "duration", 100) + value("float", "tresolution", 20) + value("float", "tstart", 1000)
                       + value("float", "tresolution_light", 20))
-        self.assertEqual(found, {"kind": "bins", "start": 299.792458, "width": 5.99584916, "count": 100})
-        self.assertIn("a pulse of 20 ns is a `response` of the gates", self.said)
+        pulse = {"offsets": [0, 5.99584916], "values": [1, 1]}
+        self.assertEqual(found, {"kind": "bins", "start": 299.792458, "width": 5.99584916, "count": 100, "response": pulse})
+        self.assertNotIn("near", self.said)  # these count from the pinhole
         self.assertEqual(gates(""), {"kind": "steady"})
 
 
@@ -201,6 +202,13 @@ class MaterialsTest(FieldTest):
             self.assertAlmostEqual(((found["ior"] - 1) / (found["ior"] + 1))**2, 0.2, 6)
         self.assertIn("plastic of the same width of its lobe", self.said)
         self.assertEqual(self.material(phong("0, 0, 0", 30), version="0.6.0")["type"], "rough_conductor")
+        # A coat reflects a half at most: beyond that whichever loses less.
+        for diffuse, kind in ((0.1, "rough_conductor"), (0.4, "plastic")):
+            strong = phong(f"{diffuse}, {diffuse}, {diffuse}", 30).replace("0.1, 0.2, 0.05", "0.3, 0.8, 0.4")
+            found = self.material(strong, version="0.6.0")
+            self.assertEqual(found["type"], kind)
+            self.assertEqual("without its diffuse part of 0.1" in self.said, kind == "rough_conductor")
+        self.assertEqual(found["reflectance"], [0.375, 1, 0.5])
 
     def test_principled(self):
         def material(**values):
