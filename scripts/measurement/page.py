@@ -33,6 +33,13 @@ def versions(records):
     return text
 
 
+def _filled(table, folder):
+    try:
+        return table(folder)
+    except FileNotFoundError as missing:
+        return f"Not measured: there is no `{pathlib.Path(missing.filename).name}`."
+
+
 def write():
     """Both pages, from what experiments/measured and experiments/figures hold."""
     experiments = ROOT / "experiments"
@@ -40,7 +47,7 @@ def write():
     for name, table in TABLES.items():
         mark = "{{" + name + "}}"
         if mark in text:
-            text = text.replace(mark, table(experiments / "measured"))
+            text = text.replace(mark, _filled(table, experiments / "measured"))
     text = text.replace("{{versions}}", versions(record.load()))
     if "{{" in text:
         raise ValueError(f"{TEMPLATE.name}: no table {text.partition('{{')[2].partition('}}')[0]}")

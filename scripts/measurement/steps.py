@@ -61,7 +61,9 @@ STEPS = {
 
 def egg(folder):
     """The public scene of "Differentiable Transient Rendering" (Yi et al. 2021), which is not part of this repository."""
-    return {"egg": Step((_script("egg.py", os.fspath(pathlib.Path(folder).resolve()), _csv("egg")),))}
+    scene = os.fspath(pathlib.Path(folder).resolve() / "scene.xml")
+    picture = "experiments/figures/egg.png"
+    return {"egg": Step((_script("public_scene.py", "measure", scene, "emitter_right,shape_2", "0,1,0", _csv("egg"), picture),))}
 
 
 def path(word):

@@ -10,6 +10,7 @@ import numpy as np
 import capture_cost
 import cube_cost
 import error_coverage
+import public_scene
 from reproduction.tables import read_rows
 
 from .steps import CHARTED
@@ -254,6 +255,10 @@ def stated_errors(folder):
     return printed(error_coverage.table, folder / "error_coverage.csv")
 
 
+def egg(folder):
+    return printed(public_scene.table, folder / "egg.csv")
+
+
 def checks(folder):
     columns = ("rows", "largest_z", "rms_z", "beyond_limit", "clearest")
     rows = read_rows(folder / "checks.csv")
@@ -263,7 +268,7 @@ def checks(folder):
 
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, cubes, hidden_share, captures, stated_errors, checks)},
+                               growth_of_cost, cubes, hidden_share, captures, stated_errors, egg, checks)},
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability corridor": lambda folder: stability(folder, "corridor"),
 }
