@@ -16,7 +16,9 @@ import numpy as np
 import plot_rabbit_study
 import rabbit_errors
 import rabbit_study
+import shape_bound
 import shape_study
+import yaml
 from isochron.captures import Capture
 from isochron.mesh_files import read_mesh
 from reproduction.measure import Failure
@@ -159,6 +161,51 @@ class ShapesTest(unittest.TestCase):
         rows = [dict(zip(shape_study.COLUMNS, ("plates", method, *numbers, verdict, ""))) for method, numbers, verdict in
                 (("back_projection", ("0.9", "2.2", "0.7", "4"), ""), ("fit", ("0.4", "1", "0.9", "213"), "explained"))]
         self.assertIn("| plates | 0.4 / 0.9 | 1 / 2.2 | 0.9 / 0.7 | 213 / 4 | explained |", shape_study.table_of(rows))
+
+
+class BoundTest(unittest.TestCase):
+    def test_quantiles_are_those_of_normal_numbers(self):
+        one = shape_bound.quantiles(np.full(10, 2.0))
+        self.assertAlmostEqual(one["median_mm"], 2 * 0.67449, places=4)
+        self.assertAlmostEqual(one["within_80_mm"], 2 * 1.28155, places=4)
+        numbers = np.abs(np.random.default_rng(1).normal(0, np.tile([0.5, 3.0], 200_000)))
+        mixed = shape_bound.quantiles(np.array([0.5, 3.0]))
+        self.assertAlmostEqual(mixed["median_mm"], np.quantile(numbers, 0.5), delta=0.02)
+        self.assertAlmostEqual(mixed["within_80_mm"], np.quantile(numbers, 0.8), delta=0.02)
+
+    def test_normals_of_a_bent_sheet(self):
+        found = shape_bound.normals(np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 1.0]]), np.array([[0, 1, 2], [1, 3, 2]]))
+        np.testing.assert_allclose(found[0], [0, 0, 1])
+        np.testing.assert_allclose(found[3], np.array([-1, -1, 1]) / np.sqrt(3))
+
+    def test_the_fit_begins_at_the_truth_with_the_last_smoothing(self):
+        """On a folder as reconstructions leave it."""
+        truth = np.array([[0, 0, 0.4], [0.1, 0, 0.4], [0, 0.1, 0.4]]), np.array([[0, 2, 1]])
+        with tempfile.TemporaryDirectory() as name:
+            run, folder = pathlib.Path(name) / "run", pathlib.Path(name) / "bound"
+            folder.mkdir()
+            for level in ("2", "10"):
+                (run / "levels" / level).mkdir(parents=True)
+            surface = {"name": "surface", "type": "vertices", "shape": "surface", "smoothing": {"bending": 1, "evidence": True}}
+            settings = {"scene": "scene.yaml", "target": {"capture": "capture.h5"}, "gates": {"response": "response.csv"},
+                        "parameters": [surface | {"remesh": {"levels": 3}}, {"name": "albedo", "type": "albedo", "initial": 1}]}
+            last = {"parameters": [surface | {"smoothing": {"bending": 7.5, "evidence": True}}, {"type": "albedo", "initial": [1, 2, 9]}]}
+            for file, content in (("experiment.yaml", settings), ("levels/10/experiment.yaml", last), ("levels/2/experiment.yaml", {}),
+                                  ("summary.yaml", {"levels": [{"edge_length": 0.03}, {"edge_length": 0.01}]}),
+                                  ("scene.yaml", {"capture": {"file": "capture.h5"}, "shapes": [{"name": "surface", "file": "s.obj"}]})):
+                (run / file).write_text(yaml.safe_dump(content), encoding="utf-8")
+            with unittest.mock.patch.object(shape_bound, "program") as program:
+                self.assertEqual(shape_bound.begun_at(truth, run, folder), folder / "fit")
+            self.assertEqual(program.call_args.args[:2], ("run", folder / "experiment.yaml"))
+            made = yaml.safe_load((folder / "experiment.yaml").read_text(encoding="utf-8"))
+            first, albedo = made["parameters"]
+            self.assertEqual(first["remesh"], {"levels": 1, "edge_length": 0.01})
+            self.assertEqual(first["smoothing"], {"bending": 7.5})
+            self.assertEqual(albedo["initial"], 2)
+            self.assertEqual(made["gates"]["response"], str(run / "response.csv"))
+            self.assertEqual(made["target"]["capture"], str(run / "capture.h5"))
+            scene = yaml.safe_load((folder / "scene.yaml").read_text(encoding="utf-8"))
+            np.testing.assert_allclose(read_mesh(folder / scene["shapes"][0]["file"])[0], truth[0])
 
 
 if __name__ == "__main__":
