@@ -9,11 +9,12 @@ from .measure import load
 HEADER = f"""\
 # Reconstructions
 
-Written by `scripts/reproduce`, which repeats the runs below and draws the pictures. The paper's figures are of scenes that
-it describes in words alone; ours are built after them (`scripts/scenes`). Its times are those of its Table 2 and captions,
-on {PAPER_CORES} vCPU; ours were measured on two cores, and core-seconds are CPU time. Errors are the distance of the parameters
-to their targets at the end, in % of that at the start, a run per seed; times are medians over the seeds. Other
-programs may have run on the machine at the time: seconds include what they took, core-seconds do not.
+Written by `scripts/reproduce`, which repeats the runs below and draws the pictures. The paper only describes its scenes in words; ours are
+built after them (`scripts/scenes`). Its times are those of its Table 2 and captions, on {PAPER_CORES} vCPU; ours were measured on two
+cores, and core-seconds are CPU time. `ratio` compares processors, scenes, resolutions and numbers of samples that are not the same: read
+it as an order of magnitude. [Speed against accuracy](MEASURED.md#speed-against-accuracy) compares methods on one machine. Errors are the
+distance of the parameters to their targets at the end, in % of that at the start, a run per seed; times are medians over the seeds.
+`limit` is the time that we allow a run on two idle cores.
 """
 
 TABLE = """
@@ -35,7 +36,7 @@ def _row(name, entry, runs):
     errors = ", ".join(f"{r.error_percent:.2g}{end}" for r, end in ends.items())
     cells = [f"`{name}`", entry.figure, runs[0].unknowns, f"{runs[0].iterations}, {entry.paper_iterations}",
              f"{middle('iteration_seconds'):.2g}, {entry.paper_seconds:.3g}", f"{cores:.2g}, {paper:.3g}",
-             f"1/{paper / cores:.0f}", errors, f"{middle('seconds'):.0f}", f"{entry.most_seconds:.0f}" if entry.most_seconds else "",
+             f"1/{float(f'{paper / cores:.1g}'):.0f}", errors, f"{middle('seconds'):.0f}", f"{entry.most_seconds:.0f}" if entry.most_seconds else "",
              f"{middle('cpu_seconds'):.0f}", f"{max(r.peak_mib for r in runs):.0f}"]
     return "| " + " | ".join(map(str, cells)) + " |\n"
 
@@ -49,12 +50,11 @@ def _notes(runs):
         notes.append(
             f"`corridor_fd`: the images of a difference are independent. {failed} of {len(runs['corridor_fd'])} seeds end above 25 %, at "
             f"{cost:.2g} times the time per iteration of `corridor`. Two unknowns are fair to finite differences; every further one "
-            "would add two images to an iteration, where our gradient costs the same for any number. The step decides: see "
+            "would add two images to an iteration, where the cost of our gradient does not grow with their number. The step decides: see "
             "`experiments/corridor_fd.yaml`.")
     if runs["cube_standard"]:
         failed = sum(r.error_percent > 25 for r in runs["cube_standard"])
-        notes.append(f"`cube_standard` can fail by noise alone, so by chance: {failed} of {len(runs['cube_standard'])} seeds end above "
-                     "25 %.")
+        notes.append(f"`cube_standard` fails by noise: {failed} of {len(runs['cube_standard'])} seeds end above 25 %.")
     return "".join(f"\n{note}\n" for note in notes)
 
 
@@ -62,7 +62,7 @@ def write(experiments):
     """From what experiments/measured/reconstructions and experiments/figures hold."""
     runs = {name: load(experiments / f"measured/reconstructions/{name}.csv") for name in RECONSTRUCTIONS}
     text = HEADER
-    for title, counterparts in (("", False), ("\n## Counterparts\n\nOne setting is changed, and they should fail.\n", True)):
+    for title, counterparts in (("", False), ("\n## Counterparts\n\nOne setting is changed, and they should end far from the target.\n", True)):
         rows = [_row(n, e, runs[n]) for n, e in RECONSTRUCTIONS.items() if runs[n] and bool(e.counterpart_of) == counterparts]
         text += title + TABLE + "".join(rows) if rows else ""
     text += _notes(runs)
