@@ -2,8 +2,9 @@
 """The pages of measurements: every table from the shipped files, and steps that are done again only where the program has changed."""
 
 import csv
-import io
 import contextlib
+import io
+import os
 import pathlib
 import re
 import sys
@@ -67,6 +68,14 @@ class Page(unittest.TestCase):
         self.assertIn("| `cubes` | `def` | 2020-01-02 | 1.5 | 2 x chip |", page.versions(other))
         del other["speed"]
         self.assertIn("Of older versions: `speed`.", page.versions(other))
+
+
+class Steps(unittest.TestCase):
+    def test_name_scripts_that_can_be_run(self):
+        for step in steps.STEPS.values():
+            for command, *_ in step.commands:
+                if command.startswith("scripts/"):
+                    self.assertTrue(os.access(ROOT / command, os.X_OK), command)
 
 
 class Resume(unittest.TestCase):
