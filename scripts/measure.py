@@ -42,6 +42,8 @@ def chosen(options, version):
 
 def measure(step):
     """Whether all its commands ended well."""
+    for file in step.removed:
+        path(file).unlink(missing_ok=True)
     for command in step.commands:
         words = [str(path(command[0])), *command[1:]]
         if subprocess.run(words, cwd=ROOT, env=os.environ | dict(step.environment), check=False).returncode != 0:

@@ -17,6 +17,7 @@ BY_CHANCE = ("cube", "cube_standard")  # runs that noise alone can lead away, so
 class Step:
     commands: tuple  # words each; from the top of the repository
     environment: tuple = ()  # pairs
+    removed: tuple = ()  # files that would keep older rows
 
 
 def _built(name, *arguments):
@@ -32,11 +33,12 @@ def _csv(name):
 
 
 def _reproduce(name):
-    return Step((_script("reproduce", name, "--seeds", *map(str, range(1, 6 if name in BY_CHANCE else 3))),))
+    seeds = map(str, range(1, 6 if name in BY_CHANCE else 3))
+    return Step((_script("reproduce", name, "--seeds", *seeds),), removed=(_csv(f"reconstructions/{name}"),))
 
 
 def _chart(name):
-    return Step((_script("charts", name),), (("SECONDS_EACH", "30"),))
+    return Step((_script("charts", name),), (("SECONDS_EACH", "24"),))
 
 
 STEPS = {
@@ -46,16 +48,16 @@ STEPS = {
     **{f"figure{n}": Step((_script("figure", n),)) for n in ("1", "8", "9")},
     **{f"reconstructions/{name}": _reproduce(name) for name in RECONSTRUCTIONS},
     **{f"charts/{name}": _chart(name) for name in (*CHARTED, "solvers", "stability")},
-    "gate_width": Step((_built("gate_width", "cost", _csv("gate_width"), "8"),
+    "gate_width": Step((_built("gate_width", "cost", _csv("gate_width"), "6"),
                         _script("plot_gate_width.py", _csv("gate_width"), "experiments/figures/gate_width.png"),
-                        _built("gate_width", "growth", _csv("width_growth"), "24"),
+                        _built("gate_width", "growth", _csv("width_growth"), "16"),
                         _script("plot_gate_width.py", _csv("width_growth"), "experiments/figures/width_growth.png"))),
-    "boundary": Step((_built("boundary", _csv("boundary"), "24"),)),
-    "contact": Step((_built("contact", _csv("contact"), "1"),)),
-    "hidden_share": Step((_built("hidden_share", _csv("hidden_share"), "8"),)),
+    "boundary": Step((_built("boundary", _csv("boundary"), "12"),)),
+    "hidden_share": Step((_built("hidden_share", _csv("hidden_share"), "4"),)),
     "capture_cost": Step((_script("capture_cost.py", "measure", _csv("capture_cost")),)),
     "stated_errors": Step((_script("error_coverage.py", "measure", _csv("error_coverage")),)),
     "checks": Step((_script("check_experiments.py", _csv("checks")),)),
+    "contact": Step((_built("contact", _csv("contact"), "1"),)),
 }
 
 
@@ -66,6 +68,6 @@ def egg(folder):
     return {"egg": Step((_script("public_scene.py", "measure", scene, "emitter_right,shape_2", "0,1,0", _csv("egg"), picture),))}
 
 
-def path(word):
-    """Of a command's first word."""
-    return ROOT / word
+def path(name):
+    """Of a command's first word or a file."""
+    return ROOT / name

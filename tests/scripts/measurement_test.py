@@ -87,7 +87,7 @@ class Resume(unittest.TestCase):
             done.append(words[-1])
             return types.SimpleNamespace(returncode=1 if words[-1] in fail else 0)
 
-        known = {name: steps.Step((("scripts/x", name),)) for name in ("a/1", "a/2", "b")}
+        known = {name: steps.Step((("scripts/x", name),), removed=(self.old,)) for name in ("a/1", "a/2", "b")}
         with unittest.mock.patch.multiple(measure, STEPS=known, subprocess=types.SimpleNamespace(run=run)), \
              unittest.mock.patch.object(page, "write"), contextlib.redirect_stdout(io.StringIO()), \
              contextlib.redirect_stderr(io.StringIO()):
@@ -98,7 +98,10 @@ class Resume(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder, \
              unittest.mock.patch.object(record, "FILE", pathlib.Path(folder) / "versions.csv"), \
              unittest.mock.patch.object(record, "version", lambda: "one"):
+            self.old = pathlib.Path(folder) / "older_rows.csv"
+            self.old.touch()
             self.assertEqual(self.run_all(["--all"], fail=["a/2"]), (["a/1", "a/2", "b"], 1))
+            self.assertFalse(self.old.exists())
             self.assertEqual(self.run_all(["--all"]), (["a/2"], 0))
             self.assertEqual(self.run_all(["--all"]), ([], 0))
             self.assertEqual(self.run_all(["a/*"]), (["a/1", "a/2"], 0), "named steps are measured again")
