@@ -125,12 +125,15 @@ def _race(rows):
 
 
 def solvers(folder):
-    methods, lines = ("adam", "lbfgs", "levenberg_marquardt"), []
-    for name in ("cube", "corridor", "height_field"):
-        rows = read_rows(folder / f"chart_solvers_{name}.csv")
+    races = {name: read_rows(folder / f"chart_solvers_{name}.csv") for name in ("cube", "corridor", "height_field")}
+    methods, lines = list(dict.fromkeys(r["method"] for rows in races.values() for r in rows)), []
+    for name, rows in races.items():
         cells = []
         for method in methods:
             own = [r for r in rows if r["method"] == method]
+            if not own:
+                cells.append("")
+                continue
             runs = [_race([r for r in own if r["seed"] == seed]) for seed in dict.fromkeys(r["seed"] for r in own)]
             arrived = [seconds for seconds, _ in runs if seconds is not None]
             ends = sorted(100 * error for _, error in runs)
