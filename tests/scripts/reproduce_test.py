@@ -49,7 +49,7 @@ class ReproduceTest(unittest.TestCase):
         self.assertTrue((self.folder / "figures/branches.png").read_bytes().startswith(b"\x89PNG"))
         page = (self.folder / "RESULTS.md").read_text()
         self.assertIn("| `branches` | 12 | 1 | 3, 100 |", page)
-        self.assertIn("| `tree` | 17 | 1 | 200, 200 | 0.2, 15.5 | 0.25, 744 | 1/2976 | 0.25 | 40 | 180 | 50 | 60 |", page)
+        self.assertIn("| `tree` | 17 | 1 | 200, 200 | 0.2, 15.5 | 0.25, 744 | 1/3000 | 0.25 | 40 | 180 | 50 | 60 |", page)
         self.assertIn("](figures/branches.png)", page)
 
     def test_stages_are_one_run(self):
