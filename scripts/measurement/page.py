@@ -9,28 +9,29 @@ from reproduction.measure import ROOT
 
 from . import record
 from .steps import STEPS
-from .tables import TABLES, markdown
+from .tables import TABLES
 
 TEMPLATE = pathlib.Path(__file__).with_name("MEASURED.md.in")
 
 
-def versions(records):
-    """One sentence where all steps are of one version and machine, else a table."""
-    entries = list(records.values())
-    missing = [name for name in STEPS if name not in records]
+def _of_one_version(entries):
+    dates = sorted({entry.date for entry in entries})
     minutes = sum(float(entry.minutes) for entry in entries)
-    text = ""
-    if len({(entry.version, entry.processor) for entry in entries}) == 1 and not missing:
-        first = entries[0]
-        dates = sorted({entry.date for entry in entries})
-        text = (f"All of version `{first.version}`, {' to '.join(dict.fromkeys((dates[0], dates[-1])))}, on {first.processor}, "
-                f"in {minutes:.0f} minutes.")
-    else:
-        rows = [[f"`{e.step}`", f"`{e.version}`", e.date, e.minutes, e.processor] for e in entries]
-        text = markdown(["step", "version", "date", "minutes", "processor"], rows)
-        if missing:
-            text += "\n\nOf older versions: " + ", ".join(f"`{name}`" for name in missing) + "."
-    return text
+    return (f"version `{entries[0].version}`, {' to '.join(dict.fromkeys((dates[0], dates[-1])))}, on {entries[0].processor}, "
+            f"in {minutes:.0f} minutes")
+
+
+def versions(records):
+    """One sentence where all steps are of one version and machine, else one of each."""
+    groups = {}
+    for entry in records.values():
+        groups.setdefault((entry.version, entry.processor), []).append(entry)
+    missing = [name for name in STEPS if name not in records]
+    if len(groups) == 1 and not missing:
+        return f"All of {_of_one_version(*groups.values())}."
+    names = lambda steps: ", ".join(f"`{name}`" for name in steps)
+    lines = [f"- Of {_of_one_version(entries)}: {names(entry.step for entry in entries)}." for entries in groups.values()]
+    return "\n".join([*lines, *([f"- Of older versions: {names(missing)}."] if missing else [])])
 
 
 def _filled(table, folder):

@@ -65,9 +65,9 @@ class Page(unittest.TestCase):
         same = {name: entry(name, "abc") for name in steps.STEPS}
         self.assertEqual(page.versions(same), f"All of version `abc`, 2020-01-02, on 2 x chip, in {1.5 * len(same):.0f} minutes.")
         other = same | {"cubes": entry("cubes", "def")}
-        self.assertIn("| `cubes` | `def` | 2020-01-02 | 1.5 | 2 x chip |", page.versions(other))
+        self.assertIn("- Of version `def`, 2020-01-02, on 2 x chip, in 2 minutes: `cubes`.", page.versions(other))
         del other["speed"]
-        self.assertIn("Of older versions: `speed`.", page.versions(other))
+        self.assertIn("- Of older versions: `speed`.", page.versions(other))
 
 
 class Steps(unittest.TestCase):
