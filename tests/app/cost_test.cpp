@@ -20,7 +20,7 @@ struct Usage {
 class Cost : public Program {
  protected:
   Cost() {
-    folder_.write("scene.yaml", replaced(folder_.read("scene.yaml"), "[8, 8]", "[64, 64]"));
+    folder_.write("scene.yaml", replaced(folder_.read("scene.yaml"), "[8, 8]", "[128, 128]"));
     for (const int bins : {10, 1000})
       folder_.write("bins" + std::to_string(bins) + ".yaml",
                     replaced(replaced(replaced(tiny_experiment(), "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}",
@@ -51,7 +51,7 @@ class Cost : public Program {
   }
 };
 
-constexpr double kImage = 4.0 * 64 * 64 * 1000;  ///< in single precision
+constexpr double kImage = 4.0 * 128 * 128 * 1000;  ///< in single precision
 
 TEST_F(Cost, RenderOfAThousandBins) {
   const Usage few = measure("render", 10), many = measure("render", 1000);
