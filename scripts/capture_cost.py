@@ -16,7 +16,7 @@ import tempfile
 import numpy as np
 
 from reproduction.measure import PROGRAM, ROOT
-from reproduction.tables import read_rows, run_action, write_rows
+from reproduction.tables import markdown, read_rows, run_action, write_rows
 
 POINTS = (16, 32, 64)  # along each side
 BINS = (128, 256, 512, 1024)
@@ -84,17 +84,17 @@ def measure(file):
             write_rows(file, COLUMNS, rows)
 
 
-def table(file):
-    rows = read_rows(file)
-
+def table_of(rows):
     def entry(points, bins):
         own = [row for row in rows if (int(row["points"]), int(row["bins"])) == (points, bins)]
         return f"{statistics.median(float(row['cpu_seconds']) for row in own):.2g}"
 
-    print("| points | " + " | ".join(f"{bins} bins" for bins in BINS) + " |")
-    print("|---" * (1 + len(BINS)) + "|")
-    for points in POINTS:
-        print(f"| {points} x {points} | " + " | ".join(entry(points, bins) for bins in BINS) + " |")
+    return markdown(["points", *(f"{bins} bins" for bins in BINS)],
+                    [[f"{points} x {points}", *(entry(points, bins) for bins in BINS)] for points in POINTS])
+
+
+def table(file):
+    print(table_of(read_rows(file)))
 
 
 if __name__ == "__main__":

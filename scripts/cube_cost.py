@@ -8,12 +8,11 @@
 
 import pathlib
 import re
-import subprocess
 import sys
 import tempfile
 
-from reproduction.measure import PROGRAM, ROOT
-from reproduction.tables import read_rows, run_action, write_rows
+from reproduction.measure import ROOT, program
+from reproduction.tables import markdown, read_rows, run_action, write_rows
 
 BINS = (10, 1000)
 FROM, TO = 4, 10  # path lengths
@@ -44,17 +43,10 @@ def write_scene(folder, colour):
     return path
 
 
-def usage(command, experiment, folder, *options):
-    """CPU seconds of the program and its pictures, and the most memory that one process had, in bytes."""
-    time = ["/usr/bin/env", "time", "-f", "%U %S %M"]
-    arguments = [str(PROGRAM), command, str(experiment), "-o", str(folder / "out"), "--quiet", "--threads", "1", *options]
-    least = None
-    for _ in range(RUNS):
-        result = subprocess.run(time + arguments, capture_output=True, text=True, check=True)
-        user, system, kilobytes = map(float, result.stderr.strip().splitlines()[-1].split())
-        if least is None or user + system < least[0]:
-            least = (user + system, 1024 * kilobytes)
-    return least
+def usage(command, experiment, folder, pictures):
+    """Of the run that takes the fewest CPU seconds, those of its pictures with them."""
+    runs = (program(command, experiment, "-o", folder / "out", "--threads", 1, pictures=pictures) for _ in range(RUNS))
+    return min(runs, key=lambda run: run.cpu_seconds)
 
 
 def measure(file):
@@ -69,21 +61,21 @@ def measure(file):
                 experiments[count].write_text(
                     EXPERIMENT.format(scene=scene, start=FROM, width=(TO - FROM) / count, count=count))
             for command in ("render", "derive"):
-                for pictures in ("yes", "no"):
-                    options = [] if pictures == "yes" else ["--no-plots"]
-                    (few, _), (many, memory) = (usage(command, experiments[count], folder, *options) for count in BINS)
-                    rows.append((command, 3 if colour else 1, pictures, f"{few:.3f}", f"{many:.3f}", f"{memory:.0f}"))
+                for pictures in (True, False):
+                    few, many = (usage(command, experiments[count], folder, pictures) for count in BINS)
+                    rows.append((command, 3 if colour else 1, "yes" if pictures else "no", f"{few.cpu_seconds:.3f}",
+                                 f"{many.cpu_seconds:.3f}", f"{2**20 * many.peak_mib:.0f}"))
                     write_rows(file, COLUMNS, rows)
 
 
 def table_of(rows):
-    lines = ["| | pictures | 10 bins | 1000 bins | ratio | memory | of the result |", "|---|---|---|---|---|---|---|"]
-    for row in rows:
+    def cells(row):
         few, many, memory = (float(row[key]) for key in ("seconds_10_bins", "seconds_1000_bins", "peak_bytes"))
         result = 4 * 256 * 256 * BINS[1] * int(row["channels"])
-        lines.append(f"| `{row['command']}`, {'colour' if row['channels'] == '3' else 'grey'} | {row['pictures']} | {few:.2f} s "
-                     f"| {many:.2f} s | {many / few:.2f} | {memory / 1e6:.0f} MB | {memory / result:.2f} |")
-    return "\n".join(lines)
+        return (f"`{row['command']}`, {'colour' if row['channels'] == '3' else 'grey'}", row["pictures"], f"{few:.2f} s",
+                f"{many:.2f} s", f"{many / few:.2f}", f"{memory / 1e6:.0f} MB", f"{memory / result:.2f}")
+
+    return markdown(["", "pictures", "10 bins", "1000 bins", "ratio", "memory", "of the result"], map(cells, rows))
 
 
 def table(file):

@@ -20,7 +20,7 @@ import yaml
 from scipy.stats import kstest
 
 from reproduction.measure import program
-from reproduction.tables import read_rows, run_action, write_rows
+from reproduction.tables import markdown, read_rows, run_action, write_rows
 from scenes import letter, mesh
 import use_package
 from isochron import exr
@@ -154,21 +154,26 @@ def p_values(rows, case):
     return [float(p) for p in {r["draw"]: r["p_value"] for r in rows if r["case"] == case}.values()]
 
 
-def table(file):
-    rows = read_rows(file)
-    print("| capture | quantity | draws | stated error | rms of error / stated | covered by 95 % |\n|---|---|---|---|---|---|")
+def tables_of(rows):
+    quantities_of, fits = [], []
     for case, name in dict.fromkeys((r["case"], r["quantity"]) for r in rows):
         own = [r for r in rows if (r["case"], r["quantity"]) == (case, name)]
         z = np.array([float(r["z"]) for r in own])
         error = np.median([float(r["standard_error"]) for r in own])
-        print(f"| {case} | {name} | {len(own)} | {error:.2g} | {np.sqrt(np.mean(z**2)):.2f} | "
-              f"{100 * np.mean(np.abs(z) < NORMAL):.0f} % |")
-    print("\n| capture | draws | mean p | below 0.05 | distance from uniform | probability |\n|---|---|---|---|---|---|")
+        quantities_of.append((case, name, len(own), f"{error:.2g}", f"{np.sqrt(np.mean(z**2)):.2f}",
+                              f"{100 * np.mean(np.abs(z) < NORMAL):.0f} %"))
     for case in dict.fromkeys(r["case"] for r in rows):
         p = p_values(rows, case)
         test = kstest(p, "uniform")
-        print(f"| {case} | {len(p)} | {np.mean(p):.2f} | {100 * np.mean(np.less(p, 0.05)):.0f} % | {test.statistic:.2f} | "
-              f"{test.pvalue:.2f} |")
+        fits.append((case, len(p), f"{np.mean(p):.2f}", f"{100 * np.mean(np.less(p, 0.05)):.0f} %", f"{test.statistic:.2f}",
+                     f"{test.pvalue:.2f}"))
+    return "\n\n".join((
+        markdown(["capture", "quantity", "draws", "stated error", "rms of error / stated", "covered by 95 %"], quantities_of),
+        markdown(["capture", "draws", "mean p", "below 0.05", "distance from uniform", "probability"], fits)))
+
+
+def table(file):
+    print(tables_of(read_rows(file)))
 
 
 if __name__ == "__main__":

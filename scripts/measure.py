@@ -12,7 +12,7 @@ import sys
 import time
 
 from measurement import page, record
-from measurement.steps import STEPS, egg, path
+from measurement.steps import STEPS, egg
 from reproduction.measure import ROOT
 
 
@@ -43,9 +43,9 @@ def chosen(options, version):
 def measure(step):
     """Whether all its commands ended well."""
     for file in step.removed:
-        path(file).unlink(missing_ok=True)
+        (ROOT / file).unlink(missing_ok=True)
     for command in step.commands:
-        words = [str(path(command[0])), *command[1:]]
+        words = [str(ROOT / command[0]), *command[1:]]
         if subprocess.run(words, cwd=ROOT, env=os.environ | dict(step.environment), check=False).returncode != 0:
             print(f"scripts/measure: failed: {' '.join(command)}", file=sys.stderr)
             return False

@@ -9,7 +9,6 @@ One unknown moves some of its shapes together.
 
 import pathlib
 import re
-import subprocess
 import sys
 import tempfile
 
@@ -25,9 +24,9 @@ import import_scene
 from isochron import exr
 from isochron.pictures import sheets
 from isochron.pictures.scales import PERCENTILE, scale_of, srgb
-from reproduction.measure import PROGRAM, Failure, Usage
+from reproduction.measure import Failure, program
 from reproduction.tables import Usage as WrongUsage
-from reproduction.tables import read_rows, run_action, write_rows
+from reproduction.tables import markdown, read_rows, run_action, write_rows
 
 SAMPLES = {"image": (16, 512), "derivative": (16, 64)}  # per pixel, for all frames together; the last make the reference
 SEEDS = 4  # images that noise is estimated from
@@ -46,17 +45,6 @@ def numbers(text):
     if len(found) != 3:
         raise WrongUsage
     return found
-
-
-def program(*arguments):
-    """What the program took. By way of `time`: a process of this one would begin with this one's memory as its peak."""
-    words = ["/usr/bin/env", "time", "-f", "%e %U %S %M", str(PROGRAM), *map(str, arguments), "--quiet", "--no-plots"]
-    result = subprocess.run(words, stderr=subprocess.PIPE, text=True)
-    *complaint, last = result.stderr.strip().splitlines()
-    if result.returncode != 0:
-        raise Failure(complaint[0] if complaint else last)
-    wall, user, system, kibibytes = map(float, last.split())
-    return Usage(wall, user + system, kibibytes / 1024)
 
 
 def imported(scene, shapes, along, folder):
@@ -225,21 +213,16 @@ def draw(images, slopes, gates, file):
     sheets.save(figure, pathlib.Path(file))
 
 
+def table_of(rows):
+    errors = lambda row: (f"{float(f'{100 * float(row[name]):.2g}'):g} %" for name in ("pixel_error", "mean_error"))
+    return markdown(["", "samples per pixel, all frames", "CPU", "memory", "error of a frame's pixels", "of a frame's mean"],
+                    [[WORDS[row["what"]], row["samples"], f"{row['cpu_seconds']} s", f"{row['peak_mib']} MiB", *errors(row)]
+                     for row in rows])
+
+
 def table(csv):
-    """The rows in Markdown."""
-    lines = ["| | samples per pixel, all frames | CPU | memory | error of a frame's pixels | of a frame's mean |", "|---|---|---|---|---|---|"]
-    for row in read_rows(csv):
-        errors = (f"{float(f'{100 * float(row[name]):.2g}'):g} %" for name in ("pixel_error", "mean_error"))
-        lines.append(f"| {WORDS[row['what']]} | {row['samples']} | {row['cpu_seconds']} s | "
-                     f"{row['peak_mib']} MiB | " + " | ".join(errors) + " |")
-    return "\n".join(lines)
+    print(table_of(read_rows(csv)))
 
-
-def print_table(csv):
-    print(table(csv))
-
-
-print_table.__name__ = "table"
 
 if __name__ == "__main__":
-    sys.exit(run_action(__doc__, sys.argv[1:], measure, print_table))
+    sys.exit(run_action(__doc__, sys.argv[1:], measure, table))

@@ -26,7 +26,7 @@ import rabbit_errors
 from isochron.mesh_files import read_mesh
 from isochron.pictures.raster import Seen
 from reproduction.measure import ROOT, program, summary
-from reproduction.tables import read_rows, write_rows
+from reproduction.tables import markdown, read_rows, write_rows
 from scenes import mesh
 from scenes.implicit import Blobs, polygonise
 
@@ -154,12 +154,12 @@ def rows(name, shape, options, folder):
 def table_of(rows):
     """For experiments/README.md: reconstruction / back-projection in each cell."""
     by = {(row["shape"], row["method"]): row for row in rows}
-    lines = ["| shape | median, mm | 80 %, mm | silhouette | seconds | verdict |", "|---|---|---|---|---|---|"]
-    for shape in dict.fromkeys(row["shape"] for row in rows):
+    lines = []
+    for shape in dict.fromkeys(shape for shape, _ in by):
         fit, other = by[shape, "fit"], by[shape, "back_projection"]
         cells = [f"{fit[key]} / {other[key]}" for key in ("median_mm", "within_80_mm", "silhouette", "seconds")]
-        lines.append(" | ".join(["| " + shape.replace("_", " "), *cells, fit["verdict"]]) + " |")
-    return "\n".join(lines)
+        lines.append([shape.replace("_", " "), *cells, fit["verdict"]])
+    return markdown(["shape", "median, mm", "80 %, mm", "silhouette", "seconds", "verdict"], lines)
 
 
 def main():

@@ -5,7 +5,6 @@ import pathlib
 from dataclasses import dataclass
 
 from reproduction.catalogue import RECONSTRUCTIONS
-from reproduction.measure import ROOT
 
 # What the numbers depend on: the version of a measurement is that of the last commit that changed any of these.
 SOURCES = ("CMakeLists.txt", "app/*.cpp", "app/*.h", "core", "optim", "scenes", "experiments/*.yaml", "tests/benchmark", ":!*.md")
@@ -67,8 +66,3 @@ def egg(folder):
     scene = os.fspath(pathlib.Path(folder).resolve() / "scene.xml")
     picture = "experiments/figures/egg.png"
     return {"egg": Step((_script("public_scene.py", "measure", scene, "emitter_right,shape_2", "0,1,0", _csv("egg"), picture),))}
-
-
-def path(name):
-    """Of a command's first word or a file."""
-    return ROOT / name

@@ -1,7 +1,5 @@
 """Tables of MEASURED.md, in Markdown, from those of experiments/measured. Each function takes that folder."""
 
-import contextlib
-import io
 import math
 import statistics
 
@@ -11,7 +9,7 @@ import capture_cost
 import cube_cost
 import error_coverage
 import public_scene
-from reproduction.tables import read_rows
+from reproduction.tables import markdown, read_rows
 
 from .steps import CHARTED
 
@@ -31,25 +29,9 @@ def number(value):
     return f"{value:.{max(0, 1 - math.floor(math.log10(abs(value))))}f}"
 
 
-def markdown(header, rows):
-    lines = ["| " + " | ".join(map(str, cells)) + " |" for cells in (header, *rows)]
-    return "\n".join([lines[0], "|---" * len(header) + "|", *lines[1:]])
-
-
-def printed(table, file):
-    """What a script's own `table` prints."""
-    with contextlib.redirect_stdout(io.StringIO()) as text:
-        table(file)
-    return text.getvalue().strip()
-
-
-def _figure8(folder):
-    rows = {(r["gate"], r["figure"]): float(r["value"]) for r in read_rows(folder / "figure8.csv")}
-    return list(dict.fromkeys(gate for gate, _ in rows)), rows
-
-
 def figure8(folder):
-    gates, rows = _figure8(folder)
+    rows = {(r["gate"], r["figure"]): float(r["value"]) for r in read_rows(folder / "figure8.csv")}
+    gates = list(dict.fromkeys(gate for gate, _ in rows))
     step = "step {}: {}"
     lines = {
         "spread of z where the derivative exceeds 1 % of its peak": "standard deviation of z where the derivative exceeds 1 % of the peak",
@@ -251,15 +233,15 @@ def hidden_share(folder):
 
 
 def captures(folder):
-    return printed(capture_cost.table, folder / "capture_cost.csv")
+    return capture_cost.table_of(read_rows(folder / "capture_cost.csv"))
 
 
 def stated_errors(folder):
-    return printed(error_coverage.table, folder / "error_coverage.csv")
+    return error_coverage.tables_of(read_rows(folder / "error_coverage.csv"))
 
 
 def egg(folder):
-    return public_scene.table(folder / "egg.csv")
+    return public_scene.table_of(read_rows(folder / "egg.csv"))
 
 
 def checks(folder):

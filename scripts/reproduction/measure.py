@@ -4,7 +4,6 @@ import csv
 import os
 import pathlib
 import subprocess
-import time
 from dataclasses import asdict, dataclass, fields
 
 import yaml
@@ -47,17 +46,18 @@ class Usage:
         return Usage(self.seconds + other.seconds, self.cpu_seconds + other.cpu_seconds, max(self.peak_mib, other.peak_mib))
 
 
-def program(*arguments):
-    """Runs PROGRAM and returns its Usage. A run that diverges fails, but leaves its summary: that is a result."""
-    words = [str(PROGRAM), *map(str, arguments), "--quiet", "--no-plots"]
-    start = time.monotonic()
-    process = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    complaint = process.stderr.read()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode != 0 and "the run diverged" not in complaint:
-        raise Failure(f"isochron {' '.join(words[1:])}: {complaint.strip() or f'status {process.returncode}'}")
-    return Usage(time.monotonic() - start, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+def program(*arguments, pictures=False):
+    """Runs PROGRAM, with the pictures that it draws by other processes or without, and returns its Usage. A run that diverges fails,
+    but leaves its summary: that is a result. By way of `time`: a child of this process would begin with this one's memory as its
+    peak."""
+    words = [*map(str, arguments), "--quiet", *([] if pictures else ["--no-plots"])]
+    result = subprocess.run(["/usr/bin/time", "--quiet", "--format", "%e %U %S %M", str(PROGRAM), *words], stderr=subprocess.PIPE,
+                            text=True, check=False)
+    complaint, _, used = result.stderr.rstrip().rpartition("\n")
+    if result.returncode != 0 and "the run diverged" not in complaint:
+        raise Failure(f"isochron {' '.join(words)}: {complaint.strip() or f'status {result.returncode}'}")
+    wall, user, system, kibibytes = map(float, used.split())
+    return Usage(wall, user + system, kibibytes / 1024)
 
 
 def summary(folder):

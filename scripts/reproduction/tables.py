@@ -25,6 +25,12 @@ def write_rows(file, columns, rows):
     partial.replace(file)
 
 
+def markdown(header, rows):
+    """A table of cells of any type."""
+    lines = ["| " + " | ".join(map(str, cells)) + " |" for cells in (header, *rows)]
+    return "\n".join([lines[0], "|---" * len(header) + "|", *lines[1:]])
+
+
 def run_action(doc, arguments, *actions):
     """Calls the action of the name arguments[0] with the others. Prints `doc` and returns 2 where they do not fit."""
     by_name = {action.__name__: action for action in actions}

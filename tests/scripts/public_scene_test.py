@@ -65,7 +65,7 @@ class PublicSceneTest(unittest.TestCase):
         for row in rows:
             self.assertTrue(0 < float(row["cpu_seconds"]) and 1 < float(row["peak_mib"]) < 2048 and 0 < int(row["lit_frames"]) <= 10)
         self.assertTrue(png.read_bytes().startswith(b"\x89PNG"))
-        lines = public_scene.table(csv).splitlines()
+        lines = public_scene.table_of(rows).splitlines()
         self.assertEqual([line.split("|")[1:3] for line in lines[2:]], [
             [" images ", " 4 "], [" images ", " 64 "], [" derivative ", " 64 "], [" derivative ", " 2048 "]])
         self.assertEqual({line.count("|") for line in lines}, {lines[0].count("|")})
