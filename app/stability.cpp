@@ -25,10 +25,11 @@ struct StabilityCommand {
   std::vector<double> widths, steps;
 };
 
-/// Half decades from 10 % to 10^-4.5 of the path length.
-std::vector<double> half_decades() {
+/// Half decades from 10 % to a millionth of the path length and, where derivatives know them, Dirac gates.
+std::vector<double> default_widths(const Scene& scene) {
   std::vector<double> widths;
-  for (int i = 2; i <= 9; ++i) widths.push_back(std::pow(10, -0.5 * i));
+  for (int i = 2; i <= 12; ++i) widths.push_back(std::pow(10, -0.5 * i));
+  if (may_keep_length(scene)) widths.push_back(0);
   return widths;
 }
 
@@ -36,10 +37,10 @@ int stability(const StabilityCommand& command) {
   begin_session(command.common);
   Experiment experiment = read_experiment(command.common);
   StabilityOptions options;
-  options.widths = command.widths.empty() ? half_decades() : command.widths;
-  std::sort(options.widths.begin(), options.widths.end(), std::greater<>());
-  with_relative_width(experiment.gates, options.widths.front());  // steady gates fail here
+  with_relative_width(experiment.gates, 0.1);  // steady gates fail here
   const Problem problem(experiment, warn);
+  options.widths = command.widths.empty() ? default_widths(problem.scene()) : command.widths;
+  std::sort(options.widths.begin(), options.widths.end(), std::greater<>());
   problem.require_parameters();
   const std::vector<double> theta = problem.parameters().initial();
   require_memory(problem, image_memory(problem));
@@ -81,9 +82,9 @@ void add_stability(CLI::App& app, Action& action) {
       ->capture_default_str()
       ->type_name("N");
   sub->add_option("--widths", command->widths,
-                  "standard deviations of the gates over the path length; default: 1e-1 to 1e-4.5 in half decades")
+                  "standard deviations of the gates over the path length, 0: Dirac gates; default: 1e-1 to 1e-6 in half decades and 0")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber)
+      ->check(CLI::NonNegativeNumber)
       ->type_name("A,B,C");
   sub->add_option("--steps", command->steps, "steps of the finite differences, as in `chart`")
       ->delimiter(',')
@@ -93,7 +94,7 @@ void add_stability(CLI::App& app, Action& action) {
       "Writes stability.csv and stability.png into -o, default runs/NAME-stability.\n"
       "Examples:\n"
       "  isochron stability cube.yaml\n"
-      "  isochron stability cube.yaml --widths 1e-2,1e-3 --seconds 60 -o map\n"
+      "  isochron stability cube.yaml --widths 1e-2,1e-3,0 --seconds 60 -o map\n"
       "  isochron stability corridor.yaml --iterations 100 --seconds 600");
   sub->callback([&action, command] { action = [command] { return stability(*command); }; });
 }

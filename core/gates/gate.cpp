@@ -117,7 +117,7 @@ double GateSet::relative_width() const {
 }
 
 double GateSet::relative_coverage() const {
-  if (shape_.is_unbounded()) return relative_width();
+  if (shape_.is_unbounded() || shape_.is_dirac()) return relative_width();
   const double apart = (sorted_.back() - sorted_.front()) / shape_.width();  // in widths of one gate
   return relative_width() * std::min(1 + apart, static_cast<double>(size()));
 }

@@ -21,7 +21,7 @@ struct CoupledPair {
   bool plus_is_jump = false, minus_is_jump = false;  ///< at a jump of the gate: reported under path_length
 };
 
-enum class GateKind { steady, gaussian, boxcar, truncated_gaussian, tabulated, bin, modulated };
+enum class GateKind { steady, gaussian, dirac, boxcar, truncated_gaussian, tabulated, bin, modulated };
 
 /// Which part of dW a pair is drawn from. A side of the other part is absent from the pair, so that each part is the same
 /// for every way of sampling and can be left out by itself. A jump that would be coupled with a slope, as at the jump of a
@@ -40,6 +40,9 @@ class GateShape {
   static GateShape steady();
   static GateShape gaussian(double sigma);
   static GateShape boxcar(double width);
+  /// A Dirac measure. Its value is one at zero and stands for that measure: divided by `mass` it is the probability that a length
+  /// drawn from the gate is zero, not a density. Only techniques that draw lengths from gates find paths.
+  static GateShape dirac();
   /// The gaussian inside (-half_width, half_width), zero outside.
   static GateShape truncated_gaussian(double sigma, double half_width);
   /// Piecewise linear through (offset, value); a repeated offset is a jump; zero outside. Scaled to unit
@@ -54,6 +57,7 @@ class GateShape {
 
   GateKind kind() const { return kind_; }
   bool is_steady() const { return kind_ == GateKind::steady; }
+  bool is_dirac() const { return kind_ == GateKind::dirac; }
   /// Counts light of every length, so that no length can be drawn from it: steady and modulated.
   bool is_unbounded() const { return kind_ == GateKind::steady || kind_ == GateKind::modulated; }
   /// Gaussian inside the support: the two kinds for which `gaussian_value` holds.

@@ -3,10 +3,10 @@
 
 namespace isochron {
 
-extern const GateKindEntry kSteady, kGaussian, kBoxcar, kTruncatedGaussian, kTabulated, kBins, kModulated;
+extern const GateKindEntry kSteady, kGaussian, kDirac, kBoxcar, kTruncatedGaussian, kTabulated, kBins, kModulated;
 
 std::span<const GateKindEntry* const> gate_kinds() {
-  static constexpr const GateKindEntry* kKinds[] = {&kSteady,    &kGaussian, &kBoxcar,   &kTruncatedGaussian,
+  static constexpr const GateKindEntry* kKinds[] = {&kSteady,    &kGaussian, &kDirac,     &kBoxcar, &kTruncatedGaussian,
                                                     &kTabulated, &kBins,     &kModulated};
   return kKinds;
 }

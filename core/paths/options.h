@@ -41,6 +41,9 @@ struct ConnectionRates {
 struct SamplingMix {
   double image = 0, interior = 0;
   ConnectionRates interior_rates = {}, path_length_rates = {};
+  /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives never act on the gates. Needs connections in the
+  /// interior term.
+  bool keep_length = false;
   bool operator==(const SamplingMix&) const = default;
 };
 
@@ -52,6 +55,9 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
+  /// Whether paths keep their lengths, see SamplingMix; only where all emitters have an extent and connections take a share of the
+  /// interior term. None: by the gates' width.
+  std::optional<bool> keep_length = {};
   /// In [0, 1): as long as a path by standard sampling has met no area-sampled shape (Shape::hidden), the probability that its
   /// next vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the cosine of a capture's wall. None: the
   /// default, see Worker. For paths of cameras, and after x1 in captures, it applies to derivatives only.
@@ -66,7 +72,10 @@ struct EstimatorOptions {
   bool operator==(const EstimatorOptions&) const = default;
 };
 
-/// What a renderer makes of `sampling` and `mix`.
+/// Whether the paths of a scene can keep their lengths: all emitters have an extent.
+bool may_keep_length(const Scene& scene);
+
+/// What a renderer makes of `sampling`, `mix` and `keep_length`.
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene);
 
 /// The terms of the derivative (paper Eq. 13). A sample of `interior` and `path_length` is a camera path with all its

@@ -1,6 +1,11 @@
 #include "core/paths/path_differential.h"
 
 #include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "core/paths/length_flow.h"
 
 namespace isochron {
 namespace {
@@ -94,6 +99,35 @@ void to_light(const PreparedScene& scene, const SurfacePoint& y, const Accumulat
     if (turn[axis] != 0) out.scalars.push_back({scene.layout.light_direction(i, axis), -1, turn[axis]});
   for (int c = 0; c < 3; ++c)
     if (light.intensity[c] > 0) out.scalars.push_back({scene.layout.light_intensity(i, c), c, 1 / light.intensity[c]});
+}
+
+/// Moves the emitter's point, the last vertex, so that the path keeps its length l: what the plain flow makes of l, by all
+/// that `g` and `out` say of it, changes ln F by -dl (X . grad ln F + div X) - X . grad dl. For one channel of ln F, or all (-1).
+void keep_length(const PreparedScene& scene, const LengthFlow& flow, const SurfacePoint* x, int count,
+                 std::vector<Accumulated>& g, int channel, LocalDifferential& out) {
+  const SurfacePoint &q = x[count - 2], &y = x[count - 1];
+  const double rate = dot(flow.x, g[count - 1].position) + flow.spread;
+  const ShapeRecord* medium = scene.medium_between(q, y);
+  const int index = medium ? scene.layout.number(medium->material, medium->bsdf->index_number()) : -1;
+  bool index_counted = false;
+  for (std::size_t i = 0, end = out.scalars.size(); i < end; ++i) {
+    const ScalarGradient s = out.scalars[i];
+    if (s.length == 0) continue;
+    double log_f = -rate * s.length;
+    if (s.dof == index && !std::exchange(index_counted, true)) log_f -= 1 / medium->index;
+    out.scalars.push_back({s.dof, channel, log_f});
+  }
+  const Vec3 of_y = g[count - 1].length;
+  for (int k = 0; k < count; ++k) g[k].position -= std::exchange(g[k].length, {}) * rate;
+  g[count - 1].position -= flow.turn;
+  g[count - 2].position += flow.turn;
+  // y crosses its triangle, whose corners may move differently.
+  const auto& edge = scene.edges(y.triangle);
+  const Vec3 opposite[3] = {edge[0] - edge[1], edge[1], -edge[0]};
+  const Vec3 across = cross(y.n, flow.x) / (2 * scene.area(y.triangle));
+  scene.for_each_moving_corner(y.triangle, [&](int i, int vertex) {
+    out.vertices.push_back({vertex, of_y * -dot(across, opposite[i]), {}, channel});
+  });
 }
 
 /// Carries position and normal gradients of a vertex to its triangle's vertices.
@@ -253,22 +287,31 @@ void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoin
           out.scalars.push_back({scene.layout.emission(s, c), c, 1 / radiance});
   }
   const SurfacePoint& y = x[count - 1];
-  const auto end_at_light = [&](const Accumulated& at_y, int channel) {
-    if (is_light(y.triangle)) to_light(scene, y, at_y, normalize(x[count - 2].p - y.p), length_only, channel, out);
+  std::optional<LengthFlow> kept;
+  if (!length_only && count > 2 && scene.flows.keep_length()) {
+    kept.emplace(scene, x[count - 2], y);
+    if (!std::isfinite(dot(kept->x, kept->x))) {  // at the foot
+      out.clear();
+      return;
+    }
+  }
+  const auto finish = [&](std::vector<Accumulated>& of_channel, int channel) {
+    if (is_light(y.triangle))
+      to_light(scene, y, of_channel[count - 1], normalize(x[count - 2].p - y.p), length_only, channel, out);
+    if (kept) keep_length(scene, *kept, x, count, of_channel, channel, out);
+    distribute_to_mesh_vertices(scene, x, count, of_channel, length_only, channel, out);
   };
   if (!coloured) {
-    end_at_light(g[count - 1], -1);
-    distribute_to_mesh_vertices(scene, x, count, g, length_only, -1, out);
+    finish(g, -1);
     return;
   }
   for (int c = 0; c < 3; ++c) {
     for (int k = 0; k < count; ++k) {
       own[c][k].position += g[k].position;
       own[c][k].normal += g[k].normal;
-      if (c == 0) own[c][k].length = g[k].length;  // once for all channels
+      if (c == 0 || kept) own[c][k].length = g[k].length;  // changes of the length: once for all channels
     }
-    end_at_light(own[c][count - 1], c);
-    distribute_to_mesh_vertices(scene, x, count, own[c], length_only, c, out);
+    finish(own[c], c);
   }
 }
 

@@ -27,6 +27,11 @@ struct ScalarGradient {
 struct LocalDifferential {
   std::vector<VertexGradient> vertices;
   std::vector<ScalarGradient> scalars;
+  /// Adds `factor` times the change of the length that `other` holds to what counts with the gate's value.
+  void add_length(const LocalDifferential& other, double factor) {
+    for (const VertexGradient& v : other.vertices) vertices.push_back({v.vertex, v.length * factor, {}});
+    for (const ScalarGradient& s : other.scalars) scalars.push_back({s.dof, -1, s.length * factor});
+  }
   void clear() {
     vertices.clear();
     scalars.clear();

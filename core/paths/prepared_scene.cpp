@@ -263,13 +263,15 @@ void PreparedScene::update_emitters() {
       TriangleRecord& record = records_[t];
       record.emits = emits && record.area > 0;
       if (!record.emits) continue;
-      const Vec3 corners[] = {record.origin, record.origin + record.edge[0], record.origin + record.edge[1]};
-      for (const Vec3& corner : corners) box.add(corner);
-      seen |= height_over(t, camera.position) > 0 && !camera.misses_image(corners[0], corners[1], corners[2]);
+      const auto corner = corners(t);
+      for (const Vec3& p : corner) box.add(p);
+      seen |= height_over(t, camera.position) > 0 && !camera.misses_image(corner[0], corner[1], corner[2]);
       triangles.push_back(t);
       power.push_back(record.area * shape.emission.power());
     }
-    if (emits) boxes.push_back(box);
+    if (!emits) continue;
+    boxes.push_back(box);
+    update_emitter_borders(shape);
   }
   const bool have_extent = !triangles.empty();
   update_lights();
@@ -288,6 +290,24 @@ void PreparedScene::update_emitters() {
   emitters.seen_by_camera = seen;
   for (ShapeRecord& shape : shapes_)
     if (shape.emission.emits() && emitters.have_extent) shape.emitter_pdf = shape.emission.power() / emitters.power();
+}
+
+void PreparedScene::update_emitter_borders(const Shape& shape) {
+  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) records_[t].emitter_borders = 0;
+  for (int e = shape.first_edge; e < shape.first_edge + shape.edge_count; ++e) {
+    const Edge& edge = scene.edges[e];
+    const auto [t0, t1] = edge.face;
+    const bool goes_on = t1 >= 0 && !edge.sector && emits(t0) && emits(t1) && dot(normal(t0), normal(t1)) > 0 &&
+                         length_squared(cross(normal(t0), normal(t1))) <= kCoplanarAngle * kCoplanarAngle;
+    if (goes_on) continue;
+    for (const int t : edge.face)
+      for (int i = 0; t >= 0 && i < 3; ++i) {
+        const auto& v = records_[t].vertex;
+        if (const int from = v[i], to = v[(i + 1) % 3];
+            std::minmax(from, to) == std::minmax(edge.vertex[0], edge.vertex[1]))
+          records_[t].emitter_borders |= 1 << i;
+      }
+  }
 }
 
 const EllipsoidBvh& PreparedScene::hierarchy(Part part) const {

@@ -217,6 +217,12 @@ class PreparedScene {
 
   /// Edges from corner 0 to corners 1 and 2.
   const Vec3 (&edges(int triangle) const)[2] { return records_[triangle].edge; }
+  std::array<Vec3, 3> corners(int triangle) const {
+    const TriangleRecord& r = records_[triangle];
+    return {r.origin, r.origin + r.edge[0], r.origin + r.edge[1]};
+  }
+  /// Whether the edge from corner i of an emitting triangle to the next ends the emitter's surface, or bends it.
+  bool is_emitter_border(int triangle, int i) const { return records_[triangle].emitter_borders >> i & 1; }
   /// Weights of the triangle's three vertices at x.
   std::array<double, 3> barycentrics(const SurfacePoint& x) const {
     const TriangleRecord& r = records_[x.triangle];
@@ -314,6 +320,7 @@ class PreparedScene {
   void update_record(int triangle);
   void update_lights();
   void update_emitters();
+  void update_emitter_borders(const Shape& shape);
   void update_hidden();
   /// Whether points drawn by area on the area-sampled shapes have weights (the wall's reflection over their density) of no larger
   /// mean square than points drawn by the wall's cosine, whose weights are 1.

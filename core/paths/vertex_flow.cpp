@@ -111,6 +111,7 @@ void VertexFlows::update(const PreparedScene& prepared, const FollowOptions& opt
   forward_ = camera.forward;
   radius_ = options.radius_in_pixels * camera.pixel_size();
   camera_possible_ = follows_bodies_ = false;
+  keep_length_ = options.keep_length;
   near_ = differentiable.bounds;
   if (!differentiable.geometry) return;
   update_bodies(prepared);
@@ -298,6 +299,7 @@ VertexFlows::Pair::Weight VertexFlows::weight(const PreparedScene& prepared, con
 VertexFlows::Pair VertexFlows::pair(const PreparedScene& scene, const SurfacePoint& x, const SurfacePoint& y,
                                     int k) const {
   Pair result;
+  if (keep_length_ && (scene.emits(x.triangle) || scene.emits(y.triangle))) return result;
   Vec3 gradient_near;  // of the weight of y with respect to x, and the other way round
   if (follows_bodies_) {
     const int patch_x = patch_[x.triangle], patch_y = patch_[y.triangle];

@@ -26,6 +26,8 @@ struct FollowOptions {
   double radius_in_pixels = 0;
   /// s of the other vertices in radii of the smaller body (half the diagonal of its box); 0: they move with their material.
   double bodies = 0;
+  /// The emitter's point moves so that the path keeps its length (LengthFlow). Nothing follows it then, and it follows nothing.
+  bool keep_length = false;
 };
 
 /// One neighbour's part of t_k.
@@ -61,6 +63,9 @@ class VertexFlows {
 
   /// Of x_k with both its segments; for k = 1, or at the end of a path, the missing one is left blank.
   static VertexFlow at(const Pair& before, const Pair& after, int k);
+
+  /// Whether paths of one bounce or more keep their lengths. All emitters have an extent.
+  bool keep_length() const { return keep_length_; }
 
   /// Whether there may be points x1 and x2, one of which moves, close enough for x1 to follow.
   bool camera_possible() const { return camera_possible_; }
@@ -99,7 +104,7 @@ class VertexFlows {
   bool camera_possible_ = false;
   Bounds camera_near_;  ///< holds every x1 that may follow
   Bounds near_;         ///< holds what moves and all others that may
-  bool follows_bodies_ = false;
+  bool follows_bodies_ = false, keep_length_ = false;
   std::vector<int> body_of_vertex_;  ///< connected meshes, which do not change when vertices move
   std::vector<int> shape_of_body_;
   int bodies_ = 0;

@@ -1,9 +1,12 @@
 #include "core/render/passes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/base/error.h"
 #include "core/base/partition_sum.h"
 #include "core/base/progress.h"
 #include "core/techniques/ellipsoidal.h"
@@ -29,20 +32,45 @@ std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis*
 
 Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOptions& estimator,
                const TangentBasis* tangent, SceneCache* cache)
-    : ready(ready_scene(source, tangent, {estimator.follow_radius, estimator.follow}, cache)),
-      // A detector delay of t equals gates shifted by -t. Offsets of single pixels are in their paths' lengths.
+    :  // A detector delay of t equals gates shifted by -t. Offsets of single pixels are in their paths' lengths.
       gates(source.detector.time_offset.size() > 1 || source.detector.time_offset[0] == 0
                 ? gate_set
                 : gate_set.shifted(-source.detector.time_offset[0])),
       options(estimator),
       basis(tangent),
-      scene(ready->scene),
       mix(sampling_mix(estimator, gates, source)),
+      ready(ready_scene(source, tangent, {estimator.follow_radius, estimator.follow, mix.keep_length}, cache)),
+      scene(ready->scene),
       every_gate(gates),
       cache_(cache) {
+  if (gates.shape().is_dirac()) check_dirac();
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
   // (measured on the cube and the box, 0.1 % to 10 %).
   if (options.antithetic) pair_coupling_gain_ = 1 + 0.1 / gates.relative_width();
+}
+
+void Passes::check_dirac() const {
+  if (options.sampling == Sampling::standard)
+    throw InputError("estimator.sampling: standard sampling finds no path of exactly the length of a dirac gate (allowed: "
+                     "auto, ellipsoidal)");
+  if (!basis || basis->columns == 0) return;
+  if (!mix.keep_length)
+    throw InputError("gates.kind: derivatives under dirac gates need paths that keep their lengths: a camera, emitters that are all "
+                     "shapes, and no `keep_length: false` (allowed here: any other kind, or gradient.method: finite_difference)");
+  if (!scene.differentiable.lengths) return;
+  for (const int t : scene.emitters.triangles()) {
+    if (!(scene.height_over(t, scene.camera.position) > 0)) continue;
+    const auto corners = scene.corners(t);
+    if (scene.camera.misses_image(corners[0], corners[1], corners[2])) continue;
+    double nearest = scene.height_over(t, scene.camera.position), farthest = 0;
+    for (const Vec3& p : corners) farthest = std::max(farthest, length(p - scene.camera.position));
+    for (int g = 0; g < gates.size(); ++g)
+      if (gates.center(g) >= nearest && gates.center(g) <= farthest)
+        throw InputError(fmt::format(
+            "gates.centers: the camera may see the emitter '{}' at the length {:.6g}, where a derivative under dirac gates is not "
+            "known (allowed: lengths outside of {:.6g} to {:.6g}, or any other kind)",
+            scene.shape_of(t).name, gates.center(g), nearest, farthest));
+  }
 }
 
 int Passes::partitions_for(SampleRange range, std::size_t values) const {
@@ -55,8 +83,9 @@ int Passes::partitions_for(SampleRange range, std::size_t values) const {
 bool Passes::has(Term term) const {
   if (!scene.differentiable.any || scene.emitters.empty()) return false;
   if (term == Term::interior) return true;
-  if (term == Term::visibility) return scene.differentiable.geometry;
-  return scene.differentiable.lengths && gates.shape().pair_mass(PairPart::dirac) > 0;
+  const bool lengths = scene.differentiable.lengths;
+  if (term == Term::visibility) return scene.differentiable.geometry || (lengths && mix.keep_length);
+  return lengths && gates.shape().pair_mass(PairPart::dirac) > 0 && any_slope();
 }
 
 void Passes::prepare(Term term) const {
@@ -91,7 +120,7 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
 }
 
 bool Passes::interior_pairs() const {
-  return mix.interior > 0 && options.antithetic && scene.differentiable.lengths;
+  return mix.interior > 0 && options.antithetic && scene.differentiable.lengths && any_slope();
 }
 
 void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths,
@@ -103,7 +132,8 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
-  EllipsoidalConnections connections(worker, lengths), camera_lengths(worker, single_lengths),
+  const GatePass& of_walks = mix.keep_length ? single_lengths : lengths;
+  EllipsoidalConnections connections(worker, of_walks), camera_lengths(worker, single_lengths),
       camera_pairs(worker, pairs);
   StandardPaths standard(worker, lengths.pairs);
   const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));

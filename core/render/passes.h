@@ -72,12 +72,12 @@ class Passes {
   /// One partition of a term of the derivative, which was prepared; gates and pixels by `pick`. `sink` is differential.
   void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
 
-  const std::shared_ptr<ReadyScene> ready;
   const GateSet gates;  ///< as the detector's time offset shifts them
   const EstimatorOptions options;
   const TangentBasis* const basis;
+  const SamplingMix mix;  ///< what the options resolve to
+  const std::shared_ptr<ReadyScene> ready;
   const PreparedScene& scene;
-  const SamplingMix mix;      ///< what the options resolve to
   const GatePick every_gate;  ///< all gates and pixels alike
 
   /// Rays traced so far by all ranks. Collective: every rank has to call it.
@@ -109,8 +109,14 @@ class Passes {
   }
 
  private:
+  /// Throws InputError where Dirac gates ask for what no technique finds.
+  void check_dirac() const;
+
   /// Whether the visibility term uses techniques that draw lengths.
   bool narrow() const { return mix.interior == 1; }
+
+  /// Whether derivatives may act on the gates: where paths keep their lengths, those do by which the camera sees an emitter.
+  bool any_slope() const { return !mix.keep_length || scene.emitters.seen_by_camera; }
 
   /// Whether the interior term takes the continuous part of dW in pairs.
   bool interior_pairs() const;

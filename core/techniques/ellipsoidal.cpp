@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/base/systematic_sampling.h"
+#include "core/techniques/ellipsoidal_impl.h"
 
 namespace isochron {
-
 double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
                          double ArcDensities::*technique, double pdf_on_arc) {
   const GatePick& pick = worker.pick;
@@ -21,7 +20,7 @@ double connection_weight(const Worker& worker, const Path& path, int pixel, cons
     // A pair serves one gate.
     return rate * (from == 0 ? 1 : pick.rate(pixel)) *
            (target.pair ? pick.probability(served, target.gate)
-                        : pick.length_pdf(served, path.length[path.size() - 1]));
+                        : pick.length_pdf(served, target.tau[side]));
   });
   const double sum = d.surface + d.emitter;
   if (!(sum > 0)) return 0;
@@ -43,7 +42,13 @@ void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
   draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
   for (const TargetLength& target : targets_) {
     if (scene_.emitters.seen_by_camera) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
-    if (worker_.options.max_bounces >= 1) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
+    // Of paths that keep their lengths only those that the camera sees an emitter by have a slope.
+    const bool has_slope = !(target.pair && scene_.flows.keep_length());
+    if (worker_.options.max_bounces >= 1 && has_slope) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
+    if (worker_.options.max_bounces >= 1 && has_flux(target)) {
+      connect_front(target, GatePick::kImage, Rgb(scale), rng);
+      connect_border(target, GatePick::kImage, Rgb(scale), rng);
+    }
   }
 }
 
@@ -85,6 +90,11 @@ void EllipsoidalConnections::connect_along(int pixel, double scale, int max_boun
       reachable = true;
       connect_emitter(target, pixel, throughput * scale, rng);
       if (bounce < max_bounces) connect_surface(target, pixel, throughput * scale, rng);
+      if (!has_flux(target)) continue;
+      borders_.sample(target.tau[0], pixel, throughput * (scale * target.scale), rng);
+      if (bounce == max_bounces) continue;
+      connect_front(target, pixel, throughput * scale, rng);
+      connect_border(target, pixel, throughput * scale, rng);
     }
     if (!reachable || bounce == max_bounces || !russian_roulette(throughput, bounce, rng)) return;
     if (!append_vertex(worker_, path, throughput, rng)) return;
@@ -124,7 +134,8 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
     const FocalTriangle triangle = scene_.focal_triangle(foci, t);
     for (int i = 0; i < 2; ++i)
       if (target.present[i] && ellipsoids[i].valid())
-        surface_arc_point(ellipsoids[i], triangle, t, y, along, pixel, factor, arcs.side[i]);
+        surface_arc_point(ellipsoids[i], triangle, t, [&](const SurfacePoint&) { return y; }, along, pixel, factor,
+                          arcs.side[i]);
   });
   for_each_seen(choices, [&](int i, const ArcPoint& q, double inverse_probability) {
     if (!path.is_confocal_return(y) && !worker_.visible(q.point, y)) return;
@@ -132,19 +143,6 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
     deliver(target, i, q, inverse_probability, &ArcDensities::surface);
     worker_.path.pop();
   });
-}
-
-template <class F>
-void EllipsoidalConnections::for_each_seen(std::span<const Choice> choices, F&& f) {
-  const SurfacePoint x = worker_.path.back();
-  for (const Choice& choice : choices)
-    for (int i = 0; i < 2; ++i) {
-      const ArcPoint& q = arcs_[choice.arc].side[i];
-      if (q.value.is_black() || !worker_.visible(x, q.point)) continue;
-      worker_.path.push(scene_, q.point);
-      f(i, q, choice.inverse_probability);
-      worker_.path.pop();
-    }
 }
 
 void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low,
@@ -208,64 +206,6 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
   for_each_seen(choices, [&](int i, const ArcPoint& y, double inverse_probability) {
     deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
   });
-}
-
-template <class F>
-std::span<const EllipsoidalConnections::Choice> EllipsoidalConnections::choose(double pick, int rays, F&& sample) {
-  const std::vector<int>& candidates = worker_.candidates;
-  const int count = static_cast<int>(candidates.size());
-  arcs_.clear();
-  choices_.clear();
-  const auto evaluate = [&](int candidate, double inverse_probability) {
-    ArcPair& arcs = arcs_.emplace_back();
-    sample(candidates[candidate], arcs);
-    if (const double weight = arcs.weight(); weight > 0)
-      choices_.push_back({static_cast<int>(arcs_.size()) - 1, weight * inverse_probability, inverse_probability});
-    else
-      arcs_.pop_back();
-  };
-  if (worker_.options.pick == ArcPick::uniform) {
-    if (count > 0) evaluate(std::min(static_cast<int>(pick * count), count - 1), count);
-    return choices_;
-  }
-  for (int i = 0; i < count; ++i) evaluate(i, worker_.inverse_probability[i]);
-  // To hand on what is found takes about as long as its rays (profile of the sofa's path_length term).
-  const int tested = std::max(1, static_cast<int>(count * kRaysPerArc / (2 * rays)));
-  const int carrying = static_cast<int>(choices_.size());
-  if (carrying > tested) choices_.resize(sample_systematically(choices_.data(), carrying, tested, pick));
-  return choices_;
-}
-
-void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t,
-                                               const SurfacePoint& y, double along, int pixel, const Rgb& factor,
-                                               ArcPoint& out) const {
-  EllipseArcs arcs;
-  if (!clip_ellipse(ellipsoid, triangle, arcs)) return;
-  const SurfacePoint q{arcs.point_at(along), scene_.normal(t), t};
-  const Path& path = worker_.path;
-  const SurfacePoint& x = path.back();
-  if (!scene_.outside(x, q)) return;
-  const Scattering s(x.p, q, y.p);
-  const double cos_y = is_light(y.triangle) ? 1 : -dot(y.n, s.w_i);
-  if (!(cos_y > 0)) return;
-  const double distances = s.distance_i * s.distance_o;
-  double carried = std::abs(s.cos_i * s.cos_o) * cos_y / (distances * distances);
-  Rgb f = bsdf_value(scene_, q, s);
-  out.pixel = pixel;
-  if (path.size() == 1) {
-    if (!scene_.captures()) out.pixel = scene_.camera.project(q.p);
-    if (out.pixel < 0) return;
-    carried *= scene_.importance(out.pixel, -s.w_o);
-  } else {
-    const Directions at_x = scattering_to(-s.w_o);
-    carried *= std::abs(at_x.cos_i);
-    f *= bsdf_value(scene_, x, at_x);
-  }
-  if (!(carried > 0) || f.is_black()) return;
-  const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, s.distance_o, s.distance_i, q.n);
-  out.pdf = 1 / area;
-  out.value = factor * scene_.emitted(y, -s.w_i) * f * (carried * area);
-  out.point = q;
 }
 
 void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, const FocalTriangle& triangle, int t,

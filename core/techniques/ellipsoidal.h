@@ -3,6 +3,9 @@
 //   surface arcs   q is put between a camera-side vertex x_k (the camera included) and a point y on an emitter, on an
 //                  ellipse of total length tau;
 //   emitter arcs   the emitter's point itself is put on a circle at the distance that is left.
+// Where paths keep their lengths (theory section 7) the ends of circles count, too: at the borders of emitters (EmitterBorders), and
+// where circles begin, at the foot of the last scattering vertex q (front arcs: q on a conic from which the way to the foot has
+// the length that is left).
 // Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
 // that ends outside is found by emitter arcs, also if it went through dielectrics before.
 // Every crossing arc is sampled once; only which of them get their visibility tested is a random choice, so the density
@@ -13,6 +16,7 @@
 #include <vector>
 
 #include "core/geometry/ellipsoid.h"
+#include "core/techniques/emitter_borders.h"
 #include "core/techniques/target_lengths.h"
 #include "core/techniques/worker.h"
 
@@ -40,7 +44,7 @@ class EllipsoidalConnections {
  public:
   /// Complete paths go to the receiver, or without one to the worker's sink.
   EllipsoidalConnections(Worker& worker, const GatePass& pass, LengthReceiver* receiver = nullptr)
-      : worker_(worker), scene_(worker.scene), pass_(pass), receiver_(receiver) {}
+      : worker_(worker), scene_(worker.scene), pass_(pass), receiver_(receiver), borders_(worker) {}
 
   /// Connections of the camera itself, which land on any pixel; contributions are scaled by `scale`. Not of captures.
   void sample_from_camera(double scale, Rng& rng);
@@ -74,6 +78,8 @@ class EllipsoidalConnections {
 
   void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
   void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
+  void connect_front(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
+  void connect_border(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
 
   /// Candidates for arcs between the path's last vertex and another focus: all triangles that may hold one, or some of
   /// the many of a fine mesh.
@@ -98,9 +104,11 @@ class EllipsoidalConnections {
   template <class F>
   void for_each_seen(std::span<const Choice> choices, F&& f);
 
-  /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried.
-  void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, const SurfacePoint& y,
-                         double along, int pixel, const Rgb& factor, ArcPoint& out) const;
+  /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried. `end`: the
+  /// emitter's point of a path by q, the second focus or, of front arcs, the foot of q.
+  template <class End>
+  void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, End&& end, double along,
+                         int pixel, const Rgb& factor, ArcPoint& out) const;
   void emitter_arc_point(const Ellipsoid& sphere, const FocalTriangle& triangle, int t, double along, int pixel,
                          const Rgb& throughput, ArcPoint& out) const;
   /// At the path's last vertex, which is not its first: from the one before, to the unit direction `w`.
@@ -110,10 +118,16 @@ class EllipsoidalConnections {
   void deliver(const TargetLength& target, int i, const ArcPoint& found, double inverse_probability,
                double ArcDensities::*technique);
 
+  /// Whether to sample what a flow that keeps the length carries across the ends of circles.
+  bool has_flux(const TargetLength& target) const {
+    return !target.pair && !receiver_ && worker_.differential_sink && scene_.flows.keep_length();
+  }
+
   Worker& worker_;
   const PreparedScene& scene_;
   const GatePass pass_;
   LengthReceiver* const receiver_;
+  EmitterBorders borders_;
   std::vector<TargetLength> targets_;
   std::vector<ArcPair> arcs_;
   Vec3 back_;  ///< unit direction from the path's last vertex to the one before

@@ -40,10 +40,11 @@ const std::vector<GatheredLight>& LightSide::gather(const SurfacePoint& towards,
       if (!radiance.is_black()) lights_.push_back({radiance, 0, 0, -1});
     }
     lengths_.clear();
+    whole_lengths_.clear();
     for (const CameraSide& side : before) {
       const double pick = rng.uniform(), u = rng.uniform();
-      const auto length = worker_.pick.sample_length(side.pixel, pick, u);
-      lengths_.push_back(length ? *length - side.length : 0);
+      whole_lengths_.push_back(worker_.pick.sample_length(side.pixel, pick, u).value_or(0));
+      lengths_.push_back(whole_lengths_.back() - side.length);
     }
     std::swap(worker_.path, path_);
     connections_.gather(lengths_, max_bounces, rng);
@@ -58,9 +59,8 @@ const std::vector<GatheredLight>& LightSide::gather(const SurfacePoint& towards,
 }
 
 void LightSide::take(int target, int bounces, const Rgb& value) {
-  const double length = lengths_[target];
-  const CameraSide& before = before_[target];
-  const double pdf = worker_.pick.length_pdf(before.pixel, length + before.length);
+  const double length = whole_lengths_[target];
+  const double pdf = worker_.pick.length_pdf(before_[target].pixel, length);
   lights_.push_back({value * (1 / pdf), length, bounces, target, worker_.path.vertex[2]});
 }
 

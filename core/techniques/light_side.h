@@ -11,10 +11,13 @@ namespace isochron {
 /// Light that vertex 1 of a path sends to vertex 0.
 struct GatheredLight {
   Rgb value;               ///< contribution over density from vertex 1 on, without the gate
-  double length;           ///< from vertex 1 to the emitter
+  double length;           ///< from vertex 1 to the emitter; of the whole path if it was drawn for a target
   int bounces;             ///< scattering vertices
   int target;              ///< index of the CameraSide whose length it was drawn for; -1: it can be joined with any
   SurfacePoint next = {};  ///< vertex 2; none (triangle -1) where vertex 1 emits the light
+
+  /// Of the path that `before` begins. Exactly as drawn: under a Dirac gate no other length counts.
+  double whole_length(double before) const { return target >= 0 ? length : before + length; }
 };
 
 /// What a boundary segment's light is joined with.
@@ -44,7 +47,8 @@ class LightSide final : private LengthReceiver {
   Path path_;
   EllipsoidalConnections connections_;
   std::span<const CameraSide> before_;
-  std::vector<double> lengths_;  ///< drawn from the gates, less `before_`
+  std::vector<double> whole_lengths_;  ///< drawn from the gates; 0: none
+  std::vector<double> lengths_;        ///< the same less `before_`
   std::vector<GatheredLight> lights_;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/paths/length_flow.h"
 #include "core/techniques/shadow_line.h"
 
 namespace isochron {
@@ -24,7 +25,9 @@ SecondaryBoundary::SecondaryBoundary(Worker& worker, const BoundaryEdges& edges,
       at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
       camera_over_edge_rate_(guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)),
       aimed_share_(techniques_.aimed && scene_.emitters.have_extent ? 0.5 : 0),
-      light_side_(worker, narrow_gates && techniques_.light_arcs) {}
+      light_side_(worker, narrow_gates && techniques_.light_arcs),
+      any_may_move_(scene_.flows.keep_length() &&
+                    (worker.options.max_bounces > 1 || scene_.differentiable.every_path)) {}
 
 bool SecondaryBoundary::Segment::orient() {
   const Vec3 normal = cross(y.tangent, w);
@@ -55,7 +58,7 @@ void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
     g.w = direction_in_wedge(g.y, u0, u1);
   }
   if (!g.orient()) return;
-  const bool may_end_flowing = g.y.edge->moves || may_meet_flowing(g, -g.w);
+  const bool may_end_flowing = any_may_move_ || g.y.edge->moves || may_meet_flowing(g, -g.w);
   if (!(may_end_flowing || may_meet_flowing(g, g.w)) || !find_light_end(g)) return;
   if (aimed_at >= 0 && g.light.triangle != aimed_at) return;
   if (!(may_end_flowing || may_flow(g.light)) || !find_camera_end(g)) return;
@@ -173,7 +176,7 @@ bool SecondaryBoundary::find_camera_end(Segment& g) {
   g.r_d = length(g.camera_end.p - g.y.y);
   // A surface that holds the edge is S, see offset_ray_origin: rays that graze it too closely end on it both ways.
   if (!(g.r_d > scene_.caster.offset())) return false;
-  return differentiate(g) || may_flow(g.camera_end) || may_flow(g.light);
+  return differentiate(g) || any_may_move_ || may_flow(g.camera_end) || may_flow(g.light);
 }
 
 bool SecondaryBoundary::differentiate(const Segment& g) {
@@ -205,6 +208,20 @@ const LocalDifferential& SecondaryBoundary::with_following(const Segment& g, con
   const Vec3 b = g.n_b * (g.side / (g.r_s + g.r_d));
   add_following_flow(scene_, of_d, &c.before, g.camera_end, &g.light, k, b * -g.r_s, following_);
   add_following_flow(scene_, of_s, &g.camera_end, g.light, &next, k + 1, b * -g.r_d, following_);
+  return following_;
+}
+
+const LocalDifferential& SecondaryBoundary::with_kept_length(const Segment& g, const Connection& c, Found found) {
+  const LocalDifferential& plain = with_following(g, c, {});
+  if (!scene_.flows.keep_length()) return plain;
+  if (&plain != &following_) following_ = plain;
+  whole_.assign(1, scene_.sensor_point(c.pixel));
+  for (int k = 1; k <= c.bounces; ++k)
+    whole_.push_back(found == Found::from_camera ? worker_.path.vertex[k] : walk_[c.bounces - k]);
+  whole_.push_back(g.light);
+  differentiate_path(scene_, c.pixel, whole_.data(), static_cast<int>(whole_.size()), true, of_length_);
+  const double across = g.side * dot(g.n_b, LengthFlow(scene_, g.camera_end, g.light).x);
+  if (std::isfinite(across)) following_.add_length(of_length_, across * g.r_d / (g.r_s + g.r_d));
   return following_;
 }
 
@@ -309,28 +326,29 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
     g.y.y = g.y.edge->point(s);
     if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) continue;
     const Connection& c = connections_[0];
-    const double rate = length_over_random(g, c);
+    const double rate = length_over_random(g, c, tau);
     const Rgb radiance = scene_.emitted(g.light, -g.w);
     if (!(rate > 0) || radiance.is_black()) continue;
-    const LocalDifferential& differential = with_following(g, c, {});
+    const LocalDifferential& differential = with_kept_length(g, c, Found::from_camera);
     if (differential.empty()) continue;
     worker_.sink.bind(differential);
     worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
     // Its share over its density is that of random edge points over theirs.
-    const double weight = BoundaryShares(c.camera_over_edge, rate).from_camera;
+    const double weight =
+        worker_.gates.shape().is_dirac() ? 1 / rate : BoundaryShares(c.camera_over_edge, rate).from_camera;
     worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
     worker_.sink.note_guide(table, g.y.x());
   }
 }
 
-double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c) const {
+double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c, double length) const {
   if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
   const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
   const int t = g.light.triangle;
   const Warp& warp = camera_warp(c.pixel, c.bounces);
   const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
   return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area(t) *
-         worker_.pick.length_pdf(c.pixel, c.length + g.r_d + g.r_s) * line.distance_rate(g.y.s);
+         worker_.pick.length_pdf(c.pixel, length) * line.distance_rate(g.y.s);
 }
 
 bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throughput) {
@@ -349,9 +367,9 @@ bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throu
     f = bsdf_value(scene_, g.camera_end, s) * std::abs(s.cos_i);
   }
   if (f.is_black() || !g.orient()) return false;
-  if (!(g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
+  if (!(any_may_move_ || g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
   if (!find_light_end(g)) return false;
-  if (!differentiate(g) && !may_flow(g.camera_end) && !may_flow(g.light)) return false;
+  if (!differentiate(g) && !any_may_move_ && !may_flow(g.camera_end) && !may_flow(g.light)) return false;
   ++worker_.rays;
   if (scene_.caster.occluded(scene_.offset_ray_origin(g.camera_end, g.w), g.offset_ray_origin(scene_.caster.offset())))
     return false;
@@ -379,24 +397,27 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
           : std::span(light_side_.gather(g.camera_end, g.light, before_, worker_.options.max_bounces - fewest, rng));
   const bool may_follow = scene_.flows.possible_at(g.camera_end.p) || scene_.flows.possible_at(g.light.p) ||
                           scene_.flows.camera_possible_at(g.camera_end.p);
+  const bool keeps = scene_.flows.keep_length();
   const LocalDifferential* bound = nullptr;
   for (std::size_t i = 0; i < connections_.size(); ++i) {
     const Connection& c = connections_[i];
-    const LocalDifferential* differential = &flow_of(c);
-    if (!may_follow && differential->empty()) continue;
+    if (!may_follow && !keeps && flow_of(c).empty()) continue;
     for (const GatheredLight& e : lights) {
       if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
       if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
-      if (may_follow) differential = &with_following(g, c, e.next);
+      const bool ends = keeps && e.bounces == 0;
+      const LocalDifferential* differential = ends         ? &with_kept_length(g, c, found)
+                                              : may_follow ? &with_following(g, c, e.next)
+                                                           : &flow_of(c);
       if (differential->empty()) continue;
-      if (may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
-      const double rate = e.bounces == 0 ? length_over_random(g, c) : 0;
+      if (ends || may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
+      const double rate = e.bounces == 0 ? length_over_random(g, c, before_[i].length) : 0;
       const BoundaryShares shares(c.camera_over_edge, rate);
       const double weight = found == Found::from_light  ? 1
                             : found == Found::from_edge ? shares.from_edge
                                                         : shares.from_camera;
       worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0]);
-      worker_.sink.add(c.pixel, c.value * e.value * weight, before_[i].length + e.length, kValueOnly);
+      worker_.sink.add(c.pixel, c.value * e.value * weight, e.whole_length(before_[i].length), kValueOnly);
     }
   }
 }

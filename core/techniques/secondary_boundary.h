@@ -112,6 +112,8 @@ class SecondaryBoundary {
 
   /// The same on the path of connection c that continues to `next` (none: triangle -1), with what D and S follow.
   const LocalDifferential& with_following(const Segment& g, const Connection& c, const SurfacePoint& next);
+  /// The same on a path that ends at S, which moves so that the length is kept if paths do so.
+  const LocalDifferential& with_kept_length(const Segment& g, const Connection& c, Found found);
 
   /// Of the vertices from x1 to D: the product of the densities per area with which BSDF sampling draws each of them, walking
   /// towards the light or towards the camera.
@@ -148,8 +150,8 @@ class SecondaryBoundary {
   void connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng);
 
   /// Density of the edge point when the length is drawn from the gates, over that of a random one from the camera; S is
-  /// on an emitter. Lengths are drawn only for segments outside of dielectrics.
-  double length_over_random(const Segment& g, const Connection& c) const;
+  /// on an emitter of a path so long. Lengths are drawn only for segments outside of dielectrics.
+  double length_over_random(const Segment& g, const Connection& c, double length) const;
 
   /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.
   bool join_camera_path(Segment& g, int pixel, const Rgb& throughput);
@@ -166,7 +168,10 @@ class SecondaryBoundary {
   const double camera_over_edge_rate_;  ///< samples of segments from the camera over those from an edge
   const double aimed_share_;            ///< of the directions from an edge
   LightSide light_side_;
-  LocalDifferential camera_flow_, material_flow_, following_;
+  /// Whether a segment can move although neither its edge nor its ends do: by other vertices of a path that keeps its length.
+  const bool any_may_move_;
+  LocalDifferential camera_flow_, material_flow_, following_, of_length_;
+  std::vector<SurfacePoint> whole_;  ///< the path from the camera to S
   std::vector<SurfacePoint> walk_;
   WalkDensities camera_densities_;  ///< of the worker's path, up to its last vertex but one
   std::vector<Connection> connections_;

@@ -81,7 +81,6 @@ class Techniques {
     return ours / (ours + (1 - share) * standard);
   }
 
- private:
   /// Density per area with which a walk at the path's vertex `from` continues to q (from the
   /// camera: by a random point of a random pixel).
   double step_pdf(const Path& path, int from, const SurfacePoint& q) const {
@@ -93,20 +92,21 @@ class Techniques {
     return scene_.bsdf_of(x.triangle).pdf(s) * to_area;
   }
 
-  /// Density of y on its emitter triangle's arc as seen from q, per area and length.
-  double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const {
-    const double distance = length(y.p - q.p);
-    EllipseArcs arcs;
-    if (!scene_.clip({q.p, q.p, 2 * distance}, y.triangle, arcs)) return 0;
-    return 1 / (arcs.total_span * distance);
-  }
-
   /// Density of q on its triangle's arc between foci x and y, per area and length.
   double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const {
     const Ellipsoid ellipsoid(x.p, y.p, length(q.p - x.p) + length(q.p - y.p));
     EllipseArcs arcs;
     if (!ellipsoid.valid() || !scene_.clip(ellipsoid, q.triangle, arcs)) return 0;
     return 1 / (arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n));
+  }
+
+ private:
+  /// Density of y on its emitter triangle's arc as seen from q, per area and length.
+  double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const {
+    const double distance = length(y.p - q.p);
+    EllipseArcs arcs;
+    if (!scene_.clip({q.p, q.p, 2 * distance}, y.triangle, arcs)) return 0;
+    return 1 / (arcs.total_span * distance);
   }
 
   const PreparedScene& scene_;

@@ -59,6 +59,7 @@ void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, Gat
     differentiate_path(scene, pixel, p.vertex.data(), p.size(), false, differential);
     if (differential.empty()) return;
     sink.bind(differential);
+    if (keeps_length(p)) use.slope = 0;
   }
   sink.add(pixel, value, length, use);
 }
@@ -69,6 +70,16 @@ void Worker::emit_length_rate(const Path& p, int pixel, int gate, const Rgb& val
   if (differential.empty()) return;
   sink.bind(differential);
   sink.add_length_rate(pixel, gate, value);
+}
+
+void Worker::emit_length_flux(const Path& p, int pixel, const Rgb& value, double length) {
+  sink.note_path(p);
+  differentiate_path(scene, pixel, p.vertex.data(), p.size(), true, of_length);
+  differential.clear();
+  differential.add_length(of_length, 1);
+  if (differential.empty()) return;
+  sink.bind(differential);
+  sink.add(pixel, value, length, kValueOnly);
 }
 
 std::optional<NextVertex> trace_next_vertex(Worker& worker, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput,

@@ -29,7 +29,7 @@ struct Worker {
   Sink& sink;
   const bool differential_sink;  ///< sink.differential()
   Path path;
-  LocalDifferential differential;
+  LocalDifferential differential, of_length;
   std::vector<int> candidates;              ///< triangles that may hold an arc
   std::vector<double> inverse_probability;  ///< of each candidate: 1 / probability that it is listed
   long long rays = 0;
@@ -106,10 +106,17 @@ struct Worker {
     return !differential_sink || path_has_gradient(scene, p, p.size() - 1, p.back().triangle);
   }
 
+  /// Whether the flow of the complete path p keeps its length (VertexFlows::keep_length), so that gates count by their values
+  /// alone.
+  bool keeps_length(const Path& p) const { return differential_sink && p.size() > 2 && scene.flows.keep_length(); }
+
   /// Hands the complete path p to the sink.
   void emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use);
   /// Passes only the change of its length to the sink, for one gate: a member of a coupled pair.
   void emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value);
+  /// Passes value x the change of its length x the gates' values to the sink: what a flow that keeps the length carries across
+  /// the end of the paths of equal length.
+  void emit_length_flux(const Path& p, int pixel, const Rgb& value, double length);
 
  private:
   double start_at_wall(int pixel, Rng& rng, double hidden);

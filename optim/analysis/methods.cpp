@@ -27,6 +27,7 @@ void set_automatic(Experiment& experiment) {
   experiment.estimator.antithetic = true;
   experiment.estimator.pick = ArcPick::contribution;
   experiment.estimator.numbers = Numbers::low_discrepancy;
+  experiment.estimator.keep_length.reset();
   experiment.gradient.method = GradientMethod::analytic;
 }
 
@@ -35,6 +36,7 @@ Method with_sampling(const std::string& name, Sampling sampling, bool antithetic
             set_automatic(experiment);
             experiment.estimator.sampling = sampling;
             experiment.estimator.antithetic = antithetic;
+            experiment.estimator.keep_length = false;
           }};
 }
 
@@ -83,6 +85,7 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
   methods.push_back({"paper",
                      [](Experiment& e) {
                        set_automatic(e);
+                       e.estimator.keep_length = false;
                        e.estimator.sampling = Sampling::ellipsoidal;
                        e.estimator.pick = ArcPick::uniform;
                        e.estimator.numbers = Numbers::independent;

@@ -146,12 +146,29 @@ Failure failure(const Direction& d, bool reference_resolved, double error_ratio)
   return Failure::descent;
 }
 
+bool may_find(const Method& method, Experiment experiment) {
+  if (!make_gates(experiment.gates).shape().is_dirac()) return true;
+  method.change(experiment);
+  const EstimatorOptions& estimator = experiment.estimator;
+  const bool images_only = method.gradient == Method::Gradient::finite_difference;
+  return estimator.sampling != Sampling::standard && (images_only || estimator.keep_length.value_or(true));
+}
+
 GateSpec with_relative_width(const GateSpec& gates, double width) {
   if (gates.unbounded())
     throw InputError(fmt::format("gates.kind: {} gates have no width to vary (allowed: any other kind)", gates.kind));
   GateSpec scaled = gates;
-  const double factor = width / make_gates(gates).relative_width();
-  scaled.shape = gates.shape->stretched(factor);
+  const double own = make_gates(gates).relative_width();
+  if (width == 0) {
+    const GateSet set = make_gates(gates);
+    scaled.choose("dirac");
+    scaled.centers.clear();
+    for (int g = 0; g < set.size(); ++g) scaled.centers.push_back(set.center(g) / length_unit(gates));
+  } else if (own > 0) {
+    scaled.shape = gates.shape->stretched(width / own);
+  } else {
+    throw InputError(fmt::format("gates.kind: {} gates have no width to vary (allowed: any other kind)", gates.kind));
+  }
   return scaled;
 }
 
@@ -161,16 +178,16 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     throw InputError(experiment.file +
                      ": target.images: measured images have one width of gates (a target to be rendered)");
   Stability map;
-  std::vector<Method> methods = methods_for(experiment, options.steps, map.notes);
-  methods.pop_back();  // `paper` differs in cost, not in where it fails
-  if (!options.steps.empty()) methods.push_back(independent_differences(options.steps[options.steps.size() / 2]));
+  std::vector<Method> all = methods_for(experiment, options.steps, map.notes);
+  all.pop_back();  // `paper` differs in cost, not in where it fails
+  if (!options.steps.empty()) all.push_back(independent_differences(options.steps[options.steps.size() / 2]));
   std::vector<double> theta;
   {
     const Problem problem(experiment);
     theta = problem.parameters().initial();
   }
   if (theta.size() > kMostUnknowns) {
-    std::erase_if(methods, [](const Method& m) { return m.gradient == Method::Gradient::finite_difference; });
+    std::erase_if(all, [](const Method& m) { return m.gradient == Method::Gradient::finite_difference; });
     map.notes.push_back(fmt::format("{} unknowns: no finite differences", theta.size()));
   }
   const double of_width = options.core_seconds / static_cast<double>(options.widths.size());
@@ -181,6 +198,8 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     narrow.gates = with_relative_width(experiment.gates, width);
     const GatedImage target = quick_target(narrow, kTargetShare * of_width, options.poll);
     const Reference reference = make_reference(narrow, theta, target, kShareOfReference * of_width, options.poll);
+    std::vector<Method> methods = all;
+    std::erase_if(methods, [&](const Method& method) { return !may_find(method, narrow); });
     std::deque<MethodRun> runs;
     for (const Method& method : methods) runs.emplace_back(narrow, method);
     const std::vector<std::size_t> first = first_alike(runs, methods, fmt::format("width {:.3g}: ", width), map.notes);
@@ -199,6 +218,16 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
       cells.push_back(first[m] < m ? cells[first[m]] : map_cell(runs[m], target, reference, time, options));
       cells.back().method = methods[m].name;
       cells.back().width = width;
+    }
+    for (std::size_t m = 0; m < all.size(); ++m) {
+      if (m < cells.size() && cells[m].method == all[m].name) continue;
+      StabilityCell none;
+      none.method = all[m].name;
+      none.width = width;
+      none.direction.zero = none.error_ratio = 1;
+      none.reference_error = reference.error;
+      none.failure = Failure::no_signal;
+      cells.insert(cells.begin() + static_cast<std::ptrdiff_t>(m), none);
     }
     map.cells.insert(map.cells.end(), cells.begin(), cells.end());
     stage.advance();

@@ -41,7 +41,7 @@ inline constexpr double kWorksError = 0.25, kWorksPositive = 2.0 / 3;
 Failure failure(const Direction& direction, bool reference_resolved, double error_ratio);
 
 struct StabilityOptions {
-  std::vector<double> widths;  ///< standard deviation of the gates over the path length
+  std::vector<double> widths;  ///< standard deviation of the gates over the path length; 0: Dirac gates
   double core_seconds = 360;   ///< for the whole map, about; but a sample per term and pixel at least
   int iterations = 50;         ///< of a reconstruction
   std::vector<double> steps;   ///< of finite differences
@@ -65,8 +65,12 @@ struct Stability {
   std::vector<std::string> notes;
 };
 
+/// Whether the method can find paths at all under the experiment's gates: Dirac gates need lengths drawn from them and, for derivatives,
+/// paths that keep them.
+bool may_find(const Method& method, Experiment experiment);
+
 /// The gates with another standard deviation, relative to the mean of their centres: all lengths of the shape
-/// scaled. Throws InputError for steady and modulated gates, which have no width.
+/// scaled; Dirac gates for width 0. Throws InputError for steady and modulated gates, which have no width.
 GateSpec with_relative_width(const GateSpec& gates, double width);
 
 /// Throws InputError for gates without a width and for measured targets, which have one width of gates only.

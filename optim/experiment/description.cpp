@@ -108,6 +108,11 @@ Field hidden_share(std::optional<double>& share) {
           [&share] { return fmt::format("{}", *share); }};
 }
 
+Field keep_length(std::optional<bool>& keep) {
+  return {"`true` or `false`", "", [&keep](const YamlValue& value) { keep = value.boolean(); },
+          [&keep] { return *keep ? "true" : "false"; }};
+}
+
 void describe_estimator(Keys& keys, Experiment& e) {
   EstimatorOptions& options = e.estimator;
   keys.remember(e.estimator_keys);
@@ -126,6 +131,10 @@ void describe_estimator(Keys& keys, Experiment& e) {
       "hidden_shapes", field::names(e.hidden_shapes),
       "the area-sampled shapes: path vertices are drawn on them by area",
       {.unset = e.hidden_shapes.empty(), .otherwise = "those that parameters change; captures: all if there are none"});
+  keys.value("keep_length", keep_length(options.keep_length),
+             "emitters' points move so that paths keep their lengths: derivatives do not act on gates, which may be as narrow as "
+             "Dirac's. Not for captures or lights without an extent",
+             {.unset = !options.keep_length, .otherwise = "where gates are narrower than 0.3 % of the path length"});
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");
   keys.value("follow", field::non_negative(options.follow),

@@ -37,7 +37,7 @@ Field centers(std::vector<double>& variable) {
 /// see nothing but rounding, and in the end their peaks overflow.
 void require_resolved(const GateSet& gates, const YamlValue& value) {
   constexpr double kLeastRelativeWidth = 1e-12, kLeastWidth = 1e-100, kMostWidth = 1e100;
-  if (gates.shape().is_unbounded()) return;
+  if (gates.shape().is_unbounded() || gates.shape().is_dirac()) return;
   double longest = 0;
   for (int g = 0; g < gates.size(); ++g) longest = std::max(longest, std::abs(gates.center(g)));
   const double least = std::max(kLeastWidth, kLeastRelativeWidth * longest), width = gates.shape().detail();

@@ -29,12 +29,12 @@ class BoundaryWeights {
     const auto connections = boundary_.connections_;
     const auto walk = boundary_.walk_;
     for (const auto& c : connections) {
-      const double at_length = boundary_.length_over_random(g, c);
+      const double at_length = boundary_.length_over_random(g, c, c.length + g.r_d + g.r_s);
       SecondaryBoundary::Segment h;
       h.y = g.y;
       if (!look_from_camera(h, c.pixel, {walk.data(), static_cast<std::size_t>(c.bounces)})) continue;
       const auto& d = boundary_.connections_[0];
-      const BoundaryShares there(d.camera_over_edge, boundary_.length_over_random(h, d));
+      const BoundaryShares there(d.camera_over_edge, boundary_.length_over_random(h, d, d.length + h.r_d + h.r_s));
       f(c.bounces, BoundaryShares(c.camera_over_edge, at_length).from_edge, there.from_camera, there.at_length);
     }
   }

@@ -141,7 +141,7 @@ def draw_stability(folder):
         axis.set_title(title, fontsize=10)
         axis.set_xticks(range(len(methods)), [plain(m).replace(", ", ",\n").replace(" un", "\nun").replace(" co", "\nco")
                                               for m in methods], fontsize=7, rotation=30, ha="right")
-        axis.set_yticks(range(len(widths)), [f"{w:.2g}" for w in widths], fontsize=8)
+        axis.set_yticks(range(len(widths)), [f"{w:.2g}" if w else "Dirac" for w in widths], fontsize=8)
         figure.colorbar(image, ax=axis, shrink=0.8, extend="both").ax.tick_params(labelsize=7)
     axes[0].set_ylabel("gate width, standard deviation / path length")
     figure.suptitle(f"{folder.resolve().name}: all methods at the same CPU time per gradient; words: why a cell fails",

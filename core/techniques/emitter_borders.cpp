@@ -1,0 +1,130 @@
+#include "core/techniques/emitter_borders.h"
+
+#include <cmath>
+
+#include "core/base/systematic_sampling.h"
+#include "core/paths/length_flow.h"
+
+namespace isochron {
+namespace {
+
+/// Crossings of one circle whose visibility is tested at most: about as many as a circle has with a rectangle.
+constexpr int kTested = 4;
+
+}  // namespace
+
+void EmitterBorders::sample(double tau, int pixel, const Rgb& throughput, Rng& rng) {
+  const double pick = rng.uniform(), thinning = rng.uniform();
+  const SurfacePoint q = worker_.path.back();
+  const double radius = tau - worker_.path.length.back();
+  if (!(radius > 0)) return;
+  std::vector<int>& candidates = worker_.candidates;
+  std::vector<double>& inverse_probability = worker_.inverse_probability;
+  candidates.clear();
+  inverse_probability.clear();
+  const EllipsoidBvh::Focus anywhere{q.p, {0, 0, 0}, 0, 1, false};
+  scene_.hierarchy(PreparedScene::Part::emitting)
+      .sample_surfaces(anywhere, anywhere, 2 * radius, 2 * radius, thinning, candidates, inverse_probability);
+  worker_.arcs += 1 + candidates.size();
+  crossings_.clear();
+  for (std::size_t i = 0; i < candidates.size(); ++i) cross(candidates[i], radius, inverse_probability[i], throughput);
+  const int count = static_cast<int>(crossings_.size());
+  if (count > kTested) crossings_.resize(sample_systematically(crossings_.data(), count, kTested, pick));
+  for (const Crossing& crossing : crossings_) {
+    if (!worker_.visible(q, crossing.point.y)) continue;
+    worker_.path.push(scene_, crossing.point.y);
+    if (worker_.contributes(worker_.path))
+      worker_.emit_length_flux(worker_.path, pixel,
+                               crossing.value * (crossing.inverse_probability * weight(tau, pixel, crossing.point, {})), tau);
+    worker_.path.pop();
+  }
+}
+
+double EmitterBorders::border_length(int triangle) const {
+  const auto corners = scene_.corners(triangle);
+  double sum = 0;
+  for (int i = 0; i < 3; ++i)
+    if (scene_.is_emitter_border(triangle, i)) sum += length(corners[(i + 1) % 3] - corners[i]);
+  return sum;
+}
+
+std::optional<EmitterBorders::Point> EmitterBorders::pick(double u_emitter, double u_border) const {
+  const int t = scene_.pick_emitter(u_emitter);
+  const auto corners = scene_.corners(t);
+  const double whole = border_length(t);
+  double at = u_border * whole;
+  for (int i = 0; i < 3; ++i) {
+    if (!scene_.is_emitter_border(t, i)) continue;
+    const Vec3 along = corners[(i + 1) % 3] - corners[i];
+    const double edge = length(along);
+    if (at < edge)
+      return Point{{corners[i] + along * (at / edge), scene_.normal(t), t},
+                   along / edge,
+                   scene_.emitter_pdf(t) * scene_.area(t) / whole};
+    at -= edge;
+  }
+  return std::nullopt;
+}
+
+double EmitterBorders::outwards(const SurfacePoint& q, const Point& border) const {
+  return dot(LengthFlow(scene_, q, border.y).x, isochron::cross(border.tangent, border.y.n));
+}
+
+double EmitterBorders::weight(double tau, int pixel, const Point& border, std::optional<double> pdf_on_arc) const {
+  const Path& path = worker_.path;
+  const int last = path.size() - 1;
+  const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1], &y = path.vertex[last];
+  // How often each is tried, times the density of the length there.
+  const auto tries = [&](int from) {
+    const GatePick& pick = worker_.pick;
+    return from == 0 ? worker_.rates.camera_lengths * pick.length_pdf(GatePick::kImage, tau)
+                     : worker_.rates.walk * pick.rate(pixel) * pick.length_pdf(pixel, tau);
+  };
+  const double from_q = worker_.techniques.step_pdf(path, last - 2, q) *
+                        std::abs(dot(normalize(y.p - q.p), border.tangent)) * tries(last - 1);
+  const double by_arcs = !scene_.outside(x, q) ? 0
+                                               : border.pdf *
+                                                     (pdf_on_arc ? *pdf_on_arc
+                                                                 : worker_.techniques.surface_arc_pdf(x, q, y)) *
+                                                     tries(last - 2);
+  const double sum = from_q + by_arcs;
+  return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / (sum * worker_.ellipsoidal_share) : 0;
+}
+
+void EmitterBorders::cross(int triangle, double radius, double inverse_probability, const Rgb& throughput) {
+  const Path& path = worker_.path;
+  const SurfacePoint& q = path.back();
+  const Vec3& n = scene_.normal(triangle);
+  const auto corners = scene_.corners(triangle);
+  const double border_pdf = scene_.emitter_pdf(triangle) * scene_.area(triangle) / border_length(triangle);
+  for (int i = 0; i < 3; ++i) {
+    if (!scene_.is_emitter_border(triangle, i)) continue;
+    const Vec3 a = corners[i] - q.p, along = corners[(i + 1) % 3] - corners[i];
+    // |a + s along| = radius
+    const double c2 = length_squared(along), c1 = dot(a, along), c0 = length_squared(a) - radius * radius;
+    const double discriminant = c1 * c1 - c0 * c2;
+    if (!(discriminant > 0)) continue;
+    const double root = -(c1 + std::copysign(std::sqrt(discriminant), c1));
+    for (const double s : {root / c2, c0 / root}) {
+      if (!(s > 0 && s < 1)) continue;
+      const Vec3 tangent = along / std::sqrt(c2);
+      const Point point{{corners[i] + along * s, n, triangle}, tangent, border_pdf};
+      const SurfacePoint& y = point.y;
+      if (!scene_.outside(q, y)) continue;
+      const Scattering at_q(path.vertex[path.size() - 2].p, q, y.p);
+      const double cos_y = -dot(n, at_q.w_i);
+      if (!(cos_y > 0)) continue;
+      const Rgb f = bsdf_value(scene_, q, at_q) * scene_.emitted(y, -at_q.w_i);
+      if (f.is_black()) continue;
+      // By the rate of the length along the border.
+      const double value = outwards(q, point) * std::abs(at_q.cos_i) * cos_y /
+                           (radius * radius * std::abs(dot(at_q.w_i, tangent)));
+      if (!(std::isfinite(value) && value != 0)) continue;
+      const Rgb carried = throughput * f;
+      crossings_.push_back(
+          {point, carried * value, carried.max() * std::abs(value) * inverse_probability, inverse_probability});
+    }
+  }
+}
+
+}  // namespace isochron
