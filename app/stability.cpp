@@ -82,7 +82,8 @@ void add_stability(CLI::App& app, Action& action) {
       ->capture_default_str()
       ->type_name("N");
   sub->add_option("--widths", command->widths,
-                  "standard deviations of the gates over the path length, 0: Dirac gates; default: 1e-1 to 1e-6 in half decades and 0")
+                  "standard deviations of the gates over the path length, 0: Dirac gates; default: 1e-1 to 1e-6 in "
+                  "half decades and 0")
       ->delimiter(',')
       ->check(CLI::NonNegativeNumber)
       ->type_name("A,B,C");

@@ -12,9 +12,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-TITLES = {"image": "gated image", "interior": "interior derivative"}
+TITLES = {"image": "gated image", "derivative": "derivative"}
 SCENES = {"cube": "glossy cube", "box": "diffuse box with shadows"}
-STYLES = {"standard": "C3o-", "ellipsoidal, uncoupled": "C1s-", "ellipsoidal, coupled pairs": "C0D-"}
+STYLES = {"standard": "C3o-", "ellipsoidal, uncoupled": "C1s-", "ellipsoidal, coupled pairs": "C0D-",
+          "ellipsoidal, kept lengths": "C2^-"}
 AUTOMATIC = {"automatic": "k.--"}
 
 
@@ -27,7 +28,8 @@ def draw_growth(rows):
                       if (r["scene"], r["method"]) == (scene, method)]
             axis.loglog(*zip(*points), style, markersize=5, label=method)
             # The predicted law, through the point at 1 % of the path length.
-            exponent = {"standard": -3, "ellipsoidal, uncoupled": -2}.get(method, 0 if scene == "open" else -1)
+            exponent = {"standard": -3, "ellipsoidal, uncoupled": -2,
+                        "ellipsoidal, kept lengths": 0}.get(method, 0 if scene == "open" else -1)
             width, variance = min(points, key=lambda p: abs(p[0] - 0.01))
             axis.loglog([width, 1e-5], [variance, variance * (1e-5 / width) ** exponent], "k:", linewidth=1,
                         label="predicted exponents 0 or -1, -2, -3" if method == "standard" else None)
@@ -47,8 +49,8 @@ def draw_cost(rows):
             for method, style in (STYLES | AUTOMATIC).items():
                 points = [(100 * float(r["relative_width"]), float(r["variance_seconds"])) for r in rows
                           if (r["scene"], r["quantity"], r["method"]) == (scene, quantity, method)]
-                # Without a derivative there is nothing to couple: one line for both ellipsoidal variants.
-                if points and not (quantity == "image" and method == "ellipsoidal, uncoupled"):
+                # Without a derivative there is nothing to couple or to keep: one line for all ellipsoidal variants.
+                if points and not (quantity == "image" and ("uncoupled" in method or "kept" in method)):
                     label = "ellipsoidal" if quantity == "image" and "pairs" in method else method
                     axis.loglog(*zip(*points), style, markersize=5, label=label)
             axis.set_title(f"{scene_title}: {title}")

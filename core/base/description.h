@@ -92,7 +92,7 @@ Field choice(E& variable) {
   return choice(
       names, [&variable](int i) { variable = kChoices<E>[i].value; }, [&variable] { return name_of(variable); });
 }
-/// The word that says of which kind a map is; choose(kind) receives it, `chosen` is written.
+/// The key that names the kind of a map. choose(kind) receives it when read; `chosen` is what is written.
 Field kind(const std::vector<KindName>& kinds, std::function<void(const std::string&)> choose,
            const std::string& chosen);
 /// The field with a check, or another action, after it was read.

@@ -6,7 +6,7 @@ namespace isochron {
 extern const GateKindEntry kSteady, kGaussian, kDirac, kBoxcar, kTruncatedGaussian, kTabulated, kBins, kModulated;
 
 std::span<const GateKindEntry* const> gate_kinds() {
-  static constexpr const GateKindEntry* kKinds[] = {&kSteady,    &kGaussian, &kDirac,     &kBoxcar, &kTruncatedGaussian,
+  static constexpr const GateKindEntry* kKinds[] = {&kSteady,    &kGaussian, &kDirac,    &kBoxcar, &kTruncatedGaussian,
                                                     &kTabulated, &kBins,     &kModulated};
   return kKinds;
 }

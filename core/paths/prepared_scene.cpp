@@ -293,7 +293,8 @@ void PreparedScene::update_emitters() {
 }
 
 void PreparedScene::update_emitter_borders(const Shape& shape) {
-  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) records_[t].emitter_borders = 0;
+  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t)
+    records_[t].emitter_borders = 0;
   for (int e = shape.first_edge; e < shape.first_edge + shape.edge_count; ++e) {
     const Edge& edge = scene.edges[e];
     const auto [t0, t1] = edge.face;

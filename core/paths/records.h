@@ -41,7 +41,8 @@ struct alignas(64) TriangleRecord {
   std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
   Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
   std::array<int, 3> vertex = {};
-  std::uint8_t emitter_borders = 0;  ///< bit i: the edge from corner i to the next ends the emitter's surface, or bends it
+  std::uint8_t emitter_borders =
+      0;  ///< bit i: the edge from corner i to the next ends the emitter's surface, or bends it
 };
 static_assert(sizeof(TriangleRecord) == 128);
 

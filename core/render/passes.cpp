@@ -51,12 +51,14 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
 
 void Passes::check_dirac() const {
   if (options.sampling == Sampling::standard)
-    throw InputError("estimator.sampling: standard sampling finds no path of exactly the length of a dirac gate (allowed: "
-                     "auto, ellipsoidal)");
+    throw InputError(
+        "estimator.sampling: standard sampling finds no path of exactly the length of a dirac gate (allowed: "
+        "auto, ellipsoidal)");
   if (!basis || basis->columns == 0) return;
   if (!mix.keep_length)
-    throw InputError("gates.kind: derivatives under dirac gates need paths that keep their lengths: a camera, emitters that are all "
-                     "shapes, and no `keep_length: false` (allowed here: any other kind, or gradient.method: finite_difference)");
+    throw InputError(
+        "gates.kind: derivatives under dirac gates need paths that keep their lengths: a camera, emitters that are all "
+        "shapes, and no `keep_length: false` (allowed here: any other kind, or gradient.method: finite_difference)");
   if (!scene.differentiable.lengths) return;
   for (const int t : scene.emitters.triangles()) {
     if (!(scene.height_over(t, scene.camera.position) > 0)) continue;
@@ -66,10 +68,11 @@ void Passes::check_dirac() const {
     for (const Vec3& p : corners) farthest = std::max(farthest, length(p - scene.camera.position));
     for (int g = 0; g < gates.size(); ++g)
       if (gates.center(g) >= nearest && gates.center(g) <= farthest)
-        throw InputError(fmt::format(
-            "gates.centers: the camera may see the emitter '{}' at the length {:.6g}, where a derivative under dirac gates is not "
-            "known (allowed: lengths outside of {:.6g} to {:.6g}, or any other kind)",
-            scene.shape_of(t).name, gates.center(g), nearest, farthest));
+        throw InputError(
+            fmt::format("gates.centers: the camera may see the emitter '{}' at the length {:.6g}, where a derivative "
+                        "under dirac gates is not "
+                        "known (allowed: lengths outside of {:.6g} to {:.6g}, or any other kind)",
+                        scene.shape_of(t).name, gates.center(g), nearest, farthest));
   }
 }
 
@@ -223,7 +226,7 @@ void Passes::learn() const {
     Worker worker(scene, gates, options, every_gate, sink);
     auto& cost = costs[partition];
     cost.fill(0);
-    const auto run = [&](Guide::Technique technique, auto&& search) {
+    const auto run = [&](Guide::Search technique, auto&& search) {
       if (!possible[technique]) return;
       const double before = worker.work();
       search();

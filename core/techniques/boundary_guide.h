@@ -46,7 +46,7 @@ class BoundaryGuide {
  public:
   /// Those of sample_points.h that search for boundaries, in the order of their histograms: from_camera has several, so it
   /// comes last.
-  enum Technique { primary, pixel_border, from_edge, from_light, from_camera };
+  enum Search { primary, pixel_border, from_edge, from_light, from_camera };
   static constexpr int kTechniques = 5;
 
   /// One value for each technique.
@@ -61,11 +61,11 @@ class BoundaryGuide {
   BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records, const Each<double>& cost);
 
   /// How often a technique is used per sample, on average; 0 where it finds nothing.
-  double rate(Technique t) const { return rate_[t]; }
+  double rate(Search t) const { return rate_[t]; }
   /// The histogram of a technique; `from_camera` has one per tile of the image for D next to the camera, and one for
   /// all others.
   const Warp& warp(int table) const { return warps_[table]; }
-  static int table(Technique t) { return t; }
+  static int table(Search t) { return t; }
   static int table_from_camera(const CameraModel& camera, int pixel, int bounces) {
     if (bounces > 1) return from_camera;
     const int x = pixel % camera.width * kTiles / camera.width, y = pixel / camera.width * kTiles / camera.height;

@@ -19,8 +19,7 @@ double connection_weight(const Worker& worker, const Path& path, int pixel, cons
     const int served = from == 0 ? GatePick::kImage : pixel;
     // A pair serves one gate.
     return rate * (from == 0 ? 1 : pick.rate(pixel)) *
-           (target.pair ? pick.probability(served, target.gate)
-                        : pick.length_pdf(served, target.tau[side]));
+           (target.pair ? pick.probability(served, target.gate) : pick.length_pdf(served, target.tau[side]));
   });
   const double sum = d.surface + d.emitter;
   if (!(sum > 0)) return 0;
@@ -134,8 +133,8 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
     const FocalTriangle triangle = scene_.focal_triangle(foci, t);
     for (int i = 0; i < 2; ++i)
       if (target.present[i] && ellipsoids[i].valid())
-        surface_arc_point(ellipsoids[i], triangle, t, [&](const SurfacePoint&) { return y; }, along, pixel, factor,
-                          arcs.side[i]);
+        surface_arc_point(
+            ellipsoids[i], triangle, t, [&](const SurfacePoint&) { return y; }, along, pixel, factor, arcs.side[i]);
   });
   for_each_seen(choices, [&](int i, const ArcPoint& q, double inverse_probability) {
     if (!path.is_confocal_return(y) && !worker_.visible(q.point, y)) return;

@@ -35,7 +35,8 @@ void EmitterBorders::sample(double tau, int pixel, const Rgb& throughput, Rng& r
     worker_.path.push(scene_, crossing.point.y);
     if (worker_.contributes(worker_.path))
       worker_.emit_length_flux(worker_.path, pixel,
-                               crossing.value * (crossing.inverse_probability * weight(tau, pixel, crossing.point, {})), tau);
+                               crossing.value * (crossing.inverse_probability * weight(tau, pixel, crossing.point, {})),
+                               tau);
     worker_.path.pop();
   }
 }
@@ -82,11 +83,10 @@ double EmitterBorders::weight(double tau, int pixel, const Point& border, std::o
   };
   const double from_q = worker_.techniques.step_pdf(path, last - 2, q) *
                         std::abs(dot(normalize(y.p - q.p), border.tangent)) * tries(last - 1);
-  const double by_arcs = !scene_.outside(x, q) ? 0
-                                               : border.pdf *
-                                                     (pdf_on_arc ? *pdf_on_arc
-                                                                 : worker_.techniques.surface_arc_pdf(x, q, y)) *
-                                                     tries(last - 2);
+  const double by_arcs =
+      !scene_.outside(x, q)
+          ? 0
+          : border.pdf * (pdf_on_arc ? *pdf_on_arc : worker_.techniques.surface_arc_pdf(x, q, y)) * tries(last - 2);
   const double sum = from_q + by_arcs;
   return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / (sum * worker_.ellipsoidal_share) : 0;
 }
@@ -117,8 +117,8 @@ void EmitterBorders::cross(int triangle, double radius, double inverse_probabili
       const Rgb f = bsdf_value(scene_, q, at_q) * scene_.emitted(y, -at_q.w_i);
       if (f.is_black()) continue;
       // By the rate of the length along the border.
-      const double value = outwards(q, point) * std::abs(at_q.cos_i) * cos_y /
-                           (radius * radius * std::abs(dot(at_q.w_i, tangent)));
+      const double value =
+          outwards(q, point) * std::abs(at_q.cos_i) * cos_y / (radius * radius * std::abs(dot(at_q.w_i, tangent)));
       if (!(std::isfinite(value) && value != 0)) continue;
       const Rgb carried = throughput * f;
       crossings_.push_back(

@@ -73,8 +73,8 @@ void EllipsoidalConnections::connect_border(const TargetLength& target, int pixe
   const Rgb factor = throughput * (target.scale / border->pdf);
   const auto choices = choose(pick, 2, [&](int t, ArcPair& arcs) {
     ArcPoint& q = arcs.side[0];
-    surface_arc_point(ellipsoid, scene_.focal_triangle(foci, t), t, [&](const SurfacePoint&) { return y; }, along, pixel,
-                      factor, q);
+    surface_arc_point(
+        ellipsoid, scene_.focal_triangle(foci, t), t, [&](const SurfacePoint&) { return y; }, along, pixel, factor, q);
     if (q.value.is_black()) return;
     const double outwards = std::abs(borders_.outwards(q.point, *border));
     q.value = std::isfinite(outwards) ? q.value * outwards : Rgb();
@@ -86,7 +86,8 @@ void EllipsoidalConnections::connect_border(const TargetLength& target, int pixe
       const double sign = std::copysign(1.0, borders_.outwards(q.point, *border));
       worker_.emit_length_flux(
           worker_.path, q.pixel,
-          q.value * (sign * inverse_probability * borders_.weight(target.tau[0], q.pixel, *border, q.pdf)), target.tau[0]);
+          q.value * (sign * inverse_probability * borders_.weight(target.tau[0], q.pixel, *border, q.pdf)),
+          target.tau[0]);
     }
     worker_.path.pop();
   });

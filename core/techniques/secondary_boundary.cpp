@@ -6,6 +6,7 @@
 
 #include "core/paths/length_flow.h"
 #include "core/techniques/shadow_line.h"
+#include "core/techniques/shadowed_length.h"
 
 namespace isochron {
 namespace {
@@ -98,6 +99,17 @@ void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
 }
 
 void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
+  double tau = 0;
+  if (at_length_) {
+    const double gate_pick = rng.uniform(), u = rng.uniform();
+    tau = worker_.pick.sample_length(pixel, gate_pick, u).value_or(0);
+  }
+  walk_from_camera(pixel, scale, tau, rng);
+  if (at_length_ && !scene_.captures() && worker_.options.max_bounces > 0)
+    for (int axis = 0; axis < 2; ++axis) connect_pixel_at_length(pixel, axis, scale, tau, rng);
+}
+
+void SecondaryBoundary::walk_from_camera(int pixel, double scale, double tau, Rng& rng) {
   // Each edge is drawn, and so prefetched, before the ray is traced to the vertex that needs it.
   BoundaryEdges::Pick pick = pick_from_camera(pixel, 1, rng);
   if (scene_.captures()) {
@@ -112,11 +124,6 @@ void SecondaryBoundary::sample_from_camera(int pixel, double scale, Rng& rng) {
   camera_densities_ = {};
   Rgb throughput(1.0);
   scale *= weight;
-  double tau = 0;
-  if (at_length_) {
-    const double gate_pick = rng.uniform(), u = rng.uniform();
-    tau = worker_.pick.sample_length(pixel, gate_pick, u).value_or(0);
-  }
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
     if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
     connect_edge(pixel, throughput * scale, pick, rng);
@@ -324,21 +331,59 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
     if (!(s > 0 && s < 1) || !line.casts(s)) continue;
     g.y.s = s;
     g.y.y = g.y.edge->point(s);
-    if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) continue;
-    const Connection& c = connections_[0];
-    const double rate = length_over_random(g, c, tau);
-    const Rgb radiance = scene_.emitted(g.light, -g.w);
-    if (!(rate > 0) || radiance.is_black()) continue;
-    const LocalDifferential& differential = with_kept_length(g, c, Found::from_camera);
-    if (differential.empty()) continue;
-    worker_.sink.bind(differential);
-    worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
-    // Its share over its density is that of random edge points over theirs.
-    const double weight =
-        worker_.gates.shape().is_dirac() ? 1 / rate : BoundaryShares(c.camera_over_edge, rate).from_camera;
-    worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
-    worker_.sink.note_guide(table, g.y.x());
+    if (deliver_at_length(g, pixel, emitter, throughput, tau)) worker_.sink.note_guide(table, g.y.x());
   }
+}
+
+bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau) {
+  if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) return false;
+  const Connection& c = connections_[0];
+  const double rate = length_over_random(g, c, tau);
+  const Rgb radiance = scene_.emitted(g.light, -g.w);
+  if (!(rate > 0) || radiance.is_black()) return false;
+  const LocalDifferential& differential = with_kept_length(g, c, Found::from_camera);
+  if (differential.empty()) return false;
+  worker_.sink.bind(differential);
+  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
+  // Its share over its density is that of random edge points over theirs.
+  const double weight =
+      worker_.gates.shape().is_dirac() ? 1 / rate : BoundaryShares(c.camera_over_edge, rate).from_camera;
+  worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
+  return true;
+}
+
+void SecondaryBoundary::connect_pixel_at_length(int pixel, int axis, double scale, double tau, Rng& rng) {
+  const double u_edge = rng.fine_uniform(), other = rng.uniform(), start = rng.uniform();
+  const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+  double pdf_area;
+  const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
+  if (is_light(emitter)) return;
+  const CameraModel& camera = scene_.camera;
+  std::array<double, 2> image{static_cast<double>(pixel % camera.width), static_cast<double>(pixel / camera.width)};
+  const double border = image[axis];
+  image[1 - axis] += other;
+  const auto triangle_at = [&](double x) {
+    std::array<double, 2> at = image;
+    at[axis] = x;
+    return worker_.closest_camera_hit(camera.direction(at[0], at[1]));
+  };
+  const int triangle = triangle_at(border + start);
+  if (triangle < 0) return;
+  Segment g;
+  const int table = camera_table(pixel, 1);
+  g.y = edges_.sample_secondary(guide_.warp(table).sample(u_edge));
+  const auto root = ShadowedLength(scene_, triangle, g.y.y, emitter).solve(image, axis, tau);
+  if (!root || triangle_at(*root) != triangle) return;
+  image[axis] = *root;
+  const auto d = scene_.end_point(triangle, camera.position, camera.direction(image[0], image[1]));
+  if (!d || camera.project(d->p) != pixel) return;
+  worker_.start_at_sensor(worker_.path, pixel);
+  worker_.path.push(scene_, *d);
+  // One over the probability to start on the triangle, which nobody knows: the mean number of trials until one does.
+  int trials = 1;
+  while (triangle_at(border + rng.uniform()) != triangle) ++trials;
+  camera_densities_ = {};
+  if (deliver_at_length(g, pixel, emitter, Rgb(scale * trials), tau)) worker_.sink.note_guide(table, g.y.x());
 }
 
 double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c, double length) const {
@@ -347,8 +392,26 @@ double SecondaryBoundary::length_over_random(const Segment& g, const Connection&
   const int t = g.light.triangle;
   const Warp& warp = camera_warp(c.pixel, c.bounces);
   const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
-  return edge_probability / (g.y.share * warp.density(g.y.x())) * scene_.emitter_pdf(t) * scene_.area(t) *
-         worker_.pick.length_pdf(c.pixel, length) * line.distance_rate(g.y.s);
+  double rate = edge_probability / (g.y.share * warp.density(g.y.x())) * line.distance_rate(g.y.s);
+  if (c.bounces == 1 && !scene_.captures()) rate += rate_in_pixel(g, c.pixel);
+  return rate * scene_.emitter_pdf(t) * scene_.area(t) * worker_.pick.length_pdf(c.pixel, length);
+}
+
+double SecondaryBoundary::rate_in_pixel(const Segment& g, int pixel) const {
+  constexpr double kSame = 1e-6;  // pixels; several lengths may be right within a pixel, of which one is found
+  const CameraModel& camera = scene_.camera;
+  const std::array<double, 2> image = camera.image_point(g.camera_end.p);
+  const ShadowedLength lengths(scene_, g.camera_end.triangle, g.y.y, g.light.triangle);
+  const auto here = lengths.at(image);
+  if (!here) return 0;
+  double rate = 0;
+  for (int axis = 0; axis < 2; ++axis) {
+    std::array<double, 2> from = image;
+    from[axis] = axis == 0 ? pixel % camera.width : pixel / camera.width;
+    const auto root = lengths.solve(from, axis, here->length);
+    if (root && std::abs(*root - image[axis]) < kSame) rate += std::abs(here->rate[axis]);
+  }
+  return rate;
 }
 
 bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throughput) {

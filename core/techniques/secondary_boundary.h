@@ -5,7 +5,8 @@
 //   - from the camera: D is a vertex of a camera path, y a point of a random edge. Finds what a narrow field of view
 //     or a glossy surface sees;
 //   - under narrow gates, from the camera at a length drawn from the gates: y is where the shadow of a random edge, cast
-//     from D onto an emitter's plane, is at the distance that is left.
+//     from D onto an emitter's plane, is at the distance that is left; or y is random, and D moved within its pixel, along either
+//     image axis, to where the length is right. Where one's density vanishes another's does not.
 // From the edge, the D side walks on and connects to the camera at every vertex. Segments that end at a light without an
 // extent, or begin at the sensor point of a capture, are found in one way each: from an edge point, which determines them.
 #pragma once
@@ -146,12 +147,22 @@ class SecondaryBoundary {
   /// D is the last vertex of the worker's path: tries the edge point.
   void connect_edge(int pixel, const Rgb& throughput, const BoundaryEdges::Pick& pick, Rng& rng);
 
+  void walk_from_camera(int pixel, double scale, double tau, Rng& rng);
+
   /// As `connect_edge`, for light straight from an emitter on paths of length tau.
   void connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng);
+  /// For light of one bounce on paths of length tau: a random edge point; a random one of the pixel's image coordinates, and the other
+  /// (`axis`) such that the length is right.
+  void connect_pixel_at_length(int pixel, int axis, double scale, double tau, Rng& rng);
+  /// D, the last vertex of the worker's path, y and tau are given: hands the path by an emitter's triangle to the sink.
+  bool deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau);
 
-  /// Density of the edge point when the length is drawn from the gates, over that of a random one from the camera; S is
+  /// Density of the segment when the length is drawn from the gates, over that of a random edge point from the camera; S is
   /// on an emitter of a path so long. Lengths are drawn only for segments outside of dielectrics.
   double length_over_random(const Segment& g, const Connection& c, double length) const;
+
+  /// The part of it that moves D within its pixel, where D is x1, without densities of the emitter and the length.
+  double rate_in_pixel(const Segment& g, int pixel) const;
 
   /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.
   bool join_camera_path(Segment& g, int pixel, const Rgb& throughput);

@@ -22,8 +22,8 @@ struct Worker {
   const GateSet& gates;
   const EstimatorOptions& options;
   const GatePick& pick;
-  double ellipsoidal_share = 0;  ///< of the samples; the others are standard
-  ConnectionRates rates = {};    ///< of ellipsoidal connections
+  double ellipsoidal_share = 0;   ///< of the samples; the others are standard
+  ConnectionRates rates = {};     ///< of ellipsoidal connections
   double pair_coupling_gain = 1;  ///< factor on the density of coupled pairs in multiple importance sampling
   Techniques techniques;
   Sink& sink;

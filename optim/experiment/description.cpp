@@ -132,7 +132,8 @@ void describe_estimator(Keys& keys, Experiment& e) {
       "the area-sampled shapes: path vertices are drawn on them by area",
       {.unset = e.hidden_shapes.empty(), .otherwise = "those that parameters change; captures: all if there are none"});
   keys.value("keep_length", keep_length(options.keep_length),
-             "emitters' points move so that paths keep their lengths: derivatives do not act on gates, which may be as narrow as "
+             "emitters' points move so that paths keep their lengths: derivatives do not act on gates, which may be as "
+             "narrow as "
              "Dirac's. Not for captures or lights without an extent",
              {.unset = !options.keep_length, .otherwise = "where gates are narrower than 0.3 % of the path length"});
   keys.value("guiding", field::boolean(e.guiding),

@@ -7,7 +7,7 @@
 namespace isochron {
 namespace {
 
-/// Keeps a patch that no reading sees, of which differences alone are known, from being singular.
+/// Keeps a patch that no reading sees from being singular: only differences within it are known.
 constexpr double kMore = 1 + 0x1p-30;
 
 }  // namespace

@@ -90,7 +90,7 @@ def stability(folder, name):
     lines = []
     for width in dict.fromkeys(r["width"] for r in rows):
         cells = (by[width, method] for method in methods)
-        lines.append([f"{100 * float(width):g} %", *(
+        lines.append([f"{100 * float(width):g} %" if float(width) else "Dirac", *(
             f"{100 * float(r['positive']):.0f} %, {number(100 * float(r['error_ratio']))} %" + f" ({r['failure']})" * bool(r["failure"])
             for r in cells)])
     shorten = lambda method: SHORT.get(method, method.replace("finite_difference_", "step ").replace("_", ", "))
@@ -131,10 +131,11 @@ def gate_width(folder):
     lines = []
     for width in sorted({key[1] for key in rows}, reverse=True):
         cells = []
-        for scene, quantity in (("cube", "image"), ("cube", "interior"), ("box", "image"), ("box", "interior")):
+        for scene, quantity in (("cube", "image"), ("cube", "derivative"), ("box", "image"), ("box", "derivative")):
             cost = {method: rows[scene, width, method, quantity]
-                    for method in ("standard", "ellipsoidal, uncoupled", "ellipsoidal, coupled pairs", "automatic")}
-            best = min(cost["ellipsoidal, uncoupled"], cost["ellipsoidal, coupled pairs"])
+                    for method in ("standard", "ellipsoidal, uncoupled", "ellipsoidal, coupled pairs", "ellipsoidal, kept lengths",
+                                   "automatic")}
+            best = min(cost[method] for method in cost if method.startswith("ellipsoidal"))
             cells += [number(cost["standard"] / best), number(cost["automatic"] / min(best, cost["standard"]))]
         lines.append([f"{100 * width:g} %", *cells])
     return markdown(["width", "cube, image", "auto", "cube, derivative", "auto", "box, image", "auto", "box, derivative", "auto"], lines)
@@ -255,5 +256,6 @@ TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
                                growth_of_cost, cubes, hidden_share, captures, stated_errors, egg, checks)},
     "stability cube": lambda folder: stability(folder, "cube"),
+    "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),
 }

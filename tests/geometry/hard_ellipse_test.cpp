@@ -3,7 +3,7 @@
 // coinciding foci, foci in the triangle's plane, lengths that pass through a vertex.
 //
 // Many of these are ill-conditioned: rounding the input alone changes the result by more than any fixed
-// tolerance. So the input is rounded anew, six times, by up to 8 units in the last place of its largest
+// tolerance. So the input is rounded again, six times, by up to 8 units in the last place of its largest
 // coordinate, and the result has to be as near to the reference as those results are to each other, times 4.
 // Six draws do not always show how far rounding can go: one case in 25 000 may be further off (2e-5 are).
 // Where the length exceeds |a-b| by less than the coordinates' rounding, whether there is an ellipsoid at all

@@ -175,6 +175,11 @@ TEST_F(GateKinds, WidthsToVary) {
   EXPECT_EQ(narrow.center(3), 4.75);
   EXPECT_NEAR(make_gates(bins).shape().upper() / narrow.shape().upper(),
               make_gates(bins).shape().width() / narrow.shape().width(), 1e-12);
+  const GateSpec none = with_relative_width(bins, 0);
+  EXPECT_TRUE(make_gates(none).shape().is_dirac());
+  EXPECT_EQ(make_gates(none).center(3), 4.75);
+  EXPECT_EQ(make_gates(none).relative_width(), 0);
+  EXPECT_THROW(with_relative_width(none, 0.01), InputError);
   EXPECT_THROW(with_relative_width(gate_spec("{kind: modulated, frequency_mhz: 20, scene_unit_m: 1}"), 0.01),
                InputError);
 }

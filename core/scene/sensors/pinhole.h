@@ -1,5 +1,7 @@
 // The pinhole camera: what files say of it, and its mapping between image plane, measured in pixels, and directions.
 #pragma once
+#include <array>
+
 #include "core/base/constants.h"
 #include "core/base/description.h"
 #include "core/base/vec.h"
@@ -36,18 +38,25 @@ class CameraModel {
 
   int pixels() const { return width * height; }
 
+  /// Direction through image point (u, v), of depth one.
+  Vec3 ray(double u, double v) const {
+    return forward + right_ * ((u - 0.5 * width) * pixel_size_) + up_ * ((0.5 * height - v) * pixel_size_);
+  }
+  /// How `ray` changes from one pixel to the next, in u (axis 0) or v (axis 1).
+  Vec3 ray_step(int axis) const { return (axis == 0 ? right_ : -up_) * pixel_size_; }
   /// Unit direction through image point (u, v).
-  Vec3 direction(double u, double v) const {
-    return normalize(forward + right_ * ((u - 0.5 * width) * pixel_size_) + up_ * ((0.5 * height - v) * pixel_size_));
+  Vec3 direction(double u, double v) const { return normalize(ray(u, v)); }
+  /// (u, v) of a point before the camera.
+  std::array<double, 2> image_point(const Vec3& p) const {
+    const Vec3 d = p - position;
+    const double depth = dot(d, forward);
+    return {0.5 * width + dot(d, right_) / (depth * pixel_size_), 0.5 * height - dot(d, up_) / (depth * pixel_size_)};
   }
 
   /// Pixel that sees the point p, or -1 when p is behind the camera or outside the image.
   int project(const Vec3& p) const {
-    const Vec3 d = p - position;
-    const double depth = dot(d, forward);
-    if (!(depth > 0)) return -1;
-    const double u = 0.5 * width + dot(d, right_) / (depth * pixel_size_);
-    const double v = 0.5 * height - dot(d, up_) / (depth * pixel_size_);
+    if (!(dot(p - position, forward) > 0)) return -1;
+    const auto [u, v] = image_point(p);
     if (!(u >= 0 && u < width && v >= 0 && v < height)) return -1;
     return static_cast<int>(v) * width + static_cast<int>(u);
   }

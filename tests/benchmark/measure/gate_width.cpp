@@ -1,13 +1,15 @@
 // Cost of one unit of precision against gate width: isochron_gate_width cost CSV [BATCHES]. For the cube of
 // experiments/cube.yaml (direct light dominates) and the reference box (diffuse, with shadow edges), gaussian gates
-// from the whole path length to 1e-4 of it: variance of a pixel of the image, or of its derivative by a vertical motion,
-// averaged over pixels, times the CPU seconds spent. Lower is better; standard against ellipsoidal sampling, coupled and
-// uncoupled, and what automatic sampling makes of them (its trial, once per scene and gates, not counted).
+// from the whole path length to 1e-5 of it: variance of a pixel of the image, or of its derivative by a vertical motion (as many
+// samples of the interior as of the visibility term), averaged over pixels, times the CPU seconds spent. Lower is better; standard
+// against ellipsoidal sampling, uncoupled, coupled and with kept lengths, and what automatic sampling makes of them (its trial, once
+// per scene and gates, not counted).
 //
 // Growth of the derivative's variance: isochron_gate_width growth CSV [BATCHES]. For a floor under a lamp, with and
 // without a shadow on it, widths from 1 to 1e-5 of the path; variance per camera path.
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 
 #include "core/base/cpu_time.h"
 #include "core/base/parallel.h"
@@ -30,10 +32,13 @@ struct Setting {
   int samples;  ///< per pixel and batch, standard sampling
 };
 
+constexpr double kGuidingSamples = 8;  ///< per pixel
+
 struct Method {
   const char* name;
   Sampling sampling;
   bool antithetic;
+  std::optional<bool> keep_length;
 };
 
 /// Variance of a pixel's mean over all batches, averaged over pixels, and the average pixel.
@@ -61,16 +66,20 @@ PixelEstimate pixel_estimate(int samples, int batches, Image&& image) {
 void measure(const Setting& setting, int batches, std::FILE* csv) {
   const Scene scene = load_scene(setting.file);
   const TangentBasis basis = testing::make_basis(scene, {testing::translate(scene, setting.moving, {0, 1, 0})});
-  for (const double width : {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 3e-4, 1e-4}) {
+  for (const double width : {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 3e-4, 1e-4, 1e-5}) {
     const GateSet gates(GateShape::gaussian(width * setting.center), {setting.center});
     for (const Method& method :
-         {Method{"standard", Sampling::standard, true}, Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false},
-          Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true},
-          Method{"automatic", Sampling::automatic, true}}) {
+         {Method{"standard", Sampling::standard, true, {}},
+          Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false, false},
+          Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true, false},
+          Method{"ellipsoidal, kept lengths", Sampling::ellipsoidal, true, true},
+          Method{"automatic", Sampling::automatic, true, {}}}) {
       EstimatorOptions options;
       options.max_bounces = setting.max_bounces;
       options.sampling = method.sampling;
       options.antithetic = method.antithetic;
+      options.keep_length = method.keep_length;
+      options.guiding_samples = kGuidingSamples;
       const SamplingMix mix = measure_mix(scene, gates, options, &basis, {2, 0, 0}, Purpose::images);
       options.mix = mix;
       const Renderer renderer(scene, gates, options, &basis);
@@ -86,8 +95,11 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
         std::fflush(stdout);
       };
       report("image", mix.image, [&](SampleRange range) { return renderer.render({1, 0, 0}, range); });
-      report("interior", mix.interior, [&](SampleRange range) {
-        return renderer.derive(Term::interior, {1, 0, 1}, range)[0];
+      report("derivative", mix.interior, [&](SampleRange range) {
+        GatedImage sum = renderer.derive(Term::interior, {1, 0, 1}, range)[0];
+        const GatedImage visibility = renderer.derive(Term::visibility, {1, 0, 2}, range)[0];
+        for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += visibility.data[i];
+        return sum;
       });
     }
   }

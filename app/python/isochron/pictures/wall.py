@@ -26,7 +26,7 @@ def _flattened(vector, normal):
 
 
 class Wall:
-    """Points [Sx, Sy, 3], rows of which run downwards; one row alone says nothing of that: then up is y, or x on a floor."""
+    """Points [Sx, Sy, 3], whose rows run downwards. A single row does not tell which way is up: then it is y, or x on a floor."""
 
     def __init__(self, points, normals):
         flat = points.reshape(-1, 3)
