@@ -24,7 +24,8 @@ bool may_keep_length(const Scene& scene) {
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene) {
   // Gates that together cover less than this part of the path length: standard sampling throws too many paths away.
   constexpr double kNarrow = 0.02;
-  // Gates so narrow that coupled pairs are noisier than paths that keep their lengths.
+  // Gates so narrow that coupled pairs are noisier than paths that keep their lengths: from 0.5 % down on the cube, from 0.1 % down in
+  // the reference box (isochron_gate_width).
   constexpr double kSteep = 0.003;
   if (gates.shape().is_unbounded() || options.sampling == Sampling::standard) return {0, 0};
   SamplingMix mix{1, 1};
