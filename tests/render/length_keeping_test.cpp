@@ -35,10 +35,16 @@ Scene floor_in_shadow(Material floor = diffuse(Rgb(0.7))) {
 }
 
 std::vector<Motion> motions_of_floor_lamp_and_screen(const Scene& scene) {
-  return {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0.2}),
+  return {translate(scene, "floor", {0, 1, 0}),
+          translate(scene, "lamp", {0.3, 1, 0.2}),
           translate(scene, "screen", {1, 0.5, 0}),
           // stretches the lamp in its plane and bends its triangles
-          translate(scene, "lamp", {0.4, 0, 0.3}, [](const Vec3& p) { return p.z > 0 && p.x > 0.6; })};
+          translate(scene, "lamp", {0.4, 0, 0.3}, [](const Vec3& p) { return p.z > 0 && p.x > 0.6; }),
+          // all paths are longer
+          {[](Scene& target, double t) { target.detector.time_offset[0] += t; },
+           [](const Scene& source, std::vector<std::pair<int, double>>& out) {
+             out.emplace_back(DofLayout(source).time_offset(0), 1.0);
+           }}};
 }
 
 struct Totals {
