@@ -1,6 +1,8 @@
 #include "core/paths/options.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace isochron {
 
@@ -16,17 +18,37 @@ const char* name(Term term) {
   return "";
 }
 
+namespace {
+
+/// Root of the area of the smallest emitter; infinite where there is none.
+double emitter_size(const Scene& scene) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Shape& shape : scene.shapes) {
+    if (!shape.emission.emits()) continue;
+    double area = 0;
+    for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
+      const auto& v = scene.triangles[t].vertex;
+      const Vec3 &a = scene.positions[v[0]], &b = scene.positions[v[1]], &c = scene.positions[v[2]];
+      area += 0.5 * length(cross(b - a, c - a));
+    }
+    if (area > 0) least = std::min(least, std::sqrt(area));
+  }
+  return least;
+}
+
+}  // namespace
+
 bool may_keep_length(const Scene& scene) {
-  const auto emits = [](const Shape& shape) { return shape.emission.emits(); };
-  return !scene.capture && scene.lights.empty() && std::ranges::any_of(scene.shapes, emits);
+  return !scene.capture && scene.lights.empty() && std::isfinite(emitter_size(scene));
 }
 
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene) {
   // Gates that together cover less than this part of the path length: standard sampling throws too many paths away.
   constexpr double kNarrow = 0.02;
-  // Gates so narrow that coupled pairs are noisier than paths that keep their lengths: from 0.5 % down on the cube, from 0.1 % down in
-  // the reference box (isochron_gate_width).
-  constexpr double kSteep = 0.003;
+  // Gates so narrow, over the size of the smallest emitter, that coupled pairs are noisier than paths that keep their lengths: the two are
+  // equal at 3 % on the cube, at 1 % in the reference box (isochron_gate_width). An emitter that a gate sees as a point has no room
+  // for points to move.
+  constexpr double kSteep = 0.02;
   if (gates.shape().is_unbounded() || options.sampling == Sampling::standard) return {0, 0};
   SamplingMix mix{1, 1};
   if (options.sampling == Sampling::automatic && !gates.shape().is_dirac()) {
@@ -36,8 +58,8 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
     else if (gates.relative_coverage() >= kNarrow)
       mix = {0, 0};
   }
-  mix.keep_length =
-      mix.interior > 0 && may_keep_length(scene) && options.keep_length.value_or(gates.relative_width() < kSteep);
+  mix.keep_length = mix.interior > 0 && may_keep_length(scene) &&
+                    options.keep_length.value_or(gates.shape().width() < kSteep * emitter_size(scene));
   return mix;
 }
 

@@ -56,7 +56,7 @@ struct EstimatorOptions {
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
   /// Whether paths keep their lengths, see SamplingMix; only where all emitters have an extent and connections take a share of the
-  /// interior term. None: by the gates' width.
+  /// interior term. None: by the gates' width over the smallest emitter's.
   std::optional<bool> keep_length = {};
   /// In [0, 1): as long as a path by standard sampling has met no area-sampled shape (Shape::hidden), the probability that its
   /// next vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the cosine of a capture's wall. None: the

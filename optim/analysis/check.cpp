@@ -201,8 +201,9 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
   if (moves_geometry(type)) {
     // Bounds of motions are the optimiser's; images exist beyond them.
     if (experiment.gradient.step_given) return step;
-    const double distance =
-        std::min(kRelativeLength * extent(problem.scene()), kRelativeWidth * problem.gates().shape().detail());
+    const GateShape& gate = problem.gates().shape();
+    double distance = kRelativeLength * extent(problem.scene());
+    if (!gate.is_dirac()) distance = std::min(distance, kRelativeWidth * gate.detail());
     const double speed = top_speed(problem, theta, component);
     const double most = type == ParameterType::rotation || type == ParameterType::camera_rotation
                             ? kMostDegrees

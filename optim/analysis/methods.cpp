@@ -133,6 +133,7 @@ bool MethodRun::same_as(const MethodRun& other) const {
     EstimatorOptions options = problem.estimator();
     options.mix = sampling_mix(options, problem.gates(), problem.scene());
     options.sampling = Sampling::automatic;
+    options.keep_length.reset();
     return options;
   };
   return settled(problem_) == settled(other.problem_);

@@ -135,7 +135,7 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "emitters' points move so that paths keep their lengths: derivatives do not act on gates, which may be as "
              "narrow as "
              "Dirac's. Not for captures or lights without an extent",
-             {.unset = !options.keep_length, .otherwise = "where gates are narrower than 0.3 % of the path length"});
+             {.unset = !options.keep_length, .otherwise = "where gates are narrower than 2 % of the smallest emitter"});
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");
   keys.value("follow", field::non_negative(options.follow),

@@ -23,7 +23,7 @@ TEST(Methods, KnowsWhatAutomaticSamplingComesDownTo) {
   folder.write("tiny.yaml", tiny_experiment());
   for (const GatesAlike& c :
        {GatesAlike{"gates={kind: steady}", "standard"},
-        GatesAlike{"gates={kind: gaussian, centers: [4.5], sigma: 0.005}", "ellipsoidal_coupled"}}) {
+        GatesAlike{"gates={kind: gaussian, centers: [4.5], sigma: 0.02}", "ellipsoidal_coupled"}}) {
     SCOPED_TRACE(c.gates);
     const Experiment experiment = load_experiment(folder.file("tiny.yaml"), {c.gates});
     std::vector<std::string> notes;

@@ -99,7 +99,8 @@ double pdf_on_arc(const PreparedScene& scene, const Path& path, double ArcDensit
 constexpr double ArcDensities::*kArcs[] = {&ArcDensities::surface, &ArcDensities::emitter};
 
 /// What connections take of the path.
-double part_of_connections(const Finder& f, const PathSink::Found& found, const TargetLength& target) {
+double part_of_connections(const Finder& f, const PathSink::Found& found, TargetLength target) {
+  target.tau[0] = found.path.length.back();
   double sum = 0;
   for (const auto technique : kArcs)
     if (const double pdf = pdf_on_arc(f.prepared, found.path, technique); pdf > 0)
@@ -168,7 +169,8 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
     const Vec3 w = normalize(q.p - path.vertex[0].p);
     const double walk = f.prepared.camera.image_area_per_solid_angle(w) * solid_angle_to_area(path.vertex[0].p, q) /
                         f.prepared.pixels() * f.pick.rate(pixel);
-    const auto expect_ratio = [&](const TargetLength& target, double camera_rate, double of_image, double of_pixel) {
+    const auto expect_ratio = [&](TargetLength target, double camera_rate, double of_image, double of_pixel) {
+      target.tau[0] = path.length.back();
       const double by_surface = connection_weight(f.worker, path, pixel, target, 0, kArcs[0], surface),
                    by_emitter = connection_weight(f.worker, path, pixel, target, 0, kArcs[1], emitter);
       const double expected = f.prepared.emitter_pdf(y.triangle) * surface * camera_rate * of_image /
@@ -214,8 +216,11 @@ TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
         const double tau = 2 * s.distance_i;
         f.prepared.hierarchy(PreparedScene::Part::emitting).query_surfaces(q.p, q.p, tau, tau, triangles);
       }
-      expected *= connection_weight(f.worker, path, pixel, {}, 0, technique, pdf_on_arc(f.prepared, path, technique)) *
-                  static_cast<double>(triangles.size()) / density;
+      TargetLength target;
+      target.tau[0] = path.length.back();
+      expected *=
+          connection_weight(f.worker, path, pixel, target, 0, technique, pdf_on_arc(f.prepared, path, technique)) *
+          static_cast<double>(triangles.size()) / density;
       EXPECT_NEAR(value.r, expected.r, 1e-6 * expected.r);
       ++compared;
     }
