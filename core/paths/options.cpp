@@ -39,7 +39,9 @@ double emitter_size(const Scene& scene) {
 }  // namespace
 
 bool may_keep_length(const Scene& scene) {
-  return !scene.capture && scene.lights.empty() && std::isfinite(emitter_size(scene));
+  const auto is_glass = [&](const Shape& shape) { return scene.materials[shape.material].bsdf().transparent(); };
+  return !scene.capture && scene.lights.empty() && std::ranges::none_of(scene.shapes, is_glass) &&
+         std::isfinite(emitter_size(scene));
 }
 
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene) {
@@ -58,7 +60,9 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
     else if (gates.relative_coverage() >= kNarrow)
       mix = {0, 0};
   }
-  mix.keep_length = mix.interior > 0 && may_keep_length(scene) &&
+  const bool possible = may_keep_length(scene);
+  if (possible && options.keep_length == true && mix.interior == 0) mix.interior = 1;
+  mix.keep_length = mix.interior > 0 && possible &&
                     options.keep_length.value_or(gates.shape().width() < kSteep * emitter_size(scene));
   return mix;
 }

@@ -18,7 +18,8 @@ enum class ArcPick { contribution, uniform };
 /// others.
 enum class Numbers { low_discrepancy, independent };
 
-/// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays.
+/// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays, except under Dirac
+/// gates, where only lengths drawn from the gates are met.
 struct BoundaryTechniques {
   bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
   bool aimed = true;        ///< directions from the edge towards emitters
@@ -41,8 +42,8 @@ struct ConnectionRates {
 struct SamplingMix {
   double image = 0, interior = 0;
   ConnectionRates interior_rates = {}, path_length_rates = {};
-  /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives never act on the gates. Needs connections in the
-  /// interior term.
+  /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives do not act on the gates, but for light that the camera
+  /// sees an emitter by. Needs connections in the interior term.
   bool keep_length = false;
   bool operator==(const SamplingMix&) const = default;
 };
@@ -55,8 +56,8 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// Whether paths keep their lengths, see SamplingMix; only where all emitters have an extent and connections take a share of the
-  /// interior term. None: by the gates' width over the smallest emitter's.
+  /// Whether paths keep their lengths, see SamplingMix and may_keep_length. True: connections take a share of the interior term.
+  /// None: where they do and gates are narrow over the smallest emitter (the root of its area).
   std::optional<bool> keep_length = {};
   /// In [0, 1): as long as a path by standard sampling has met no area-sampled shape (Shape::hidden), the probability that its
   /// next vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the cosine of a capture's wall. None: the
@@ -72,7 +73,7 @@ struct EstimatorOptions {
   bool operator==(const EstimatorOptions&) const = default;
 };
 
-/// Whether the paths of a scene can keep their lengths: all emitters have an extent.
+/// Whether the paths of a scene can keep their lengths: all emitters have an extent, and nothing is of glass.
 bool may_keep_length(const Scene& scene);
 
 /// What a renderer makes of `sampling`, `mix` and `keep_length`.

@@ -179,6 +179,8 @@ struct Trial {
       per_batch[i] = std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]);
       EstimatorOptions trial = options;
       trial.mix = SamplingMix{kShares[i], kShares[i]};
+      // Where paths keep their lengths, a part of the variance is another term's.
+      trial.keep_length = false;
       // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
       trial.numbers = Numbers::independent;
       renderers[i].emplace(small, gates, trial, column);
@@ -222,7 +224,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   double own_work = 0;
   double& work = trial_work ? *trial_work : own_work;
   work = 0;
-  if (options.sampling != Sampling::automatic || gates.shape().is_unbounded() || scene.capture)
+  if (options.sampling != Sampling::automatic || gates.shape().is_unbounded() || gates.shape().is_dirac() ||
+      scene.capture)
     return sampling_mix(options, gates, scene);
   const double width = gates.relative_width(), coverage = gates.relative_coverage();
   EstimatorOptions plain = options;
@@ -243,6 +246,10 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   const Term interior = Term::interior;
   best.interior = choose(kInterior, by_width.interior, has_rates ? job.interior / 2 : job.interior, &one, &interior);
   if (!has_rates) return best;
+  // Without pairs there is nothing to choose between.
+  EstimatorOptions chosen = options;
+  chosen.mix = best;
+  if (sampling_mix(chosen, gates, scene).keep_length) return best;
   const auto rates = [&](Term term, double samples) {
     return measure_rates(scene, gates, options, one, term, stream, purpose, kTrialPart * pixels_of(scene) * samples,
                          work);

@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "core/base/error.h"
@@ -21,6 +23,22 @@ namespace {
 /// The learning pass has random numbers of its own; with fewer searches by each technique it would teach noise.
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
 constexpr long long kFewestLearningRounds = 64;
+
+/// Of p from the points of a triangle, the least and the largest.
+std::pair<double, double> distances(const Vec3& p, const std::array<Vec3, 3>& corners) {
+  double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
+  const Vec3 n = normalize(cross(corners[1] - corners[0], corners[2] - corners[0]));
+  bool holds_foot = true;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 along = corners[(i + 1) % 3] - corners[i], d = p - corners[i];
+    const double s = std::clamp(dot(d, along) / length_squared(along), 0.0, 1.0);
+    nearest = std::min(nearest, length(d - along * s));
+    farthest = std::max(farthest, length(d));
+    holds_foot &= dot(cross(along, d), n) >= 0;
+  }
+  if (holds_foot) nearest = std::abs(dot(p - corners[0], n));
+  return {nearest, farthest};
+}
 
 std::shared_ptr<ReadyScene> ready_scene(const Scene& source, const TangentBasis* basis, const FollowOptions& follow,
                                         SceneCache* cache) {
@@ -43,6 +61,12 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
       scene(ready->scene),
       every_gate(gates),
       cache_(cache) {
+  const bool derives = basis && basis->columns > 0;
+  if (derives && options.keep_length == true && !mix.keep_length)
+    throw InputError(
+        "estimator.keep_length: paths cannot keep their lengths in captures, with lights without an extent, glass, "
+        "standard sampling or "
+        "gates of any length (allowed here: false)");
   if (gates.shape().is_dirac()) check_dirac();
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
   // (measured on the cube and the box, 0.1 % to 10 %).
@@ -58,21 +82,20 @@ void Passes::check_dirac() const {
   if (!mix.keep_length)
     throw InputError(
         "gates.kind: derivatives under dirac gates need paths that keep their lengths: a camera, emitters that are all "
-        "shapes, and no `keep_length: false` (allowed here: any other kind, or gradient.method: finite_difference)");
+        "shapes, no glass, and no `keep_length: false` (allowed here: any other kind, or gradient.method: "
+        "finite_difference)");
   if (!scene.differentiable.lengths) return;
   for (const int t : scene.emitters.triangles()) {
     if (!(scene.height_over(t, scene.camera.position) > 0)) continue;
     const auto corners = scene.corners(t);
     if (scene.camera.misses_image(corners[0], corners[1], corners[2])) continue;
-    double nearest = scene.height_over(t, scene.camera.position), farthest = 0;
-    for (const Vec3& p : corners) farthest = std::max(farthest, length(p - scene.camera.position));
+    const auto [nearest, farthest] = distances(scene.camera.position, corners);
     for (int g = 0; g < gates.size(); ++g)
       if (gates.center(g) >= nearest && gates.center(g) <= farthest)
-        throw InputError(
-            fmt::format("gates.centers: the camera may see the emitter '{}' at the length {:.6g}, where a derivative "
-                        "under dirac gates is not "
-                        "known (allowed: lengths outside of {:.6g} to {:.6g}, or any other kind)",
-                        scene.shape_of(t).name, gates.center(g), nearest, farthest));
+        throw InputError(fmt::format(
+            "gates.centers: the camera may see the emitter '{}' at the length {:.6g}, where a derivative "
+            "under dirac gates is not known (allowed: lengths outside of {:.6g} to {:.6g}, or any other kind)",
+            scene.shape_of(t).name, gates.center(g), nearest, farthest));
   }
 }
 
@@ -151,8 +174,9 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
       points.in_image(of_pairs, pixel, share * used.camera_pairs,
                       [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale / used.camera_pairs, rng); });
     const double rate = worker.pick.rate(pixel), walks = rate * used.walk;
-    points.in_pixel(Technique::walk, pixel, walks * share,
-                    [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
+    if (of_walks.value || of_walks.pairs)
+      points.in_pixel(Technique::walk, pixel, walks * share,
+                      [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
     points.in_pixel(Technique::standard, pixel, rate * (1 - share),
                     [&](Rng& rng) { standard.start(pixel, scale / rate, rng); });
   });

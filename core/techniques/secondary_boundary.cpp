@@ -5,8 +5,6 @@
 #include <limits>
 
 #include "core/paths/length_flow.h"
-#include "core/techniques/shadow_line.h"
-#include "core/techniques/shadowed_length.h"
 
 namespace isochron {
 namespace {
@@ -306,112 +304,6 @@ void SecondaryBoundary::connect_edge(int pixel, const Rgb& throughput, const Bou
   g.y = BoundaryEdges::Sample(pick);
   if (join_camera_path(g, pixel, throughput)) finish(g, Found::from_camera, rng);
   worker_.sink.note_guide(camera_table(pixel, worker_.path.size() - 1), pick.x());
-}
-
-void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng) {
-  const double u_edge = rng.fine_uniform(), u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-  double pdf_area;
-  const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
-  if (is_light(emitter)) return;
-  Segment g;
-  const int table = camera_table(pixel, worker_.path.size() - 1);
-  g.y = edges_.sample_secondary(guide_.warp(table).sample(u_edge));
-  const double left = tau - worker_.path.length.back();
-  const ShadowLine line(scene_, worker_.path.back().p, *g.y.edge, emitter);
-  if (!(left > 0) || !(line.height > 0)) return;
-  // height^2 |p|^2 = left^2 (n.p)^2 with p = a + s c.
-  const double h2 = line.height * line.height, l2 = left * left;
-  const double an = dot(line.a, line.n), cn = dot(line.c, line.n);
-  const double q2 = h2 * dot(line.c, line.c) - l2 * cn * cn, q1 = h2 * dot(line.a, line.c) - l2 * an * cn,
-               q0 = h2 * dot(line.a, line.a) - l2 * an * an;
-  const double discriminant = q1 * q1 - q0 * q2;
-  if (!(discriminant >= 0)) return;
-  const double q = -(q1 + std::copysign(std::sqrt(discriminant), q1));
-  for (const double s : {q / q2, q0 / q}) {
-    if (!(s > 0 && s < 1) || !line.casts(s)) continue;
-    g.y.s = s;
-    g.y.y = g.y.edge->point(s);
-    if (deliver_at_length(g, pixel, emitter, throughput, tau)) worker_.sink.note_guide(table, g.y.x());
-  }
-}
-
-bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau) {
-  if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) return false;
-  const Connection& c = connections_[0];
-  const double rate = length_over_random(g, c, tau);
-  const Rgb radiance = scene_.emitted(g.light, -g.w);
-  if (!(rate > 0) || radiance.is_black()) return false;
-  const LocalDifferential& differential = with_kept_length(g, c, Found::from_camera);
-  if (differential.empty()) return false;
-  worker_.sink.bind(differential);
-  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
-  // Its share over its density is that of random edge points over theirs.
-  const double weight =
-      worker_.gates.shape().is_dirac() ? 1 / rate : BoundaryShares(c.camera_over_edge, rate).from_camera;
-  worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
-  return true;
-}
-
-void SecondaryBoundary::connect_pixel_at_length(int pixel, int axis, double scale, double tau, Rng& rng) {
-  const double u_edge = rng.fine_uniform(), other = rng.uniform(), start = rng.uniform();
-  const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-  double pdf_area;
-  const int emitter = scene_.sample_emitter(u0, u1, u2, pdf_area).triangle;
-  if (is_light(emitter)) return;
-  const CameraModel& camera = scene_.camera;
-  std::array<double, 2> image{static_cast<double>(pixel % camera.width), static_cast<double>(pixel / camera.width)};
-  const double border = image[axis];
-  image[1 - axis] += other;
-  const auto triangle_at = [&](double x) {
-    std::array<double, 2> at = image;
-    at[axis] = x;
-    return worker_.closest_camera_hit(camera.direction(at[0], at[1]));
-  };
-  const int triangle = triangle_at(border + start);
-  if (triangle < 0) return;
-  Segment g;
-  const int table = camera_table(pixel, 1);
-  g.y = edges_.sample_secondary(guide_.warp(table).sample(u_edge));
-  const auto root = ShadowedLength(scene_, triangle, g.y.y, emitter).solve(image, axis, tau);
-  if (!root || triangle_at(*root) != triangle) return;
-  image[axis] = *root;
-  const auto d = scene_.end_point(triangle, camera.position, camera.direction(image[0], image[1]));
-  if (!d || camera.project(d->p) != pixel) return;
-  worker_.start_at_sensor(worker_.path, pixel);
-  worker_.path.push(scene_, *d);
-  // One over the probability to start on the triangle, which nobody knows: the mean number of trials until one does.
-  int trials = 1;
-  while (triangle_at(border + rng.uniform()) != triangle) ++trials;
-  camera_densities_ = {};
-  if (deliver_at_length(g, pixel, emitter, Rgb(scale * trials), tau)) worker_.sink.note_guide(table, g.y.x());
-}
-
-double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c, double length) const {
-  if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
-  const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
-  const int t = g.light.triangle;
-  const Warp& warp = camera_warp(c.pixel, c.bounces);
-  const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
-  double rate = edge_probability / (g.y.share * warp.density(g.y.x())) * line.distance_rate(g.y.s);
-  if (c.bounces == 1 && !scene_.captures()) rate += rate_in_pixel(g, c.pixel);
-  return rate * scene_.emitter_pdf(t) * scene_.area(t) * worker_.pick.length_pdf(c.pixel, length);
-}
-
-double SecondaryBoundary::rate_in_pixel(const Segment& g, int pixel) const {
-  constexpr double kSame = 1e-6;  // pixels; several lengths may be right within a pixel, of which one is found
-  const CameraModel& camera = scene_.camera;
-  const std::array<double, 2> image = camera.image_point(g.camera_end.p);
-  const ShadowedLength lengths(scene_, g.camera_end.triangle, g.y.y, g.light.triangle);
-  const auto here = lengths.at(image);
-  if (!here) return 0;
-  double rate = 0;
-  for (int axis = 0; axis < 2; ++axis) {
-    std::array<double, 2> from = image;
-    from[axis] = axis == 0 ? pixel % camera.width : pixel / camera.width;
-    const auto root = lengths.solve(from, axis, here->length);
-    if (root && std::abs(*root - image[axis]) < kSame) rate += std::abs(here->rate[axis]);
-  }
-  return rate;
 }
 
 bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throughput) {

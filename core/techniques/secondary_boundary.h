@@ -1,4 +1,4 @@
-// Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Four ways
+// Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Several ways
 // to find such segments, combined by multiple importance sampling (balance heuristic; BoundaryShares):
 //   - from the edge, direction within the wedge of grazing directions;
 //   - from the edge, aimed at a point on an emitter;

@@ -146,6 +146,26 @@ Failure failure(const Direction& d, bool reference_resolved, double error_ratio)
   return Failure::descent;
 }
 
+namespace {
+
+/// Empty where the derivative is known under Dirac gates.
+std::string why_not_dirac(const Experiment& experiment, const std::vector<double>& theta) {
+  Experiment narrow = experiment;
+  narrow.gates = with_relative_width(experiment.gates, 0);
+  automatic_method().change(narrow);
+  try {
+    const Problem problem(narrow);
+    const Scene scene = problem.parameters().apply(theta);
+    const TangentBasis basis = problem.parameters().tangent(theta);
+    problem.renderer(scene, problem.estimator(), &basis);
+    return {};
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+}  // namespace
+
 bool may_find(const Method& method, Experiment experiment) {
   if (!make_gates(experiment.gates).shape().is_dirac()) return true;
   method.change(experiment);
@@ -190,9 +210,16 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     std::erase_if(all, [](const Method& m) { return m.gradient == Method::Gradient::finite_difference; });
     map.notes.push_back(fmt::format("{} unknowns: no finite differences", theta.size()));
   }
-  const double of_width = options.core_seconds / static_cast<double>(options.widths.size());
-  ProgressStage stage("mapping", static_cast<int>(options.widths.size()));
-  for (double width : options.widths) {
+  std::vector<double> widths = options.widths;
+  std::erase_if(widths, [&](double width) {
+    if (width > 0) return false;
+    const std::string refusal = why_not_dirac(experiment, theta);
+    if (!refusal.empty()) map.notes.push_back("no Dirac gates: " + refusal);
+    return !refusal.empty();
+  });
+  const double of_width = options.core_seconds / static_cast<double>(widths.size());
+  ProgressStage stage("mapping", static_cast<int>(widths.size()));
+  for (double width : widths) {
     options.progress(fmt::format("width {:.3g}", width));
     Experiment narrow = experiment;
     narrow.gates = with_relative_width(experiment.gates, width);

@@ -134,7 +134,7 @@ void describe_estimator(Keys& keys, Experiment& e) {
   keys.value("keep_length", keep_length(options.keep_length),
              "emitters' points move so that paths keep their lengths: derivatives do not act on gates, which may be as "
              "narrow as "
-             "Dirac's. Not for captures or lights without an extent",
+             "Dirac's. Not for captures, lights without an extent or glass",
              {.unset = !options.keep_length, .otherwise = "where gates are narrower than 2 % of the smallest emitter"});
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");

@@ -91,7 +91,7 @@ TEST(ConnectionRates, AutomaticSamplingFindsWhatPays) {
   for (int v = 0; v < cube.vertex_count; ++v) scene.positions[cube.first_vertex + v].y += 0.1;
   const TangentBasis basis = make_basis(scene, {translate(scene, "cube", {0, 1, 0})});
   const GateSet gates(GateShape::gaussian(0.0054), {5.4});
-  EstimatorOptions options{.max_bounces = 1};
+  EstimatorOptions options{.max_bounces = 1, .keep_length = false};
   const auto cost = [&](std::uint64_t seed) {
     const Renderer renderer(scene, gates, options, &basis);
     const Estimate mean = term_means(renderer, Term::interior, 1, 1, 4, 24, {seed, 0, 0})[0][0];
@@ -102,7 +102,7 @@ TEST(ConnectionRates, AutomaticSamplingFindsWhatPays) {
   // A trial misses it at times (seed 7), one of as many samples in fewer batches did so more often.
   int found = 0;
   for (std::uint64_t seed = 12; seed >= 1; --seed) {
-    options.mix = measure_mix(scene, gates, {.max_bounces = 1}, &basis, {seed, 0, 0}, Purpose::gradients);
+    options.mix = measure_mix(scene, gates, {.max_bounces = 1, .keep_length = false}, &basis, {seed, 0, 0}, Purpose::gradients);
     found += options.mix->interior_rates.camera_pairs > 5 * options.mix->interior_rates.walk;
   }
   EXPECT_GE(found, 11);

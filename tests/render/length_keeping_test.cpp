@@ -169,6 +169,35 @@ TEST(LengthKeeping, DiracGatesOfThreeBounces) {
                 64);
 }
 
+/// Gradients of a loss whose pixels and gates count unevenly: how often lengths are drawn for one then enters all weights.
+TEST(LengthKeeping, GradientsUnderUnevenAdjoints) {
+  const Scene scene = floor_in_shadow();
+  const TangentBasis basis = make_basis(scene, {translate(scene, "lamp", {0.3, 1, 0.2})});
+  const GateSet gates(GateShape::gaussian(0.03), {5.4, 5.7, 6.0});
+  GatedImage adjoint(8, 8, 3, 1);
+  for (int pixel = 0; pixel < adjoint.pixels(); ++pixel)
+    for (int g = 0; g < 3; ++g) adjoint.at(pixel, g) = pixel % 3 == g ? 0 : (1.0 + pixel % 8) * std::pow(5.0, -g);
+  const auto gradient = [&](bool keep) {
+    EstimatorOptions options = kDirect;
+    options.keep_length = keep;
+    const Renderer renderer(scene, gates, options, &basis);
+    Batches batches;
+    for (int b = 0; b < 64; ++b) {
+      std::vector<double> dofs(DofLayout(scene).size(), 0.0);
+      for (const Term term : kTerms)
+        renderer.add_gradient(term, adjoint,
+                              {test_seed(4), static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(term)},
+                              {0, samples_of(term, 128)}, dofs);
+      batches.add(basis.transpose_apply(dofs)[0]);
+    }
+    return batches.estimate();
+  };
+  const Estimate kept = gradient(true), pairs = gradient(false);
+  EXPECT_LT(std::abs(z_score(kept, pairs)), 4.5)
+      << kept.mean << " +- " << kept.standard_error << ", by pairs " << pairs.mean << " +- " << pairs.standard_error;
+  EXPECT_LT(std::hypot(kept.standard_error, pairs.standard_error), 0.1 * std::abs(pairs.mean));
+}
+
 TEST(LengthKeeping, DiracGatesSayWhatTheyCannot) {
   Scene scene = floor_under_lamp(0.5, 1.5);
   const TangentBasis basis = make_basis(scene, {translate(scene, "lamp", {0, 1, 0})});
@@ -176,6 +205,7 @@ TEST(LengthKeeping, DiracGatesSayWhatTheyCannot) {
   EXPECT_THROW(Renderer(scene, gates, {.sampling = Sampling::standard}), InputError);
   EXPECT_NO_THROW(Renderer(scene, gates, {}, &basis));
   EXPECT_THROW(Renderer(scene, gates, {.keep_length = false}, &basis), InputError);
+  EXPECT_THROW(Renderer(scene, gates, {.sampling = Sampling::standard, .keep_length = true}, &basis), InputError);
   // A lamp in the image, at distances of 4.5 and more.
   add_shape(scene, "seen", quad({-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}), diffuse(Rgb(0.0)), Rgb(10));
   EXPECT_THROW(Renderer(scene, GateSet(GateShape::dirac(), {4.2}), {}, &basis), InputError);
