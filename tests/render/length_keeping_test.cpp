@@ -187,7 +187,7 @@ TEST(LengthKeeping, GradientsUnderUnevenAdjoints) {
       for (const Term term : kTerms)
         renderer.add_gradient(term, adjoint,
                               {test_seed(4), static_cast<std::uint32_t>(b), static_cast<std::uint32_t>(term)},
-                              {0, samples_of(term, 128)}, dofs);
+                              {0, samples_of(term, 512)}, dofs);
       batches.add(basis.transpose_apply(dofs)[0]);
     }
     return batches.estimate();
