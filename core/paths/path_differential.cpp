@@ -105,18 +105,11 @@ void to_light(const PreparedScene& scene, const SurfacePoint& y, const Accumulat
 /// that `g` and `out` say of it, changes ln F by -dl (X . grad ln F + div X) - X . grad dl. For one channel of ln F, or all (-1).
 void keep_length(const PreparedScene& scene, const LengthFlow& flow, const SurfacePoint* x, int count,
                  std::vector<Accumulated>& g, int channel, LocalDifferential& out) {
-  const SurfacePoint &q = x[count - 2], &y = x[count - 1];
+  const SurfacePoint& y = x[count - 1];
   const double rate = dot(flow.x, g[count - 1].position) + flow.spread;
-  const ShapeRecord* medium = scene.medium_between(q, y);
-  const int index = medium ? scene.layout.number(medium->material, medium->bsdf->index_number()) : -1;
-  bool index_counted = false;
-  for (std::size_t i = 0, end = out.scalars.size(); i < end; ++i) {
-    const ScalarGradient s = out.scalars[i];
-    if (s.length == 0) continue;
-    double log_f = -rate * s.length;
-    if (s.dof == index && !std::exchange(index_counted, true)) log_f -= 1 / medium->index;
-    out.scalars.push_back({s.dof, channel, log_f});
-  }
+  for (std::size_t i = 0, end = out.scalars.size(); i < end; ++i)
+    if (const ScalarGradient s = out.scalars[i]; s.length != 0)
+      out.scalars.push_back({s.dof, channel, -rate * s.length});
   const Vec3 of_y = g[count - 1].length;
   for (int k = 0; k < count; ++k) g[k].position -= std::exchange(g[k].length, {}) * rate;
   g[count - 1].position -= flow.turn;
@@ -289,7 +282,7 @@ void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoin
   const SurfacePoint& y = x[count - 1];
   std::optional<LengthFlow> kept;
   if (!length_only && count > 2 && scene.flows.keep_length()) {
-    kept.emplace(scene, x[count - 2], y);
+    kept.emplace(x[count - 2], y);
     if (!std::isfinite(dot(kept->x, kept->x))) {  // at the foot
       out.clear();
       return;

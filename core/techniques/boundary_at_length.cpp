@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/progress.h"
+#include "core/base/quadratic.h"
 #include "core/techniques/secondary_boundary.h"
 #include "core/techniques/shadow_line.h"
 #include "core/techniques/shadowed_length.h"
@@ -39,10 +40,9 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
   const double an = dot(line.a, line.n), cn = dot(line.c, line.n);
   const double q2 = h2 * dot(line.c, line.c) - l2 * cn * cn, q1 = h2 * dot(line.a, line.c) - l2 * an * cn,
                q0 = h2 * dot(line.a, line.a) - l2 * an * an;
-  const double discriminant = q1 * q1 - q0 * q2;
-  if (!(discriminant >= 0)) return;
-  const double q = -(q1 + std::copysign(std::sqrt(discriminant), q1));
-  for (const double s : {q / q2, q0 / q}) {
+  const auto roots = quadratic_roots(q2, q1, q0);
+  if (!roots) return;
+  for (const double s : *roots) {
     if (!(s > 0 && s < 1) || !line.casts(s)) continue;
     g.y.s = s;
     g.y.y = g.y.edge->point(s);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "core/base/quadratic.h"
 #include "core/base/systematic_sampling.h"
 #include "core/paths/length_flow.h"
 
@@ -68,7 +69,7 @@ std::optional<EmitterBorders::Point> EmitterBorders::pick(double u_emitter, doub
 }
 
 double EmitterBorders::outwards(const SurfacePoint& q, const Point& border) const {
-  return dot(LengthFlow(scene_, q, border.y).x, isochron::cross(border.tangent, border.y.n));
+  return dot(LengthFlow(q, border.y).x, isochron::cross(border.tangent, border.y.n));
 }
 
 double EmitterBorders::weight(double tau, int pixel, const Point& border, std::optional<double> pdf_on_arc) const {
@@ -102,10 +103,9 @@ void EmitterBorders::cross(int triangle, double radius, double inverse_probabili
     const Vec3 a = corners[i] - q.p, along = corners[(i + 1) % 3] - corners[i];
     // |a + s along| = radius
     const double c2 = length_squared(along), c1 = dot(a, along), c0 = length_squared(a) - radius * radius;
-    const double discriminant = c1 * c1 - c0 * c2;
-    if (!(discriminant > 0)) continue;
-    const double root = -(c1 + std::copysign(std::sqrt(discriminant), c1));
-    for (const double s : {root / c2, c0 / root}) {
+    const auto roots = quadratic_roots(c2, c1, c0);
+    if (!roots) continue;
+    for (const double s : *roots) {
       if (!(s > 0 && s < 1)) continue;
       const Vec3 tangent = along / std::sqrt(c2);
       const Point point{{corners[i] + along * s, n, triangle}, tangent, border_pdf};
