@@ -1,9 +1,11 @@
 // Paths that keep their lengths (theory section 7): the same derivatives as by coupled pairs, and under Dirac gates as finite
 // differences of images.
 //
-// Statistics: z-tests at 4.5 standard errors (false alarms: 7e-6 each, 5e-4 for the file) of differences whose standard error is
-// below 10 % of the case's largest term.
+// Statistics: z-tests at 4.5 standard errors (false alarms: 7e-6 each, 5e-4 for the file). Half of a case's derivatives must be known
+// to 5 % of its largest term. Not all: ends of circles have a tail of index 2, and a rare sample makes one error several times as large.
 #include <gtest/gtest.h>
+
+#include <algorithm>
 
 #include "core/base/error.h"
 #include "support.h"
@@ -72,14 +74,17 @@ Totals totals(const Scene& scene, const TangentBasis& basis, const GateSet& gate
 }
 
 void expect_equal(const Totals& ours, const std::vector<std::vector<Estimate>>& expected) {
+  std::vector<double> errors;
   for (std::size_t c = 0; c < expected.size(); ++c)
     for (std::size_t g = 0; g < expected[c].size(); ++g) {
       const Estimate &a = ours.sum[c][g], &b = expected[c][g];
+      errors.push_back(std::hypot(a.standard_error, b.standard_error));
       EXPECT_LT(std::abs(z_score(a, b)), 4.5) << "column " << c << ", gate " << g << ": " << a.mean << " +- "
                                               << a.standard_error << ", not " << b.mean << " +- " << b.standard_error;
-      EXPECT_LT(std::hypot(a.standard_error, b.standard_error), 0.1 * ours.largest_term)
-          << "column " << c << ", gate " << g;
     }
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>((errors.size() - 1) / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  EXPECT_LT(*middle, 0.05 * ours.largest_term);
 }
 
 void compare_with_pairs(const Scene& scene, const std::vector<Motion>& motions, const GateSet& gates,
