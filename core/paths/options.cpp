@@ -51,19 +51,22 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
   // equal at 3 % on the cube, at 1 % in the reference box (isochron_gate_width). An emitter that a gate sees as a point has no room
   // for points to move.
   constexpr double kSteep = 0.02;
-  if (gates.shape().is_unbounded() || options.sampling == Sampling::standard) return {0, 0};
-  SamplingMix mix{1, 1};
-  if (options.sampling == Sampling::automatic && !gates.shape().is_dirac()) {
-    if (scene.capture) return {0, 0};  // area sampling serves all gates at once
-    if (options.mix)
-      mix = *options.mix;
-    else if (gates.relative_coverage() >= kNarrow)
-      mix = {0, 0};
-  }
-  const bool possible = may_keep_length(scene);
+  const bool draws_lengths = !gates.shape().is_unbounded() && options.sampling != Sampling::standard;
+  const bool chooses = options.sampling == Sampling::automatic && !gates.shape().is_dirac();
+  SamplingMix mix;
+  if (chooses && options.mix && !scene.capture)
+    mix = *options.mix;
+  else if (draws_lengths)  // area sampling serves all gates of a capture at once
+    mix.image = mix.interior = !chooses || (!scene.capture && gates.relative_coverage() < kNarrow) ? 1 : 0;
+  if (!draws_lengths) mix.image = mix.interior = 0;
+  const bool possible = draws_lengths && may_keep_length(scene);
   if (possible && options.keep_length == true && mix.interior == 0) mix.interior = 1;
   mix.keep_length = mix.interior > 0 && possible &&
                     options.keep_length.value_or(gates.shape().width() < kSteep * emitter_size(scene));
+  // Light subpaths share what standard sampling takes.
+  if (options.light && !scene.capture) mix.image_light = mix.interior_light = *options.light;
+  if (mix.image == 1) mix.image_light = 0;
+  if (mix.interior == 1) mix.interior_light = 0;
   return mix;
 }
 

@@ -42,6 +42,8 @@ struct ConnectionRates {
 struct SamplingMix {
   double image = 0, interior = 0;
   ConnectionRates interior_rates = {}, path_length_rates = {};
+  /// Samples with light subpaths (LightSubpaths) per sample of standard sampling.
+  double image_light = 0, interior_light = 0;
   /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives do not act on the gates, but for light that the camera
   /// sees an emitter by. Needs connections in the interior term.
   bool keep_length = false;
@@ -59,6 +61,8 @@ struct EstimatorOptions {
   /// Whether paths keep their lengths, see SamplingMix and may_keep_length. True: connections take a share of the interior term.
   /// None: where they do and gates are narrow over the smallest emitter (the root of its area).
   std::optional<bool> keep_length = {};
+  /// SamplingMix::image_light and interior_light. None: those of `mix`. Not of captures.
+  std::optional<double> light = {};
   /// In [0, 1): as long as a path by standard sampling has met no area-sampled shape (Shape::hidden), the probability that its
   /// next vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the cosine of a capture's wall. None: the
   /// default, see Worker. For paths of cameras, and after x1 in captures, it applies to derivatives only.

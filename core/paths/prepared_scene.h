@@ -215,6 +215,17 @@ class PreparedScene {
     return shapes_[shape_index(triangle)].emitter_pdf;
   }
 
+  /// The direction in which light leaves the point y of an emitter: of a shape by the cosine.
+  Vec3 sample_emission(const SurfacePoint& y, double u0, double u1) const {
+    return is_light(y.triangle) ? lights[light_number(y.triangle)].sample_direction(u0, u1)
+                                : sample_cosine(y.n, u0, u1);
+  }
+  /// Its density per solid angle.
+  double emission_pdf(const SurfacePoint& y, const Vec3& w) const {
+    if (is_light(y.triangle)) return lights[light_number(y.triangle)].direction_pdf(w);
+    return std::max(0.0, dot(y.n, w)) * kInvPi;
+  }
+
   /// Edges from corner 0 to corners 1 and 2.
   const Vec3 (&edges(int triangle) const)[2] { return records_[triangle].edge; }
   std::array<Vec3, 3> corners(int triangle) const {

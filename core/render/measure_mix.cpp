@@ -6,6 +6,7 @@
 
 #include "core/base/listed_sum.h"
 #include "core/image/stored_image.h"
+#include "core/render/light_rate.h"
 
 namespace isochron {
 namespace {
@@ -49,6 +50,10 @@ constexpr double kConnectionsWork = 4;
 /// nothing). For gradients neither is favoured: where standard sampling is twice as good (the tree's fourteen gates) trials
 /// see 1.2 to 4 times.
 constexpr double kCostHandicapOfStandard[] = {1.1, 1};
+
+/// Paths of the trial of light subpaths at most and, where the job is small, at least, and what each takes in paths by standard
+/// sampling: one without and one with light subpaths and all their joints.
+constexpr double kLightPaths = 16384, kFewestLightPaths = 2048, kLightWork = 8;
 
 double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;
@@ -157,7 +162,8 @@ struct Trial {
   const GateSet& gates;
   EstimatorOptions options;
   Purpose purpose;
-  double job;  ///< samples per pixel that it decides about
+  double job;    ///< samples per pixel that it decides about
+  double light;  ///< rate of light subpaths
 
   /// The best of kShares, or `by_width` where it cannot tell. `term`: of the derivative along one column; null: of images.
   double choose(double by_width, const TangentBasis* column, const Term* term, const Stream& stream,
@@ -179,6 +185,7 @@ struct Trial {
       per_batch[i] = std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]);
       EstimatorOptions trial = options;
       trial.mix = SamplingMix{kShares[i], kShares[i]};
+      trial.mix->image_light = trial.mix->interior_light = light;
       // Where paths keep their lengths, a part of the variance is another term's.
       trial.keep_length = false;
       // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
@@ -224,23 +231,37 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   double own_work = 0;
   double& work = trial_work ? *trial_work : own_work;
   work = 0;
-  if (options.sampling != Sampling::automatic || gates.shape().is_unbounded() || gates.shape().is_dirac() ||
-      scene.capture)
+  if (options.sampling != Sampling::automatic || gates.shape().is_dirac() || scene.capture)
     return sampling_mix(options, gates, scene);
-  const double width = gates.relative_width(), coverage = gates.relative_coverage();
+  const bool any_length = gates.shape().is_unbounded();
+  const double width = any_length ? 1 : gates.relative_width(), coverage = any_length ? 1 : gates.relative_coverage();
   EstimatorOptions plain = options;
   plain.mix.reset();
   const SamplingMix by_width = sampling_mix(plain, gates, scene);
   SamplingMix best;
+  // Next-event estimation finds light of one bounce. Standard sampling must have a part.
+  const auto choose_light = [&](const TrialWidths& widths, double samples, const TangentBasis* column) {
+    const double budget =
+        kTrialPart * pixels_of(scene) * samples - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+    const double paths = std::min(kLightPaths, budget / kLightWork);
+    if (options.light || options.max_bounces < 2 || coverage < widths.below_is_ellipsoidal ||
+        !(paths >= kFewestLightPaths))
+      return 0.0;
+    return measure_light_rate(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
+                              work);
+  };
   const auto choose = [&](const TrialWidths& widths, double otherwise, double samples, const TangentBasis* column,
                           const Term* term) {
+    const double light = term ? best.interior_light : best.image_light;
     if (coverage < widths.below_is_ellipsoidal) return 1.0;
     if (width > widths.above_is_standard) return 0.0;
-    return Trial{scene, gates, options, purpose, samples}.choose(otherwise, column, term, stream, work);
+    return Trial{scene, gates, options, purpose, samples, light}.choose(otherwise, column, term, stream, work);
   };
+  best.image_light = choose_light(kImage, job.image, nullptr);
   best.image = choose(kImage, by_width.image, job.image, nullptr, nullptr);
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
+  best.interior_light = choose_light(kInterior, job.interior, &one);
   // Only walks find paths of more bounces, and a trial cannot judge rare ones.
   const bool has_rates = options.max_bounces == 1;
   const Term interior = Term::interior;

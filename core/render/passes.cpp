@@ -12,6 +12,7 @@
 #include "core/base/partition_sum.h"
 #include "core/base/progress.h"
 #include "core/techniques/ellipsoidal.h"
+#include "core/techniques/light_subpaths.h"
 #include "core/techniques/primary_boundary.h"
 #include "core/techniques/sample_points.h"
 #include "core/techniques/secondary_boundary.h"
@@ -122,7 +123,7 @@ void Passes::run_images(const Pass& pass, Partition partition, Sink& sink) const
   Worker worker(scene, gates, options, every_gate, sink);
   GatePass lengths;
   lengths.value = true;
-  run_paths(worker, mix.image, {}, lengths, pass, partition);
+  run_paths(worker, mix.image, {}, mix.image_light, lengths, pass, partition);
   count(worker);
 }
 
@@ -133,12 +134,12 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
     lengths.value = true;
     lengths.pairs = interior_pairs();
     if (lengths.pairs) lengths.use = kValueOnly;
-    run_paths(worker, mix.interior, mix.interior_rates, lengths, pass, partition);
+    run_paths(worker, mix.interior, mix.interior_rates, mix.interior_light, lengths, pass, partition);
   } else if (term == Term::path_length) {
     lengths.pairs = true;
     lengths.part = PairPart::dirac;
     lengths.coupled = options.antithetic;
-    run_paths(worker, 1, mix.path_length_rates, lengths, pass, partition);
+    run_paths(worker, 1, mix.path_length_rates, 0, lengths, pass, partition);
   } else {
     run_visibility(worker, pass, partition);
   }
@@ -149,12 +150,12 @@ bool Passes::interior_pairs() const {
   return mix.interior > 0 && options.antithetic && scene.differentiable.lengths && any_slope();
 }
 
-void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths,
-                       const Pass& pass, Partition partition) const {
+void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, double light,
+                       const GatePass& lengths, const Pass& pass, Partition partition) const {
   const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
-  const ConnectionRates& used = worker.rates = share == 1 ? rates : ConnectionRates{};
-  worker.ellipsoidal_share = share;
-  worker.pair_coupling_gain = pair_coupling_gain_;
+  const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
+  const double light_rate = share == 1 ? 0 : light;
+  worker.balance.rates = {share, used, light_rate, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -162,6 +163,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   EllipsoidalConnections connections(worker, of_walks), camera_lengths(worker, single_lengths),
       camera_pairs(worker, pairs);
   StandardPaths standard(worker, lengths.pairs);
+  LightSubpaths light_subpaths(worker, lengths.pairs);
   const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
   const PointSet of_lengths = points.of_image(Technique::camera_lengths);
   const PointSet of_pairs = points.of_image(Technique::camera_pairs);
@@ -179,6 +181,8 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
                       [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
     points.in_pixel(Technique::standard, pixel, rate * (1 - share),
                     [&](Rng& rng) { standard.start(pixel, scale / rate, rng); });
+    points.in_pixel(Technique::light_subpath, pixel, rate * light_rate * (1 - share),
+                    [&](Rng& rng) { light_subpaths.sample(pixel, scale / rate, splat_scale, rng); });
   });
   standard.finish();
 }

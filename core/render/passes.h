@@ -54,8 +54,10 @@ class Passes {
   /// Whether the term can be other than zero, so that a pass over it is worth while.
   bool has(Term term) const;
   /// Whether every sample of images or of the term adds to its own pixel only, and pixels are statistically independent.
-  bool stays_in_pixels() const { return mix.image == 0 || scene.captures(); }
-  bool stays_in_pixels(Term term) const { return (term == Term::interior && mix.interior == 0) || scene.captures(); }
+  bool stays_in_pixels() const { return (mix.image == 0 && mix.image_light == 0) || scene.captures(); }
+  bool stays_in_pixels(Term term) const {
+    return (term == Term::interior && mix.interior == 0 && mix.interior_light == 0) || scene.captures();
+  }
 
   /// Whether the term draws lengths from the gates.
   bool draws_lengths(Term term) const {
@@ -122,9 +124,9 @@ class Passes {
   bool interior_pairs() const;
 
   /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling. `rates` hold where
-  /// there are no others.
-  void run_paths(Worker& worker, double share, const ConnectionRates& rates, const GatePass& lengths, const Pass& pass,
-                 Partition partition) const;
+  /// there are no others; `light` samples with light subpaths come with each standard one.
+  void run_paths(Worker& worker, double share, const ConnectionRates& rates, double light, const GatePass& lengths,
+                 const Pass& pass, Partition partition) const;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
 
   void learn() const;

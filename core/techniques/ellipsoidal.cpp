@@ -6,35 +6,6 @@
 #include "core/techniques/ellipsoidal_impl.h"
 
 namespace isochron {
-double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
-                         double ArcDensities::*technique, double pdf_on_arc) {
-  const GatePick& pick = worker.pick;
-  // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
-  // densities of the length differ between the two techniques.
-  const bool same_length_pdf = pick.uniform() || path.size() != 3;
-  const double camera_rate = target.pair ? worker.rates.camera_pairs : worker.rates.camera_lengths;
-  const ArcDensities d = worker.techniques.arcs(path, technique, pdf_on_arc, false, [&](int from) {
-    const double rate = from == 0 ? camera_rate : worker.rates.walk;
-    if (same_length_pdf) return rate;
-    const int served = from == 0 ? GatePick::kImage : pixel;
-    // A pair serves one gate.
-    return rate * (from == 0 ? 1 : pick.rate(pixel)) *
-           (target.pair ? pick.probability(served, target.gate) : pick.length_pdf(served, target.tau[side]));
-  });
-  const double sum = d.surface + d.emitter;
-  if (!(sum > 0)) return 0;
-  // No other technique finds lengths at a jump.
-  const double share = worker.ellipsoidal_share, gain = target.pair ? worker.pair_coupling_gain : 1;
-  const double ours =
-      target.jump[side] || share == 1 ? 1 : worker.techniques.ellipsoidal_weight(path, pixel, share, gain);
-  return ours / share * (d.*technique / sum);
-}
-
-double gathered_weight(const Worker& worker, const Path& path, double ArcDensities::*technique, double pdf_on_arc) {
-  const ArcDensities d = worker.techniques.arcs(path, technique, pdf_on_arc, true, [](int) { return 1.0; });
-  const double sum = d.surface + d.emitter;
-  return sum > 0 ? d.*technique / sum : 0;
-}
 
 void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
   worker_.start_at_sensor(worker_.path, 0);
@@ -243,8 +214,8 @@ void EllipsoidalConnections::deliver(const TargetLength& target, int i, const Ar
                                      double inverse_probability, double ArcDensities::*technique) {
   if (!receiver_ && !worker_.contributes(worker_.path)) return;
   const double weight = receiver_
-                            ? gathered_weight(worker_, worker_.path, technique, found.pdf)
-                            : connection_weight(worker_, worker_.path, found.pixel, target, i, technique, found.pdf);
+                            ? worker_.balance.gathered(worker_.path, technique, found.pdf)
+                            : worker_.balance.connection(worker_.path, found.pixel, target, i, technique, found.pdf);
   const Rgb value = found.value * (inverse_probability * weight * target.scale);
   if (receiver_)
     receiver_->take(target.index, worker_.path.size() - 2, value);

@@ -22,15 +22,6 @@
 
 namespace isochron {
 
-/// Multiple importance weight of the complete path of a pixel, whose length is that side of the target: that of connections by
-/// `technique`, over the connections' share of the samples. `pdf_on_arc`: of the point that was found, per
-/// area and length.
-double connection_weight(const Worker& worker, const Path& path, int pixel, const TargetLength& target, int side,
-                         double ArcDensities::*technique, double pdf_on_arc);
-
-/// The same of a path that was gathered for its vertex 0: only techniques by arcs share it.
-double gathered_weight(const Worker& worker, const Path& path, double ArcDensities::*technique, double pdf_on_arc);
-
 /// Takes the light that EllipsoidalConnections::gather finds.
 class LengthReceiver {
  public:

@@ -73,23 +73,7 @@ double EmitterBorders::outwards(const SurfacePoint& q, const Point& border) cons
 }
 
 double EmitterBorders::weight(double tau, int pixel, const Point& border, std::optional<double> pdf_on_arc) const {
-  const Path& path = worker_.path;
-  const int last = path.size() - 1;
-  const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1], &y = path.vertex[last];
-  // How often each is tried, times the density of the length there.
-  const auto tries = [&](int from) {
-    const GatePick& pick = worker_.pick;
-    return from == 0 ? worker_.rates.camera_lengths * pick.length_pdf(GatePick::kImage, tau)
-                     : worker_.rates.walk * pick.rate(pixel) * pick.length_pdf(pixel, tau);
-  };
-  const double from_q = worker_.techniques.step_pdf(path, last - 2, q) *
-                        std::abs(dot(normalize(y.p - q.p), border.tangent)) * tries(last - 1);
-  const double by_arcs =
-      !scene_.outside(x, q)
-          ? 0
-          : border.pdf * (pdf_on_arc ? *pdf_on_arc : worker_.techniques.surface_arc_pdf(x, q, y)) * tries(last - 2);
-  const double sum = from_q + by_arcs;
-  return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / (sum * worker_.ellipsoidal_share) : 0;
+  return worker_.balance.border(worker_.path, pixel, tau, border.tangent, border.pdf, pdf_on_arc);
 }
 
 void EmitterBorders::cross(int triangle, double radius, double inverse_probability, const Rgb& throughput) {

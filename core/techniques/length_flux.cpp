@@ -51,7 +51,8 @@ void EllipsoidalConnections::connect_front(const TargetLength& target, int pixel
     const double circle = 2 * kPi * scene_.height_over(emitter, q.point.p);
     if (worker_.contributes(worker_.path))
       worker_.emit_length_flux(worker_.path, q.pixel,
-                               q.value * (-circle * inverse_probability / worker_.ellipsoidal_share), target.tau[0]);
+                               q.value * (-circle * inverse_probability / worker_.balance.rates.ellipsoidal_share),
+                               target.tau[0]);
     worker_.path.pop();
   });
 }

@@ -21,7 +21,8 @@ enum class Technique : std::uint32_t {
   pixel_border,
   from_edge,
   from_camera,
-  from_light
+  from_light,
+  light_subpath  ///< from the pixel and from an emitter
 };
 
 /// One of `count` parts of the samples of each pixel.

@@ -8,16 +8,6 @@ constexpr std::size_t kCachedTriangles = 1 << 13;
 
 }  // namespace
 
-GateWeights standard_weights(const Worker& worker, const Path& path, int pixel, bool pairs) {
-  const double share = worker.ellipsoidal_share;
-  if (!(share > 0)) return {};
-  const auto weight = [&](double gain) {
-    return (1 - worker.techniques.ellipsoidal_weight(path, pixel, share, gain)) / (1 - share);
-  };
-  const double of_value = weight(1);
-  return {of_value, pairs ? weight(worker.pair_coupling_gain) : of_value};
-}
-
 StandardPaths::StandardPaths(Worker& worker, bool pairs)
     : worker_(worker),
       large_(worker.scene.scene.triangles.size() > kCachedTriangles),
@@ -77,7 +67,7 @@ StandardPaths::Slot::Walk StandardPaths::Slot::begin(int pixel, double scale, Rn
 }
 
 void StandardPaths::Slot::emit(const Rgb& value) {
-  worker_.emit(path_, pixel_, value * scale_, path_.length.back(), standard_weights(worker_, path_, pixel_, pairs_));
+  worker_.emit(path_, pixel_, value * scale_, path_.length.back(), worker_.balance.standard(path_, pixel_, pairs_));
 }
 
 }  // namespace isochron

@@ -7,15 +7,11 @@
 
 namespace isochron {
 
-/// Multiple importance sampling of the worker's complete paths: the part of the path of a pixel that standard sampling takes, over
-/// its share of the samples. `pairs`: the slope of the gate is shared with ellipsoidal connections in coupled pairs.
-GateWeights standard_weights(const Worker& worker, const Path& path, int pixel, bool pairs);
-
 /// In a scene too large for the caches two paths are under way at a time and take turns: while one's next triangle comes
 /// from main memory, the other continues.
 class StandardPaths {
  public:
-  /// `pairs`: see standard_weights.
+  /// `pairs`: see Balance::standard.
   StandardPaths(Worker& worker, bool pairs);
 
   /// Starts a path through `pixel`; contributions are scaled by `scale`. It ends during later calls, of finish() at the

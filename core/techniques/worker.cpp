@@ -8,7 +8,7 @@ Worker::Worker(const PreparedScene& prepared, const GateSet& gate_set, const Est
       gates(gate_set),
       options(estimator),
       pick(gate_pick),
-      techniques(prepared, gate_pick),
+      balance(prepared, gate_pick),
       sink(target),
       differential_sink(target.differential()),
       path(estimator.max_bounces) {}

@@ -8,7 +8,7 @@
 #include "core/base/random.h"
 #include "core/films/sinks.h"
 #include "core/paths/options.h"
-#include "core/techniques/techniques.h"
+#include "core/techniques/balance.h"
 
 namespace isochron {
 
@@ -22,10 +22,7 @@ struct Worker {
   const GateSet& gates;
   const EstimatorOptions& options;
   const GatePick& pick;
-  double ellipsoidal_share = 0;   ///< of the samples; the others are standard
-  ConnectionRates rates = {};     ///< of ellipsoidal connections
-  double pair_coupling_gain = 1;  ///< factor on the density of coupled pairs in multiple importance sampling
-  Techniques techniques;
+  Balance balance;
   Sink& sink;
   const bool differential_sink;  ///< sink.differential()
   Path path;

@@ -102,10 +102,9 @@ void describe(Keys& keys, SampleSpec& s) {
              "`run` takes as many as of `interior`");
 }
 
-Field hidden_share(std::optional<double>& share) {
-  const NumberRange range{.low = 0, .high = 1, .high_open = true};
-  return {"number", range.describe(), [&share, range](const YamlValue& value) { share = value.number(range); },
-          [&share] { return fmt::format("{}", *share); }};
+Field optional_number(std::optional<double>& number, const NumberRange& range) {
+  return {"number", range.describe(), [&number, range](const YamlValue& value) { number = value.number(range); },
+          [&number] { return fmt::format("{}", *number); }};
 }
 
 Field keep_length(std::optional<bool>& keep) {
@@ -121,7 +120,7 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "coupled pairs for the gates' slopes, under ellipsoidal sampling");
   keys.value("pick", field::choice(options.pick), "which arc of an ellipsoid a connection takes");
   keys.value("numbers", field::choice(options.numbers), "the random numbers of a pixel's samples");
-  keys.value("hidden", hidden_share(options.hidden),
+  keys.value("hidden", optional_number(options.hidden, {.low = 0, .high = 1, .high_open = true}),
              "area sampling, for standard sampling: the probability that a step is drawn on `hidden_shapes`, until the "
              "path has met "
              "one. For derivatives, and for the first step from a capture's wall in images",
@@ -136,6 +135,11 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "narrow as "
              "Dirac's. Not for captures, lights without an extent or glass",
              {.unset = !options.keep_length, .otherwise = "where gates are narrower than 2 % of the smallest emitter"});
+  keys.value("light", optional_number(options.light, {.low = 0, .high = 100}),
+             "light subpaths: walks from the emitters, joined with the paths from the camera, per path by standard "
+             "sampling. For "
+             "light that leaves its case by a slit. Not of captures",
+             {.unset = !options.light, .otherwise = "`auto`: measured; else `0`"});
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");
   keys.value("follow", field::non_negative(options.follow),

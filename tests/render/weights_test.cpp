@@ -104,8 +104,8 @@ double part_of_connections(const Finder& f, const PathSink::Found& found, Target
   double sum = 0;
   for (const auto technique : kArcs)
     if (const double pdf = pdf_on_arc(f.prepared, found.path, technique); pdf > 0)
-      sum +=
-          f.worker.ellipsoidal_share * connection_weight(f.worker, found.path, found.pixel, target, 0, technique, pdf);
+      sum += f.worker.balance.rates.ellipsoidal_share *
+             f.worker.balance.connection(found.path, found.pixel, target, 0, technique, pdf);
   return sum;
 }
 
@@ -130,27 +130,49 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
     connections.sample_from_camera(1, rng);
   });
   ASSERT_GT(f.sink.found.size(), 1000u);
-  int shared = 0;
+  int shared = 0, shared_by_light = 0;
   for (const PathSink::Found& found : f.sink.found) {
-    f.worker.pair_coupling_gain = 7;
-    f.worker.rates = {};
+    f.worker.balance.rates.pair_coupling_gain = 7;
+    f.worker.balance.rates.connections = {};
     for (const double share : {0.3, 0.9}) {
-      f.worker.ellipsoidal_share = share;
-      const GateWeights standard = standard_weights(f.worker, found.path, found.pixel, true);
+      f.worker.balance.rates.ellipsoidal_share = share;
+      const GateWeights standard = f.worker.balance.standard(found.path, found.pixel, true);
       const double of_value = part_of_connections(f, found, {});
       EXPECT_NEAR(of_value + (1 - share) * standard.value, 1, 1e-9);
       for (int gate = 0; gate < 3; ++gate)
         EXPECT_NEAR(part_of_connections(f, found, pair_target(gate)) + (1 - share) * standard.slope, 1, 1e-9);
       shared += of_value > 0.01 && standard.value > 0.01;
     }
+    // Of light subpaths, by every joint.
+    for (const double light : {0.25, 3.0}) {
+      f.worker.balance.rates.light = light;
+      for (const double share : {0.0, 0.3}) {
+        f.worker.balance.rates.ellipsoidal_share = share;
+        GateWeights sum = f.worker.balance.standard(found.path, found.pixel, true);
+        double of_light = 0;
+        for (int joint = 0; joint <= found.path.size() - 3; ++joint) {
+          const GateWeights part = f.worker.balance.light(found.path, found.pixel, joint, true);
+          of_light += light * part.value;
+          sum.slope += light * part.slope;
+        }
+        sum.value += of_light;
+        const double by_arcs = share > 0 ? part_of_connections(f, found, {}) : 0;
+        EXPECT_NEAR(by_arcs + (1 - share) * sum.value, 1, 1e-9);
+        const double pairs = share > 0 ? part_of_connections(f, found, pair_target(1)) : 0;
+        EXPECT_NEAR(pairs + (1 - share) * sum.slope, 1, 1e-9);
+        shared_by_light += of_light > 0.01 && of_light < 0.99;
+      }
+    }
+    f.worker.balance.rates.light = 0;
     // By themselves, and at jumps, which standard sampling does not find.
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
-    f.worker.ellipsoidal_share = 1;
-    f.worker.rates = {0.3, 2, 0.1};
+    f.worker.balance.rates.ellipsoidal_share = 1;
+    f.worker.balance.rates.connections = {0.3, 2, 0.1};
     for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
       EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
   }
   EXPECT_GT(shared, 500);
+  EXPECT_GT(shared_by_light, 500);
 }
 
 /// Of two bounces' paths, surface arcs come from the camera and serve the whole image, emitter arcs serve a pixel: what each
@@ -158,8 +180,8 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
 TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
   Finder f = finder();
   f.find_by_standard_sampling(4000);
-  f.worker.ellipsoidal_share = 1;
-  f.worker.rates = {0.3, 2, 0.1};
+  f.worker.balance.rates.ellipsoidal_share = 1;
+  f.worker.balance.rates.connections = {0.3, 2, 0.1};
   int compared = 0;
   for (const auto& [path, pixel, value] : f.sink.found) {
     const double surface = pdf_on_arc(f.prepared, path, kArcs[0]), emitter = pdf_on_arc(f.prepared, path, kArcs[1]);
@@ -171,17 +193,17 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
                         f.prepared.pixels() * f.pick.rate(pixel);
     const auto expect_ratio = [&](TargetLength target, double camera_rate, double of_image, double of_pixel) {
       target.tau[0] = path.length.back();
-      const double by_surface = connection_weight(f.worker, path, pixel, target, 0, kArcs[0], surface),
-                   by_emitter = connection_weight(f.worker, path, pixel, target, 0, kArcs[1], emitter);
+      const double by_surface = f.worker.balance.connection(path, pixel, target, 0, kArcs[0], surface),
+                   by_emitter = f.worker.balance.connection(path, pixel, target, 0, kArcs[1], emitter);
       const double expected = f.prepared.emitter_pdf(y.triangle) * surface * camera_rate * of_image /
-                              (walk * emitter * f.worker.rates.walk * of_pixel);
+                              (walk * emitter * f.worker.balance.rates.connections.walk * of_pixel);
       EXPECT_NEAR(by_surface / by_emitter, expected, 1e-9 * expected);
     };
     for (int gate = 0; gate < 3; ++gate)
-      expect_ratio(pair_target(gate), f.worker.rates.camera_pairs, f.pick.probability(GatePick::kImage, gate),
-                   f.pick.probability(pixel, gate));
+      expect_ratio(pair_target(gate), f.worker.balance.rates.connections.camera_pairs,
+                   f.pick.probability(GatePick::kImage, gate), f.pick.probability(pixel, gate));
     const double length = path.length.back();
-    expect_ratio({}, f.worker.rates.camera_lengths, f.pick.length_pdf(GatePick::kImage, length),
+    expect_ratio({}, f.worker.balance.rates.connections.camera_lengths, f.pick.length_pdf(GatePick::kImage, length),
                  f.pick.length_pdf(pixel, length));
     ++compared;
   }
@@ -192,7 +214,7 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
 TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
   for (const bool from_camera : {true, false}) {
     Finder f = finder();
-    f.worker.ellipsoidal_share = 0.3;
+    f.worker.balance.rates.ellipsoidal_share = 0.3;
     f.find_by_connections(4000, [&](EllipsoidalConnections& connections, int pixel, Rng& rng) {
       from_camera ? connections.sample_from_camera(1, rng) : connections.sample_walk(pixel, 1, rng);
     });
@@ -219,7 +241,7 @@ TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
       TargetLength target;
       target.tau[0] = path.length.back();
       expected *=
-          connection_weight(f.worker, path, pixel, target, 0, technique, pdf_on_arc(f.prepared, path, technique)) *
+          f.worker.balance.connection(path, pixel, target, 0, technique, pdf_on_arc(f.prepared, path, technique)) *
           static_cast<double>(triangles.size()) / density;
       EXPECT_NEAR(value.r, expected.r, 1e-6 * expected.r);
       ++compared;
@@ -262,7 +284,7 @@ TEST(GatheredWeights, AddUpToOne) {
       double sum = 0, most = 0;
       for (const auto technique : kArcs)
         if (const double pdf = pdf_on_arc(worker->scene, worker->path, technique); pdf > 0) {
-          const double weight = gathered_weight(*worker, worker->path, technique, pdf);
+          const double weight = worker->balance.gathered(worker->path, technique, pdf);
           sum += weight;
           most = std::max(most, weight);
         }

@@ -7,6 +7,7 @@
 
 #include "core/base/constants.h"
 #include "core/base/description.h"
+#include "core/base/frame.h"
 #include "core/base/vec.h"
 
 namespace isochron {
@@ -45,14 +46,28 @@ struct PointLight {
     if (!(value > 0)) return {};
     return {direction * (slope / value), w * (slope / value)};
   }
+  /// A direction in which light leaves: of a point uniform, of a spot uniform in its cone, of a wall by the cosine.
+  Vec3 sample_direction(double u0, double u1) const {
+    if (kind == Kind::wall) return sample_cosine(direction, u0, u1);
+    const double cosine = 1 - u0 * spread(), sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
+    const SineCosine phi = sincos_2pi(u1);
+    return Frame(direction).to_world({sine * phi.cosine, sine * phi.sine, cosine});
+  }
+  /// Its density per solid angle.
+  double direction_pdf(const Vec3& w) const {
+    const double cosine = dot(w, direction);
+    if (kind == Kind::wall) return cosine > 0 ? cosine * kInvPi : 0;
+    return cosine >= 1 - spread() ? 1 / (2 * kPi * spread()) : 0;
+  }
   /// What it is picked by, comparable to area x radiance of a shape.
   double power() const {
     if (kind == Kind::wall) return 1;
-    const double part = kind == Kind::point ? 2 : 1 - std::cos(cone * kPi / 180);
-    return 2 * part * intensity.max();
+    return 2 * spread() * intensity.max();
   }
 
  private:
+  /// Part of the sphere that it lights, times two.
+  double spread() const { return kind == Kind::point ? 2 : 1 - std::cos(cone * kPi / 180); }
   /// Falls from one to zero with the angle from the direction, by smoothstep; `slope`: by the angle's cosine.
   double fade(double cosine, double& slope) const {
     slope = 0;

@@ -1,0 +1,186 @@
+#include "core/techniques/balance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace isochron {
+
+template <class F>
+GateWeights Balance::for_value_and_slope(const Path& path, int pixel, bool pairs, F&& f) const {
+  if (!(rates.ellipsoidal_share > 0)) {
+    const double both = f(0.0);
+    return {both, both};
+  }
+  const double of_value = f(of_connections(path, pixel, 1));
+  return {of_value, pairs ? f(of_connections(path, pixel, rates.pair_coupling_gain)) : of_value};
+}
+
+GateWeights Balance::standard(const Path& path, int pixel, bool pairs) const {
+  if (!(rates.ellipsoidal_share > 0 || rates.light > 0)) return {};
+  const double of_standard = rates.light > 0 ? 1 / (1 + rates.light * light_ratio(path, pixel).all) : 1;
+  return for_value_and_slope(path, pixel, pairs, [&](double connections) {
+    return (1 - connections) / (1 - rates.ellipsoidal_share) * of_standard;
+  });
+}
+
+GateWeights Balance::light(const Path& path, int pixel, int camera_vertices, bool pairs) const {
+  const LightRatio ratio = light_ratio(path, pixel, camera_vertices);
+  const double of_light = ratio.of_joint / (1 + rates.light * ratio.all);
+  return for_value_and_slope(path, pixel, pairs, [&](double connections) {
+    return (1 - connections) / (1 - rates.ellipsoidal_share) * of_light;
+  });
+}
+
+LightRatio Balance::light_ratio(const Path& path, int pixel, int joint) const {
+  const int last = path.size() - 1;
+  const double rate = pick_.rate(pixel);
+  if (last < 2 || !(rate > 0)) return {};
+  const SurfacePoint& y = path.vertex[last];
+  LightRatio ratio;
+  // Per area of x(last - 1) from the emitter, over next-event estimation and BSDF sampling there.
+  const SurfacePoint& q = path.vertex[last - 1];
+  const double pdf_y = scene_.emitter_pdf(y.triangle);
+  double product = pdf_y / (pdf_y + (is_light(y.triangle) ? 0 : step_pdf(path, last - 1, y)));
+  double from_light = scene_.emission_pdf(y, normalize(q.p - y.p)) * solid_angle_to_area(y.p, q);
+  for (int k = last - 1; k > 0; --k) {
+    product *= from_light / step_pdf(path, k - 1, path.vertex[k]);
+    // A light subpath is drawn for every sample of any pixel, and may be seen in every other.
+    const double of_joint = k == 1 ? product / rate : product;
+    ratio.all += of_joint;
+    if (k - 1 == joint) ratio.of_joint = of_joint;
+    if (k == 1) break;
+    const SurfacePoint &x = path.vertex[k], &next = path.vertex[k - 1];
+    const Scattering s(next.p, x, path.vertex[k + 1].p);
+    from_light = scene_.bsdf_of(x.triangle).pdf(s.reversed()) * solid_angle_to_area(x.p, next);
+  }
+  return std::isfinite(ratio.all) ? ratio : LightRatio{};
+}
+
+/// `length_pdf(k)`: density of the path's length in connections of x(k), times the number of samples that make them.
+/// `walks_only`: x0 makes no connections (it is no camera).
+template <class LengthPdf>
+ArcDensities Balance::arcs(const Path& path, double ArcDensities::*found, double pdf_on_arc, bool walks_only,
+                           LengthPdf&& length_pdf) const {
+  const int last = path.size() - 1;
+  const SurfacePoint& y = path.vertex[last];
+  const bool by_emitter = found == &ArcDensities::emitter;
+  if (is_light(y.triangle)) return {1, 0};  // no circle goes through a point
+  if (last == 1) return {0, pdf_on_arc * length_pdf(0)};
+  if (walks_only && last == 2) return {0, 1};
+  const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
+  ArcDensities d;
+  if (!scene_.outside(q, y)) return d;
+  d.emitter = step_pdf(path, last - 2, q) * (by_emitter ? pdf_on_arc : emitter_arc_pdf(q, y)) * length_pdf(last - 1);
+  if (scene_.outside(x, q))
+    d.surface =
+        scene_.emitter_pdf(y.triangle) * (by_emitter ? surface_arc_pdf(x, q, y) : pdf_on_arc) * length_pdf(last - 2);
+  return d;
+}
+
+double Balance::connection(const Path& path, int pixel, const TargetLength& target, int side,
+                           double ArcDensities::*technique, double pdf_on_arc) const {
+  // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
+  // densities of the length differ between the two techniques.
+  const bool same_length_pdf = pick_.uniform() || path.size() != 3;
+  const double camera_rate = target.pair ? rates.connections.camera_pairs : rates.connections.camera_lengths;
+  const ArcDensities d = arcs(path, technique, pdf_on_arc, false, [&](int from) {
+    const double rate = from == 0 ? camera_rate : rates.connections.walk;
+    if (same_length_pdf) return rate;
+    const int served = from == 0 ? GatePick::kImage : pixel;
+    // A pair serves one gate.
+    return rate * (from == 0 ? 1 : pick_.rate(pixel)) *
+           (target.pair ? pick_.probability(served, target.gate) : pick_.length_pdf(served, target.tau[side]));
+  });
+  const double sum = d.surface + d.emitter;
+  if (!(sum > 0)) return 0;
+  // No other technique finds lengths at a jump.
+  const double share = rates.ellipsoidal_share, gain = target.pair ? rates.pair_coupling_gain : 1;
+  const double ours = target.jump[side] || share == 1 ? 1 : of_connections(path, pixel, gain);
+  return ours / share * (d.*technique / sum);
+}
+
+double Balance::gathered(const Path& path, double ArcDensities::*technique, double pdf_on_arc) const {
+  const ArcDensities d = arcs(path, technique, pdf_on_arc, true, [](int) { return 1.0; });
+  const double sum = d.surface + d.emitter;
+  return sum > 0 ? d.*technique / sum : 0;
+}
+
+double Balance::border(const Path& path, int pixel, double tau, const Vec3& tangent, double border_pdf,
+                       std::optional<double> pdf_on_arc) const {
+  const int last = path.size() - 1;
+  const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1], &y = path.vertex[last];
+  // How often each is tried, times the density of the length there.
+  const auto tries = [&](int from) {
+    return from == 0 ? rates.connections.camera_lengths * pick_.length_pdf(GatePick::kImage, tau)
+                     : rates.connections.walk * pick_.rate(pixel) * pick_.length_pdf(pixel, tau);
+  };
+  const double from_q = step_pdf(path, last - 2, q) * std::abs(dot(normalize(y.p - q.p), tangent)) * tries(last - 1);
+  const double by_arcs =
+      !scene_.outside(x, q) ? 0 : border_pdf * (pdf_on_arc ? *pdf_on_arc : surface_arc_pdf(x, q, y)) * tries(last - 2);
+  const double sum = from_q + by_arcs;
+  return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / (sum * rates.ellipsoidal_share) : 0;
+}
+
+/// The part of connections, whose density is multiplied by `gain`, against all other techniques.
+double Balance::of_connections(const Path& path, int pixel, double gain) const {
+  const int last = path.size() - 1;
+  const SurfacePoint& y = path.vertex[last];
+  const double length = path.length[last], pdf_y = scene_.emitter_pdf(y.triangle);
+  const double to_y = length - path.length[last - 1];
+  // The arc that an emitter of this size leaves on a sphere of this radius.
+  const double across = std::min(1 / std::sqrt(pdf_y), 2 * kPi * to_y);
+  const double rate = pick_.rate(pixel);  // of walks through the pixel
+  double standard, ellipsoidal;
+  if (last == 1) {
+    standard = rate * step_pdf(path, 0, y);
+    ellipsoidal = pick_.length_pdf(GatePick::kImage, length) / across;
+  } else {
+    const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
+    if (!scene_.outside(q, y)) return 0;
+    const double to_q = path.length[last - 1] - path.length[last - 2], pdf_q = rate * step_pdf(path, last - 2, q);
+    standard = pdf_q * (pdf_y + step_pdf(path, last - 1, y));
+    // Ellipsoids cross the scene on a few closed curves, where dA = |q-a| |q-b| / sqrt(tau^2 - |P(b-a)|^2)
+    // dphi dtau.
+    constexpr double kCurves = 1;
+    const Vec3 d = y.p - x.p;
+    const double in_plane = isochron::length_squared(d) - dot(d, q.n) * dot(d, q.n);
+    const double area_rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
+    ellipsoidal = is_light(y.triangle) ? 0 : pdf_q * pick_.length_pdf(pixel, length) / across;
+    if (scene_.outside(x, q))
+      ellipsoidal += pdf_y *
+                     (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
+                     (2 * kPi * kCurves * area_rate);
+  }
+  if (rates.light > 0) standard *= 1 + rates.light * light_ratio(path, pixel).all;
+  const double ours = gain * rates.ellipsoidal_share * ellipsoidal;
+  return ours / (ours + (1 - rates.ellipsoidal_share) * standard);
+}
+
+/// Density per area with which a walk at the path's vertex `from` continues to q (from the camera: by a random point of a
+/// random pixel).
+double Balance::step_pdf(const Path& path, int from, const SurfacePoint& q) const {
+  const SurfacePoint& x = path.vertex[from];
+  const double to_area = solid_angle_to_area(x.p, q);
+  if (from == 0)
+    return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
+  const Scattering s(path.vertex[from - 1].p, x, q.p);
+  return scene_.bsdf_of(x.triangle).pdf(s) * to_area;
+}
+
+/// Density of q on its triangle's arc between foci x and y, per area and length.
+double Balance::surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const {
+  const Ellipsoid ellipsoid(x.p, y.p, length(q.p - x.p) + length(q.p - y.p));
+  EllipseArcs arcs;
+  if (!ellipsoid.valid() || !scene_.clip(ellipsoid, q.triangle, arcs)) return 0;
+  return 1 / (arcs.total_span * area_per_angle_and_length(ellipsoid, q.p, q.n));
+}
+
+/// Density of y on its emitter triangle's arc as seen from q, per area and length.
+double Balance::emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const {
+  const double distance = length(y.p - q.p);
+  EllipseArcs arcs;
+  if (!scene_.clip({q.p, q.p, 2 * distance}, y.triangle, arcs)) return 0;
+  return 1 / (arcs.total_span * distance);
+}
+
+}  // namespace isochron

@@ -1,0 +1,87 @@
+// How the techniques that may find a complete path share it: the one place of the weights of multiple importance sampling,
+// but for those within a technique (next-event estimation against the BSDF, area sampling) and those of boundaries.
+//
+// All by the balance heuristic: a technique takes the part of a path that it makes among all that may be made. Parts add up
+// to one whatever densities they come from, so long as all ask the same functions; contributions are divided by the true ones.
+//   standard sampling      from the camera, as densities per area of every vertex; Russian roulette and area sampling are left out
+//   light subpaths         the same from the emitter, joined behind each camera vertex, as ratios to standard sampling
+//   connections            an estimate: they choose among all the arcs that an ellipsoid leaves on the scene, whose common length no
+//                          single path knows
+//   arcs                   surface arcs and emitter arcs among connections: per area at the path's last two vertices, without the
+//                          camera walk that they have in common. Connections of the camera itself serve every pixel; so that they
+//                          compare, walks count as starting at a random point of a random pixel
+#pragma once
+#include <optional>
+
+#include "core/geometry/ellipsoid.h"
+#include "core/paths/options.h"
+#include "core/paths/path.h"
+#include "core/techniques/gate_pick.h"
+#include "core/techniques/target_lengths.h"
+
+namespace isochron {
+
+/// Of each technique of connections.
+struct ArcDensities {
+  double surface = 0, emitter = 0;
+};
+
+/// How often each technique is used.
+struct TechniqueRates {
+  double ellipsoidal_share = 0;      ///< of the samples; the others are standard
+  ConnectionRates connections = {};  ///< of ellipsoidal connections
+  double light = 0;                  ///< samples with light subpaths per standard one
+  double pair_coupling_gain = 1;     ///< factor on the density of coupled pairs
+};
+
+/// Densities of a path under samples with light subpaths over that under standard sampling, as if there were as many of
+/// both.
+struct LightRatio {
+  double all = 0;       ///< of all joints
+  double of_joint = 0;  ///< of the one asked for
+};
+
+class Balance {
+ public:
+  Balance(const PreparedScene& scene, const GatePick& pick) : scene_(scene), pick_(pick) {}
+
+  TechniqueRates rates;
+
+  // The part that a technique takes of the complete path x0 .. x(K) of a pixel, over its share of the samples (of light subpaths: that
+  // of standard sampling, which they share).
+
+  /// `pairs`: the slope of the gate is shared with ellipsoidal connections in coupled pairs.
+  GateWeights standard(const Path& path, int pixel, bool pairs) const;
+  /// Of light subpaths joined behind so many camera vertices, per standard sample.
+  GateWeights light(const Path& path, int pixel, int camera_vertices, bool pairs) const;
+  /// Of connections by `technique`, where the path is as long as that side of the target. `pdf_on_arc`: of the point that was
+  /// found, per area and length.
+  double connection(const Path& path, int pixel, const TargetLength& target, int side, double ArcDensities::*technique,
+                    double pdf_on_arc) const;
+  /// The same of a path that was gathered for its vertex 0: only techniques by arcs share it.
+  double gathered(const Path& path, double ArcDensities::*technique, double pdf_on_arc) const;
+  /// Of a path of length tau that ends on a border of an emitter: found by an arc of density `pdf_on_arc` (per area and length), or
+  /// without one from its last scattering vertex. `tangent`: unit, of the border; `border_pdf`: of its points, per length.
+  double border(const Path& path, int pixel, double tau, const Vec3& tangent, double border_pdf,
+                std::optional<double> pdf_on_arc) const;
+
+  /// See LightRatio. `joint`: the number of camera vertices before it; 0: the camera itself is joined.
+  LightRatio light_ratio(const Path& path, int pixel, int joint = -1) const;
+
+ private:
+  template <class LengthPdf>
+  ArcDensities arcs(const Path& path, double ArcDensities::*found, double pdf_on_arc, bool walks_only,
+                    LengthPdf&& length_pdf) const;
+  double of_connections(const Path& path, int pixel, double gain) const;
+  /// f(part of connections in a path's value or slope) for both.
+  template <class F>
+  GateWeights for_value_and_slope(const Path& path, int pixel, bool pairs, F&& f) const;
+  double step_pdf(const Path& path, int from, const SurfacePoint& q) const;
+  double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const;
+  double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const;
+
+  const PreparedScene& scene_;
+  const GatePick& pick_;
+};
+
+}  // namespace isochron

@@ -1,0 +1,49 @@
+// Light subpaths: walks from an emitter, each vertex of which is joined with the camera and with every vertex of a camera
+// path (bidirectional path tracing: Lafortune and Willems 1993, Veach and Guibas 1995). They find light that walks from the
+// camera rarely lead to, of a lamp in a case for instance. All joints of a path and standard sampling share it by the
+// balance heuristic, see Balance::light.
+#pragma once
+#include <vector>
+
+#include "core/techniques/standard_walk.h"
+
+namespace isochron {
+
+/// Not of captures.
+class LightSubpaths {
+ public:
+  /// `pairs`: see Balance::standard.
+  LightSubpaths(Worker& worker, bool pairs)
+      : worker_(worker),
+        scene_(worker.scene),
+        reach_{worker.gates.lower(), worker.gates.upper()},
+        pairs_(pairs),
+        path_(worker.options.max_bounces) {}
+
+  /// One camera path from `pixel` and one light subpath, with all their joints: contributions to the pixel are scaled by `scale`,
+  /// those to whichever pixel the camera sees the light subpath in by `splat_scale`.
+  void sample(int pixel, double scale, double splat_scale, Rng& rng);
+
+ private:
+  /// A scattering vertex of the light subpath.
+  struct Vertex {
+    SurfacePoint point;
+    Vec3 towards_light;  ///< unit, to the vertex before
+    double length;       ///< optical, from the emitter
+    Rgb throughput;      ///< contribution over density from the emitter to here, without the BSDF
+  };
+
+  void trace_light(Rng& rng);
+  /// Joins the camera path, so far as it goes, with every vertex of the light subpath. `pixel`: -1 where the camera itself is joined.
+  void join(int pixel, const Rgb& throughput, double scale);
+
+  Worker& worker_;
+  const PreparedScene& scene_;
+  const LengthRange reach_;
+  const bool pairs_;
+  Path path_;
+  SurfacePoint emitter_;
+  std::vector<Vertex> light_;
+};
+
+}  // namespace isochron
