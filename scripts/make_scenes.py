@@ -7,13 +7,14 @@ usage: make_scenes.py [DIR]     DIR: default the repository's scenes/
 import pathlib
 import sys
 
-from scenes import branches, bunny, corner, corridor, cube, glass_bunny, height_field, hidden_s, letter, rabbit, relief, sofa, tree
+from scenes import branches, bunny, corner, corridor, cove, cube, glass_bunny, height_field, hidden_s, letter, rabbit, relief, sofa, tree
 
 SCENES = {
     "branches": branches.write,
     "bunny": bunny.write,
     "corner": corner.write,
     "corridor": corridor.write,
+    "cove": cove.write,
     "cube": cube.write,
     "glass_bunny": glass_bunny.write,
     "height_field": height_field.write,

@@ -63,10 +63,7 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
   if (possible && options.keep_length == true && mix.interior == 0) mix.interior = 1;
   mix.keep_length = mix.interior > 0 && possible &&
                     options.keep_length.value_or(gates.shape().width() < kSteep * emitter_size(scene));
-  // Light subpaths share what standard sampling takes.
   if (options.light && !scene.capture) mix.image_light = mix.interior_light = *options.light;
-  if (mix.image == 1) mix.image_light = 0;
-  if (mix.interior == 1) mix.interior_light = 0;
   return mix;
 }
 

@@ -139,7 +139,7 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
     lengths.pairs = true;
     lengths.part = PairPart::dirac;
     lengths.coupled = options.antithetic;
-    run_paths(worker, 1, mix.path_length_rates, 0, lengths, pass, partition);
+    run_paths(worker, 1, mix.path_length_rates, mix.interior_light, lengths, pass, partition);
   } else {
     run_visibility(worker, pass, partition);
   }
@@ -154,8 +154,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
                        const GatePass& lengths, const Pass& pass, Partition partition) const {
   const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
-  const double light_rate = share == 1 ? 0 : light;
-  worker.balance.rates = {share, used, light_rate, pair_coupling_gain_};
+  worker.balance.rates = {share, used, light, light > 0 ? 1.0 : 0.0, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -181,7 +180,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
                       [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
     points.in_pixel(Technique::standard, pixel, rate * (1 - share),
                     [&](Rng& rng) { standard.start(pixel, scale / rate, rng); });
-    points.in_pixel(Technique::light_subpath, pixel, rate * light_rate * (1 - share),
+    points.in_pixel(Technique::light_subpath, pixel, rate * light * (1 - share),
                     [&](Rng& rng) { light_subpaths.sample(pixel, scale / rate, splat_scale, rng); });
   });
   standard.finish();

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/techniques/light_walk.h"
+
 namespace isochron {
 
 template <class F>
@@ -37,53 +39,62 @@ LightRatio Balance::light_ratio(const Path& path, int pixel, int joint) const {
   if (last < 2 || !(rate > 0)) return {};
   const SurfacePoint& y = path.vertex[last];
   LightRatio ratio;
-  // Per area of x(last - 1) from the emitter, over next-event estimation and BSDF sampling there.
-  const SurfacePoint& q = path.vertex[last - 1];
+  // Over next-event estimation and BSDF sampling of y.
   const double pdf_y = scene_.emitter_pdf(y.triangle);
   double product = pdf_y / (pdf_y + (is_light(y.triangle) ? 0 : step_pdf(path, last - 1, y)));
-  double from_light = scene_.emission_pdf(y, normalize(q.p - y.p)) * solid_angle_to_area(y.p, q);
   for (int k = last - 1; k > 0; --k) {
-    product *= from_light / step_pdf(path, k - 1, path.vertex[k]);
+    product *= step_from_light_pdf(path, k) / step_pdf(path, k - 1, path.vertex[k]);
     // A light subpath is drawn for every sample of any pixel, and may be seen in every other.
     const double of_joint = k == 1 ? product / rate : product;
     ratio.all += of_joint;
     if (k - 1 == joint) ratio.of_joint = of_joint;
-    if (k == 1) break;
-    const SurfacePoint &x = path.vertex[k], &next = path.vertex[k - 1];
-    const Scattering s(next.p, x, path.vertex[k + 1].p);
-    from_light = scene_.bsdf_of(x.triangle).pdf(s.reversed()) * solid_angle_to_area(x.p, next);
   }
   return std::isfinite(ratio.all) ? ratio : LightRatio{};
 }
 
 /// `length_pdf(k)`: density of the path's length in connections of x(k), times the number of samples that make them.
-/// `walks_only`: x0 makes no connections (it is no camera).
 template <class LengthPdf>
-ArcDensities Balance::arcs(const Path& path, double ArcDensities::*found, double pdf_on_arc, bool walks_only,
-                           LengthPdf&& length_pdf) const {
+double Balance::part_of_arc(const Path& path, int on_arc, double pdf_on_arc, bool gathered,
+                            LengthPdf&& length_pdf) const {
   const int last = path.size() - 1;
-  const SurfacePoint& y = path.vertex[last];
-  const bool by_emitter = found == &ArcDensities::emitter;
-  if (is_light(y.triangle)) return {1, 0};  // no circle goes through a point
-  if (last == 1) return {0, pdf_on_arc * length_pdf(0)};
-  if (walks_only && last == 2) return {0, 1};
-  const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
-  ArcDensities d;
-  if (!scene_.outside(q, y)) return d;
-  d.emitter = step_pdf(path, last - 2, q) * (by_emitter ? pdf_on_arc : emitter_arc_pdf(q, y)) * length_pdf(last - 1);
-  if (scene_.outside(x, q))
-    d.surface =
-        scene_.emitter_pdf(y.triangle) * (by_emitter ? surface_arc_pdf(x, q, y) : pdf_on_arc) * length_pdf(last - 2);
-  return d;
+  const bool by_light = rates.light_connections > 0 && !gathered;
+  if (last == 1 || (gathered && last == 2)) return on_arc == last ? 1 : 0;  // x0 makes no other connections
+  const SurfacePoint &q = path.vertex[last - 1], &y = path.vertex[last];
+  if (is_light(y.triangle) && !by_light) return on_arc == last - 1 ? 1 : 0;  // no circle goes through a point
+  double sum = 0, found = 0;
+  // By the vertex k on an arc: the others' densities, which make a path of the length with an arc in its place.
+  const auto count = [&](int k, double others) {
+    const double pdf = k == on_arc ? pdf_on_arc
+                       : k == last ? emitter_arc_pdf(q, y)
+                                   : surface_arc_pdf(path.vertex[k - 1], path.vertex[k], path.vertex[k + 1]);
+    const double density = others * pdf * length_pdf(k - 1);
+    sum += density;
+    if (k == on_arc) found = density;
+  };
+  const auto outside = [&](int k) { return scene_.outside(path.vertex[k], path.vertex[k + 1]); };
+  const double pdf_y = scene_.emitter_pdf(y.triangle);
+  if (outside(last - 1)) {
+    if (!is_light(y.triangle)) count(last, step_pdf(path, last - 2, q));
+    if (outside(last - 2)) count(last - 1, pdf_y);
+  }
+  if (by_light && last > 2) {
+    double others = rates.light_connections * pdf_y * step_from_light_pdf(path, last - 1);
+    for (int k = last - 2; k > 0; --k) {
+      others *= LightWalk::kPickNext / step_pdf(path, k - 1, path.vertex[k]);
+      if (outside(k - 1) && outside(k)) count(k, others);
+      others *= step_from_light_pdf(path, k);
+    }
+  }
+  return sum > 0 && std::isfinite(sum) ? found / sum : 0;
 }
 
-double Balance::connection(const Path& path, int pixel, const TargetLength& target, int side,
-                           double ArcDensities::*technique, double pdf_on_arc) const {
+double Balance::connection(const Path& path, int pixel, const TargetLength& target, int side, int on_arc,
+                           double pdf_on_arc) const {
   // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
   // densities of the length differ between the two techniques.
-  const bool same_length_pdf = pick_.uniform() || path.size() != 3;
+  const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !(rates.light_connections > 0));
   const double camera_rate = target.pair ? rates.connections.camera_pairs : rates.connections.camera_lengths;
-  const ArcDensities d = arcs(path, technique, pdf_on_arc, false, [&](int from) {
+  const double part = part_of_arc(path, on_arc, pdf_on_arc, false, [&](int from) {
     const double rate = from == 0 ? camera_rate : rates.connections.walk;
     if (same_length_pdf) return rate;
     const int served = from == 0 ? GatePick::kImage : pixel;
@@ -91,18 +102,15 @@ double Balance::connection(const Path& path, int pixel, const TargetLength& targ
     return rate * (from == 0 ? 1 : pick_.rate(pixel)) *
            (target.pair ? pick_.probability(served, target.gate) : pick_.length_pdf(served, target.tau[side]));
   });
-  const double sum = d.surface + d.emitter;
-  if (!(sum > 0)) return 0;
+  if (!(part > 0)) return 0;
   // No other technique finds lengths at a jump.
   const double share = rates.ellipsoidal_share, gain = target.pair ? rates.pair_coupling_gain : 1;
   const double ours = target.jump[side] || share == 1 ? 1 : of_connections(path, pixel, gain);
-  return ours / share * (d.*technique / sum);
+  return ours / share * part;
 }
 
-double Balance::gathered(const Path& path, double ArcDensities::*technique, double pdf_on_arc) const {
-  const ArcDensities d = arcs(path, technique, pdf_on_arc, true, [](int) { return 1.0; });
-  const double sum = d.surface + d.emitter;
-  return sum > 0 ? d.*technique / sum : 0;
+double Balance::gathered(const Path& path, int on_arc, double pdf_on_arc) const {
+  return part_of_arc(path, on_arc, pdf_on_arc, true, [](int) { return 1.0; });
 }
 
 double Balance::border(const Path& path, int pixel, double tau, const Vec3& tangent, double border_pdf,
@@ -165,6 +173,15 @@ double Balance::step_pdf(const Path& path, int from, const SurfacePoint& q) cons
     return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
   const Scattering s(path.vertex[from - 1].p, x, q.p);
   return scene_.bsdf_of(x.triangle).pdf(s) * to_area;
+}
+
+/// Density per area with which a light subpath continues from the vertex behind to vertex number `to` of the path.
+double Balance::step_from_light_pdf(const Path& path, int to) const {
+  const SurfacePoint &x = path.vertex[to], &from = path.vertex[to + 1];
+  const double to_area = solid_angle_to_area(from.p, x);
+  if (to + 2 == path.size()) return scene_.emission_pdf(from, normalize(x.p - from.p)) * to_area;
+  const Scattering s(x.p, from, path.vertex[to + 2].p);
+  return scene_.bsdf_of(from.triangle).pdf(s.reversed()) * to_area;
 }
 
 /// Density of q on its triangle's arc between foci x and y, per area and length.

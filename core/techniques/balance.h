@@ -7,8 +7,8 @@
 //   light subpaths         the same from the emitter, joined behind each camera vertex, as ratios to standard sampling
 //   connections            an estimate: they choose among all the arcs that an ellipsoid leaves on the scene, whose common length no
 //                          single path knows
-//   arcs                   surface arcs and emitter arcs among connections: per area at the path's last two vertices, without the
-//                          camera walk that they have in common. Connections of the camera itself serve every pixel; so that they
+//   arcs                   among connections, by the vertex that was put on an arc: per area and length there, over the camera walk
+//                          to the last vertex but two. Connections of the camera itself serve every pixel; so that they
 //                          compare, walks count as starting at a random point of a random pixel
 #pragma once
 #include <optional>
@@ -21,16 +21,12 @@
 
 namespace isochron {
 
-/// Of each technique of connections.
-struct ArcDensities {
-  double surface = 0, emitter = 0;
-};
-
 /// How often each technique is used.
 struct TechniqueRates {
   double ellipsoidal_share = 0;      ///< of the samples; the others are standard
   ConnectionRates connections = {};  ///< of ellipsoidal connections
   double light = 0;                  ///< samples with light subpaths per standard one
+  double light_connections = 0;      ///< connections with light subpaths per sample of connections: 0 or 1
   double pair_coupling_gain = 1;     ///< factor on the density of coupled pairs
 };
 
@@ -54,12 +50,12 @@ class Balance {
   GateWeights standard(const Path& path, int pixel, bool pairs) const;
   /// Of light subpaths joined behind so many camera vertices, per standard sample.
   GateWeights light(const Path& path, int pixel, int camera_vertices, bool pairs) const;
-  /// Of connections by `technique`, where the path is as long as that side of the target. `pdf_on_arc`: of the point that was
-  /// found, per area and length.
-  double connection(const Path& path, int pixel, const TargetLength& target, int side, double ArcDensities::*technique,
+  /// Of connections that put vertex number `on_arc` of the path on an arc, where the path is as long as that side of the target:
+  /// emitter arcs put the last one, surface arcs one before. `pdf_on_arc`: of the point that was found, per area and length.
+  double connection(const Path& path, int pixel, const TargetLength& target, int side, int on_arc,
                     double pdf_on_arc) const;
-  /// The same of a path that was gathered for its vertex 0: only techniques by arcs share it.
-  double gathered(const Path& path, double ArcDensities::*technique, double pdf_on_arc) const;
+  /// The same of a path that was gathered for its vertex 0: without the vertices of light subpaths, and other techniques.
+  double gathered(const Path& path, int on_arc, double pdf_on_arc) const;
   /// Of a path of length tau that ends on a border of an emitter: found by an arc of density `pdf_on_arc` (per area and length), or
   /// without one from its last scattering vertex. `tangent`: unit, of the border; `border_pdf`: of its points, per length.
   double border(const Path& path, int pixel, double tau, const Vec3& tangent, double border_pdf,
@@ -69,14 +65,15 @@ class Balance {
   LightRatio light_ratio(const Path& path, int pixel, int joint = -1) const;
 
  private:
+  /// Of all techniques of connections that one by `on_arc` is, its part.
   template <class LengthPdf>
-  ArcDensities arcs(const Path& path, double ArcDensities::*found, double pdf_on_arc, bool walks_only,
-                    LengthPdf&& length_pdf) const;
+  double part_of_arc(const Path& path, int on_arc, double pdf_on_arc, bool gathered, LengthPdf&& length_pdf) const;
   double of_connections(const Path& path, int pixel, double gain) const;
   /// f(part of connections in a path's value or slope) for both.
   template <class F>
   GateWeights for_value_and_slope(const Path& path, int pixel, bool pairs, F&& f) const;
   double step_pdf(const Path& path, int from, const SurfacePoint& q) const;
+  double step_from_light_pdf(const Path& path, int to) const;
   double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const;
   double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const;
 

@@ -10,11 +10,13 @@ namespace isochron {
 void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
   worker_.start_at_sensor(worker_.path, 0);
   draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
+  if (connects_light() && !targets_.empty()) light_.trace(worker_, rng);
   for (const TargetLength& target : targets_) {
     if (scene_.emitters.seen_by_camera) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
     // Of paths that keep their lengths only those that the camera sees an emitter by have a slope.
     const bool has_slope = !(target.pair && scene_.flows.keep_length());
     if (worker_.options.max_bounces >= 1 && has_slope) connect_surface(target, GatePick::kImage, Rgb(scale), rng);
+    if (connects_light() && has_slope) connect_light(target, GatePick::kImage, Rgb(scale), rng);
     if (worker_.options.max_bounces >= 1 && has_flux(target)) {
       connect_front(target, GatePick::kImage, Rgb(scale), rng);
       connect_border(target, GatePick::kImage, Rgb(scale), rng);
@@ -51,6 +53,7 @@ void EllipsoidalConnections::gather(std::span<const double> lengths, int max_bou
 
 void EllipsoidalConnections::connect_along(int pixel, double scale, int max_bounces, Rng& rng) {
   Path& path = worker_.path;
+  if (connects_light()) light_.trace(worker_, rng);
   Rgb throughput(1.0);
   for (int bounce = 1; bounce <= max_bounces; ++bounce) {
     const double needed = path.length.back() + scene_.distance_to_emitters(path.back().p);
@@ -60,6 +63,7 @@ void EllipsoidalConnections::connect_along(int pixel, double scale, int max_boun
       reachable = true;
       connect_emitter(target, pixel, throughput * scale, rng);
       if (bounce < max_bounces) connect_surface(target, pixel, throughput * scale, rng);
+      if (connects_light()) connect_light(target, pixel, throughput * scale, rng);
       if (!has_flux(target)) continue;
       borders_.sample(target.tau[0], pixel, throughput * (scale * target.scale), rng);
       if (bounce == max_bounces) continue;
@@ -78,25 +82,55 @@ bool EllipsoidalConnections::any_arc_contributes(int emitter_triangle) const {
 
 void EllipsoidalConnections::connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
   const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
-  const double along = rng.uniform();
-  const double pick = rng.uniform(), thinning = rng.uniform();
   double pdf_y = 1;
   const SurfacePoint y =
       scene_.captures() ? scene_.point_of_light(scene_.spot_of(pixel)) : scene_.sample_emitter(u0, u1, u2, pdf_y);
+  Path& path = worker_.path;
+  connect_arcs(target, 0, {y.p, y.n, 0, 1, length_squared(y.n) > 0}, any_arc_contributes(y.triangle), pixel,
+               throughput * (1 / pdf_y), rng, y, leaves_emitter(),
+               [&](int i, const ArcPoint& q, double inverse_probability) {
+                 if (!path.is_confocal_return(y) && !worker_.visible(q.point, y)) return;
+                 path.push(scene_, y);
+                 deliver(target, i, q, inverse_probability, path.size() - 2);
+                 path.pop();
+               });
+}
+
+void EllipsoidalConnections::connect_light(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
+  const int picked = light_.pick(rng.uniform());
+  Path& path = worker_.path;
+  // Its number of vertices, and q, have to be left.
+  if (picked < 0 || path.size() - 1 + picked + 2 > worker_.options.max_bounces) return;
+  const LightVertex& z = light_.vertices()[picked];
+  const bool any_arc = !worker_.differential_sink || path.has_gradient.back() || light_.has_gradient(scene_, picked);
+  connect_arcs(
+      target, z.length, scattering_focus(z.point, z.towards_light), any_arc, pixel,
+      throughput * (1 / LightWalk::pick_probability(picked)), rng, z.point,
+      [&](const SurfacePoint&, const Vec3& w) { return z.leaving(scene_, w); },
+      [&](int i, const ArcPoint& q, double inverse_probability) {
+        if (!worker_.visible(q.point, z.point)) return;
+        const int on_arc = path.size() - 1;
+        light_.append(scene_, picked, path);
+        deliver(target, i, q, inverse_probability, on_arc);
+        light_.remove(picked, path);
+      });
+}
+
+template <class Leaving, class Complete>
+void EllipsoidalConnections::connect_arcs(const TargetLength& target, double way_of_light,
+                                          const EllipsoidBvh::Focus& other, bool any_arc, int pixel, const Rgb& factor,
+                                          Rng& rng, const SurfacePoint& y, Leaving&& leaving, Complete&& complete) {
+  const double along = rng.uniform();
+  const double pick = rng.uniform(), thinning = rng.uniform();
   const Path& path = worker_.path;
   const SurfacePoint& x = path.back();
-  const double before = path.length.back();
-  const double high = target.longest() - before, low = target.shortest() - before;
-
+  const double way = path.length.back() + way_of_light;
+  const double high = target.longest() - way, low = target.shortest() - way;
   const Foci foci(x.p, y.p);
   if (!(high > foci.distance)) return;
-  const Ellipsoid ellipsoids[2] = {{foci, target.tau[0] - before}, {foci, target.tau[1] - before}};
-  const EllipsoidBvh& bvh =
-      scene_.hierarchy(any_arc_contributes(y.triangle) ? PreparedScene::Part::all : PreparedScene::Part::moving);
-  const bool has_front = length_squared(y.n) > 0;
-  find_candidates(bvh, {y.p, y.n, 0, 1, has_front}, low, high, thinning);
-
-  const Rgb factor = throughput * (1 / pdf_y);
+  const Ellipsoid ellipsoids[2] = {{foci, target.tau[0] - way}, {foci, target.tau[1] - way}};
+  find_candidates(scene_.hierarchy(any_arc ? PreparedScene::Part::all : PreparedScene::Part::moving), other, low, high,
+                  thinning);
   const auto choices = choose(pick, 2, [&](int t, ArcPair& arcs) {
     const double side_x = scene_.height_over(t, x.p), side_y = scene_.height_over(t, y.p);
     const bool two_sided = scene_.two_sided(t);
@@ -105,14 +139,10 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
     for (int i = 0; i < 2; ++i)
       if (target.present[i] && ellipsoids[i].valid())
         surface_arc_point(
-            ellipsoids[i], triangle, t, [&](const SurfacePoint&) { return y; }, along, pixel, factor, arcs.side[i]);
+            ellipsoids[i], triangle, t, [&](const SurfacePoint&) { return y; }, leaving, along, pixel, factor,
+            arcs.side[i]);
   });
-  for_each_seen(choices, [&](int i, const ArcPoint& q, double inverse_probability) {
-    if (!path.is_confocal_return(y) && !worker_.visible(q.point, y)) return;
-    worker_.path.push(scene_, y);
-    deliver(target, i, q, inverse_probability, &ArcDensities::surface);
-    worker_.path.pop();
-  });
+  for_each_seen(choices, complete);
 }
 
 void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const EllipsoidBvh::Focus& other, double low,
@@ -149,8 +179,7 @@ EllipsoidBvh::Focus EllipsoidalConnections::focus() const {
     return {x.p, scene_.camera.forward, cosine, std::sqrt(1 - cosine * cosine), false};
   }
   const Vec3& before = path.vertex[path.size() - 2].p;
-  const bool back = scene_.two_sided(x.triangle) && dot(x.n, before - x.p) < 0;
-  return {x.p, back ? -x.n : x.n, 0, 1, true};
+  return scattering_focus(x, before - x.p);
 }
 
 void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
@@ -174,7 +203,7 @@ void EllipsoidalConnections::connect_emitter(const TargetLength& target, int pix
         emitter_arc_point(spheres[i], triangle, t, along, pixel, throughput, arcs.side[i]);
   });
   for_each_seen(choices, [&](int i, const ArcPoint& y, double inverse_probability) {
-    deliver(target, i, y, inverse_probability, &ArcDensities::emitter);
+    deliver(target, i, y, inverse_probability, worker_.path.size() - 1);
   });
 }
 
@@ -211,11 +240,10 @@ void EllipsoidalConnections::emitter_arc_point(const Ellipsoid& sphere, const Fo
 }
 
 void EllipsoidalConnections::deliver(const TargetLength& target, int i, const ArcPoint& found,
-                                     double inverse_probability, double ArcDensities::*technique) {
+                                     double inverse_probability, int on_arc) {
   if (!receiver_ && !worker_.contributes(worker_.path)) return;
-  const double weight = receiver_
-                            ? worker_.balance.gathered(worker_.path, technique, found.pdf)
-                            : worker_.balance.connection(worker_.path, found.pixel, target, i, technique, found.pdf);
+  const double weight = receiver_ ? worker_.balance.gathered(worker_.path, on_arc, found.pdf)
+                                  : worker_.balance.connection(worker_.path, found.pixel, target, i, on_arc, found.pdf);
   const Rgb value = found.value * (inverse_probability * weight * target.scale);
   if (receiver_)
     receiver_->take(target.index, worker_.path.size() - 2, value);

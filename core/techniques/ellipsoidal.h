@@ -1,8 +1,9 @@
-// Ellipsoidal connections (theory sections 3 and 4, paper Section 5): paths of prescribed length. Two techniques,
+// Ellipsoidal connections (theory sections 3 and 4, paper Section 5): paths of prescribed length. Three techniques,
 // combined by multiple importance sampling:
 //   surface arcs   q is put between a camera-side vertex x_k (the camera included) and a point y on an emitter, on an
 //                  ellipse of total length tau;
-//   emitter arcs   the emitter's point itself is put on a circle at the distance that is left.
+//   emitter arcs   the emitter's point itself is put on a circle at the distance that is left;
+//   light arcs     surface arcs with a vertex of a light subpath in the place of the emitter's point.
 // Where paths keep their lengths (theory section 7) the ends of circles count, too: at the borders of emitters (EmitterBorders), and
 // where circles begin, at the foot of the last scattering vertex q (front arcs: q on a conic from which the way to the foot has
 // the length that is left).
@@ -17,6 +18,7 @@
 
 #include "core/geometry/ellipsoid.h"
 #include "core/techniques/emitter_borders.h"
+#include "core/techniques/light_walk.h"
 #include "core/techniques/target_lengths.h"
 #include "core/techniques/worker.h"
 
@@ -68,6 +70,7 @@ class EllipsoidalConnections {
   bool any_arc_contributes(int emitter_triangle) const;
 
   void connect_surface(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
+  void connect_light(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
   void connect_emitter(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
   void connect_front(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
   void connect_border(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng);
@@ -78,6 +81,11 @@ class EllipsoidalConnections {
                        double thinning);
   /// The path's last vertex with the half space that it scatters into; the camera with its field of view.
   EllipsoidBvh::Focus focus() const;
+  /// A vertex with the half space that it scatters light from the direction w into.
+  EllipsoidBvh::Focus scattering_focus(const SurfacePoint& x, const Vec3& w) const {
+    return {x.p, scene_.two_sided(x.triangle) && dot(x.n, w) < 0 ? -x.n : x.n, 0, 1, true};
+  }
+  bool connects_light() const { return !receiver_ && worker_.balance.rates.light_connections > 0; }
 
   /// An arc to test.
   struct Choice {
@@ -95,19 +103,32 @@ class EllipsoidalConnections {
   template <class F>
   void for_each_seen(std::span<const Choice> choices, F&& f);
 
-  /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried. `end`: the
-  /// emitter's point of a path by q, the second focus or, of front arcs, the foot of q.
-  template <class End>
-  void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, End&& end, double along,
-                         int pixel, const Rgb& factor, ArcPoint& out) const;
+  /// Surface arcs between the path's last vertex and y, the focus `other`, which light reaches by a way of that optical length.
+  /// `leaving(y, w)`: what y sends in the unit direction w, with the cosine there; `complete(side, q, inverse probability)`: of a
+  /// chosen q that the path's last vertex sees, while it is at the end of the path.
+  template <class Leaving, class Complete>
+  void connect_arcs(const TargetLength& target, double way_of_light, const EllipsoidBvh::Focus& other, bool any_arc,
+                    int pixel, const Rgb& factor, Rng& rng, const SurfacePoint& y, Leaving&& leaving,
+                    Complete&& complete);
+  /// Samples the arc of `ellipsoid` on triangle t; leaves `out` black when there is none or nothing is carried. `end(q)`: where a path by
+  /// q gets its light from, the second focus or, of front arcs, the foot of q; `leaving`: see connect_arcs.
+  template <class End, class Leaving>
+  void surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t, End&& end, Leaving&& leaving,
+                         double along, int pixel, const Rgb& factor, ArcPoint& out) const;
+  /// What the point of an emitter sends, as `leaving`.
+  auto leaves_emitter() const {
+    return [this](const SurfacePoint& y, const Vec3& w) {
+      const double cosine = is_light(y.triangle) ? 1 : dot(y.n, w);
+      return cosine > 0 ? scene_.emitted(y, w) * cosine : Rgb();
+    };
+  }
   void emitter_arc_point(const Ellipsoid& sphere, const FocalTriangle& triangle, int t, double along, int pixel,
                          const Rgb& throughput, ArcPoint& out) const;
   /// At the path's last vertex, which is not its first: from the one before, to the unit direction `w`.
   Directions scattering_to(const Vec3& w) const;
 
-  /// The worker's path is complete, by the point `found`, and as long as side i of the target says.
-  void deliver(const TargetLength& target, int i, const ArcPoint& found, double inverse_probability,
-               double ArcDensities::*technique);
+  /// The worker's path is complete, by its vertex number `on_arc`, the point `found`, and as long as side i of the target says.
+  void deliver(const TargetLength& target, int i, const ArcPoint& found, double inverse_probability, int on_arc);
 
   /// Whether to sample what a flow that keeps the length carries across the ends of circles.
   bool has_flux(const TargetLength& target) const {
@@ -119,6 +140,7 @@ class EllipsoidalConnections {
   const GatePass pass_;
   LengthReceiver* const receiver_;
   EmitterBorders borders_;
+  LightWalk light_;
   std::vector<TargetLength> targets_;
   std::vector<ArcPair> arcs_;
   Vec3 back_;  ///< unit direction from the path's last vertex to the one before

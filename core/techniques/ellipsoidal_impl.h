@@ -47,9 +47,9 @@ void EllipsoidalConnections::for_each_seen(std::span<const Choice> choices, F&& 
     }
 }
 
-template <class End>
+template <class End, class Leaving>
 void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, const FocalTriangle& triangle, int t,
-                                               End&& end, double along, int pixel, const Rgb& factor,
+                                               End&& end, Leaving&& leaving, double along, int pixel, const Rgb& factor,
                                                ArcPoint& out) const {
   EllipseArcs arcs;
   if (!clip_ellipse(ellipsoid, triangle, arcs)) return;
@@ -59,10 +59,10 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, const
   if (!scene_.outside(x, q)) return;
   const SurfacePoint y = end(q);
   const Scattering s(x.p, q, y.p);
-  const double cos_y = is_light(y.triangle) ? 1 : -dot(y.n, s.w_i);
-  if (!(cos_y > 0)) return;
+  const Rgb light = leaving(y, -s.w_i);
+  if (light.is_black()) return;
   const double distances = s.distance_i * s.distance_o;
-  double carried = std::abs(s.cos_i * s.cos_o) * cos_y / (distances * distances);
+  double carried = std::abs(s.cos_i * s.cos_o) / (distances * distances);
   Rgb f = bsdf_value(scene_, q, s);
   out.pixel = pixel;
   if (path.size() == 1) {
@@ -78,7 +78,7 @@ void EllipsoidalConnections::surface_arc_point(const Ellipsoid& ellipsoid, const
   const double to_focus = length(ellipsoid.b - q.p);
   const double area = arcs.total_span * area_per_angle_and_length(ellipsoid, s.distance_o, to_focus, q.n);
   out.pdf = 1 / area;
-  out.value = factor * scene_.emitted(y, -s.w_i) * f * (carried * area);
+  out.value = factor * light * f * (carried * area);
   out.point = q;
 }
 

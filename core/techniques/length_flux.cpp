@@ -40,7 +40,7 @@ void EllipsoidalConnections::connect_front(const TargetLength& target, int pixel
   const Rgb factor = throughput * (target.scale / (pdf_area * scene_.area(emitter)));
   const auto choices = choose(pick, 2, [&](int t, ArcPair& arcs) {
     ArcPoint& q = arcs.side[0];
-    surface_arc_point(ellipsoid, scene_.focal_triangle(foci, t), t, foot, along, pixel, factor, q);
+    surface_arc_point(ellipsoid, scene_.focal_triangle(foci, t), t, foot, leaves_emitter(), along, pixel, factor, q);
     if (!q.value.is_black() && !holds_foot(q.point)) q.value = {};
   });
   for_each_seen(choices, [&](int, const ArcPoint& q, double inverse_probability) {
@@ -75,7 +75,8 @@ void EllipsoidalConnections::connect_border(const TargetLength& target, int pixe
   const auto choices = choose(pick, 2, [&](int t, ArcPair& arcs) {
     ArcPoint& q = arcs.side[0];
     surface_arc_point(
-        ellipsoid, scene_.focal_triangle(foci, t), t, [&](const SurfacePoint&) { return y; }, along, pixel, factor, q);
+        ellipsoid, scene_.focal_triangle(foci, t), t, [&](const SurfacePoint&) { return y; }, leaves_emitter(), along,
+        pixel, factor, q);
     if (q.value.is_black()) return;
     const double outwards = std::abs(borders_.outwards(q.point, *border));
     q.value = std::isfinite(outwards) ? q.value * outwards : Rgb();

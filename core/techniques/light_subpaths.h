@@ -3,8 +3,7 @@
 // camera rarely lead to, of a lamp in a case for instance. All joints of a path and standard sampling share it by the
 // balance heuristic, see Balance::light.
 #pragma once
-#include <vector>
-
+#include "core/techniques/light_walk.h"
 #include "core/techniques/standard_walk.h"
 
 namespace isochron {
@@ -25,25 +24,15 @@ class LightSubpaths {
   void sample(int pixel, double scale, double splat_scale, Rng& rng);
 
  private:
-  /// A scattering vertex of the light subpath.
-  struct Vertex {
-    SurfacePoint point;
-    Vec3 towards_light;  ///< unit, to the vertex before
-    double length;       ///< optical, from the emitter
-    Rgb throughput;      ///< contribution over density from the emitter to here, without the BSDF
-  };
-
-  void trace_light(Rng& rng);
   /// Joins the camera path, so far as it goes, with every vertex of the light subpath. `pixel`: -1 where the camera itself is joined.
-  void join(int pixel, const Rgb& throughput, double scale);
+  void join(int pixel, const Rgb& throughput);
 
   Worker& worker_;
   const PreparedScene& scene_;
   const LengthRange reach_;
   const bool pairs_;
   Path path_;
-  SurfacePoint emitter_;
-  std::vector<Vertex> light_;
+  LightWalk light_;
 };
 
 }  // namespace isochron

@@ -80,32 +80,30 @@ struct Finder {
   }
 };
 
-/// Density of the path's point on its arc, per area and length, as a connection of the technique would draw it; 0: it would not.
-double pdf_on_arc(const PreparedScene& scene, const Path& path, double ArcDensities::*technique) {
-  const int last = path.size() - 1;
-  const SurfacePoint& y = path.vertex[last];
-  const bool by_emitter = technique == &ArcDensities::emitter;
-  if (!by_emitter && last < 2) return 0;
-  const SurfacePoint &from = path.vertex[by_emitter ? last - 1 : last - 2],
-                     &found = by_emitter ? y : path.vertex[last - 1];
-  const double r = length(found.p - from.p), s = by_emitter ? r : length(found.p - y.p);
-  const Ellipsoid ellipsoid(from.p, by_emitter ? from.p : y.p, r + s);
+/// Density of the path's vertex number `on_arc` on its arc, per area and length, as a connection would draw it; 0: it would not.
+double pdf_on_arc(const PreparedScene& scene, const Path& path, int on_arc) {
+  const bool by_emitter = on_arc == path.size() - 1;
+  if (on_arc < 1) return 0;
+  const SurfacePoint &from = path.vertex[on_arc - 1], &found = path.vertex[on_arc];
+  const SurfacePoint& other = by_emitter ? from : path.vertex[on_arc + 1];
+  const double r = length(found.p - from.p), s = by_emitter ? r : length(found.p - other.p);
+  const Ellipsoid ellipsoid(from.p, other.p, r + s);
   EllipseArcs arcs;
   if (!ellipsoid.valid() || !scene.clip(ellipsoid, found.triangle, arcs)) return 0;
   const double by_angle = by_emitter ? r : area_per_angle_and_length(ellipsoid, found.p, found.n);
   return 1 / (arcs.total_span * by_angle);
 }
 
-constexpr double ArcDensities::*kArcs[] = {&ArcDensities::surface, &ArcDensities::emitter};
-
 /// What connections take of the path.
 double part_of_connections(const Finder& f, const PathSink::Found& found, TargetLength target) {
   target.tau[0] = found.path.length.back();
   double sum = 0;
-  for (const auto technique : kArcs)
-    if (const double pdf = pdf_on_arc(f.prepared, found.path, technique); pdf > 0)
+  const int last = found.path.size() - 1;
+  const int first = f.worker.balance.rates.light_connections > 0 ? 1 : std::max(1, last - 1);
+  for (int on_arc = first; on_arc <= last; ++on_arc)
+    if (const double pdf = pdf_on_arc(f.prepared, found.path, on_arc); pdf > 0)
       sum += f.worker.balance.rates.ellipsoidal_share *
-             f.worker.balance.connection(found.path, found.pixel, target, 0, technique, pdf);
+             f.worker.balance.connection(found.path, found.pixel, target, 0, on_arc, pdf);
   return sum;
 }
 
@@ -168,8 +166,12 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
     f.worker.balance.rates.ellipsoidal_share = 1;
     f.worker.balance.rates.connections = {0.3, 2, 0.1};
-    for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
-      EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
+    for (const double light : {0.0, 1.0}) {
+      f.worker.balance.rates.light_connections = light;
+      for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
+        EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
+    }
+    f.worker.balance.rates.light_connections = 0;
   }
   EXPECT_GT(shared, 500);
   EXPECT_GT(shared_by_light, 500);
@@ -184,8 +186,9 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
   f.worker.balance.rates.connections = {0.3, 2, 0.1};
   int compared = 0;
   for (const auto& [path, pixel, value] : f.sink.found) {
-    const double surface = pdf_on_arc(f.prepared, path, kArcs[0]), emitter = pdf_on_arc(f.prepared, path, kArcs[1]);
-    if (path.size() != 3 || !(surface > 0 && emitter > 0)) continue;
+    if (path.size() != 3) continue;
+    const double surface = pdf_on_arc(f.prepared, path, 1), emitter = pdf_on_arc(f.prepared, path, 2);
+    if (!(surface > 0 && emitter > 0)) continue;
     const SurfacePoint &q = path.vertex[1], &y = path.vertex[2];
     if (!f.prepared.outside(q, y)) continue;
     const Vec3 w = normalize(q.p - path.vertex[0].p);
@@ -193,8 +196,8 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
                         f.prepared.pixels() * f.pick.rate(pixel);
     const auto expect_ratio = [&](TargetLength target, double camera_rate, double of_image, double of_pixel) {
       target.tau[0] = path.length.back();
-      const double by_surface = f.worker.balance.connection(path, pixel, target, 0, kArcs[0], surface),
-                   by_emitter = f.worker.balance.connection(path, pixel, target, 0, kArcs[1], emitter);
+      const double by_surface = f.worker.balance.connection(path, pixel, target, 0, 1, surface),
+                   by_emitter = f.worker.balance.connection(path, pixel, target, 0, 2, emitter);
       const double expected = f.prepared.emitter_pdf(y.triangle) * surface * camera_rate * of_image /
                               (walk * emitter * f.worker.balance.rates.connections.walk * of_pixel);
       EXPECT_NEAR(by_surface / by_emitter, expected, 1e-9 * expected);
@@ -218,7 +221,7 @@ TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
     f.find_by_connections(4000, [&](EllipsoidalConnections& connections, int pixel, Rng& rng) {
       from_camera ? connections.sample_from_camera(1, rng) : connections.sample_walk(pixel, 1, rng);
     });
-    const auto technique = from_camera ? &ArcDensities::surface : &ArcDensities::emitter;
+    const int on_arc = from_camera ? 1 : 2;
     int compared = 0;
     for (const auto& [path, pixel, value] : f.sink.found) {
       if (path.size() != 3) continue;
@@ -226,7 +229,7 @@ TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
       const Scattering s(x.p, q, y.p);
       Rgb expected = bsdf_value(f.prepared, q, s) * f.prepared.emitted(y, -s.w_i) *
                      (std::abs(s.cos_i) * solid_angle_to_area(q.p, y));
-      double density = pdf_on_arc(f.prepared, path, technique) *
+      double density = pdf_on_arc(f.prepared, path, on_arc) *
                        f.pick.length_pdf(from_camera ? GatePick::kImage : pixel, path.length.back());
       std::vector<int> triangles;
       if (from_camera) {
@@ -240,9 +243,8 @@ TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
       }
       TargetLength target;
       target.tau[0] = path.length.back();
-      expected *=
-          f.worker.balance.connection(path, pixel, target, 0, technique, pdf_on_arc(f.prepared, path, technique)) *
-          static_cast<double>(triangles.size()) / density;
+      expected *= f.worker.balance.connection(path, pixel, target, 0, on_arc, pdf_on_arc(f.prepared, path, on_arc)) *
+                  static_cast<double>(triangles.size()) / density;
       EXPECT_NEAR(value.r, expected.r, 1e-6 * expected.r);
       ++compared;
     }
@@ -282,12 +284,14 @@ TEST(GatheredWeights, AddUpToOne) {
     int shared = 0;
     void take(int, int, const Rgb&) override {
       double sum = 0, most = 0;
-      for (const auto technique : kArcs)
-        if (const double pdf = pdf_on_arc(worker->scene, worker->path, technique); pdf > 0) {
-          const double weight = worker->balance.gathered(worker->path, technique, pdf);
+      for (const int before_last : {0, 1}) {
+        const int on_arc = worker->path.size() - 1 - before_last;
+        if (const double pdf = pdf_on_arc(worker->scene, worker->path, on_arc); pdf > 0) {
+          const double weight = worker->balance.gathered(worker->path, on_arc, pdf);
           sum += weight;
           most = std::max(most, weight);
         }
+      }
       EXPECT_NEAR(sum, 1, 1e-9);
       shared += most < 0.99;
     }

@@ -1,0 +1,61 @@
+// Walks from the emitters (light subpaths).
+#pragma once
+#include <cmath>
+#include <vector>
+
+#include "core/techniques/worker.h"
+
+namespace isochron {
+
+/// A scattering vertex of a light subpath.
+struct LightVertex {
+  SurfacePoint point;
+  Vec3 towards_light;  ///< unit, to the vertex before
+  double length;       ///< optical, from the emitter
+  Rgb throughput;      ///< contribution over density from the emitter to here, without the BSDF
+
+  /// What it sends in the unit direction w, with the cosine there.
+  Rgb leaving(const PreparedScene& scene, const Vec3& w) const {
+    Directions d;
+    d.n = point.n;
+    d.w_i = towards_light;
+    d.w_o = w;
+    d.cos_i = dot(d.n, d.w_i);
+    d.cos_o = dot(d.n, d.w_o);
+    d.cos_io = dot(d.w_i, d.w_o);
+    return throughput * bsdf_value(scene, point, d) * std::abs(d.cos_o);
+  }
+};
+
+/// A walk from an emitter; not in captures.
+class LightWalk {
+ public:
+  /// A new one, as far as paths to the camera can be no longer than the last gate.
+  void trace(Worker& worker, Rng& rng);
+
+  const std::vector<LightVertex>& vertices() const { return vertices_; }
+  /// Of connections: one of the vertices, each with kPickNext times the probability of the one before, or -1 where the walk has
+  /// ended.
+  static constexpr double kPickNext = 0.5;
+  int pick(double u) const {
+    const double i = -std::log2(u);
+    return i < static_cast<double>(vertices_.size()) ? static_cast<int>(i) : -1;
+  }
+  static double pick_probability(int i) { return std::ldexp(kPickNext, -i); }
+  /// Completes a path that ends next to vertex i: by that and those before. `remove` undoes it.
+  void append(const PreparedScene& scene, int i, Path& path) const {
+    for (int k = i; k >= 0; --k) path.push(scene, vertices_[k].point);
+    path.push(scene, emitter_);
+  }
+  void remove(int i, Path& path) const {
+    for (int k = 0; k < i + 2; ++k) path.pop();
+  }
+  /// Whether one of the vertices up to i, or the emitter, gives paths a derivative.
+  bool has_gradient(const PreparedScene& scene, int i) const;
+
+ private:
+  SurfacePoint emitter_;
+  std::vector<LightVertex> vertices_;
+};
+
+}  // namespace isochron

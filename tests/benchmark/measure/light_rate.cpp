@@ -1,0 +1,101 @@
+// What light subpaths bring: isochron_light_rate CSV [SEEDS]. Variance x CPU seconds over the mean square, summed over pixels and
+// gates, of images and of the interior term of a derivative, by rates of samples with light subpaths per standard one, and by the
+// rate that is measured by default (its trial not counted). Lower is better.
+#include <cstdio>
+#include <optional>
+#include <vector>
+
+#include "core/base/cpu_time.h"
+#include "core/base/parallel.h"
+#include "core/render/measure_mix.h"
+#include "tests/benchmark/measure/arguments.h"
+#include "tests/render/pixel_statistics.h"
+#include "tests/render/support.h"
+
+namespace isochron::benchmarks {
+namespace {
+
+using namespace testing;
+
+constexpr double kRates[] = {0, 0.25, 0.5, 1, 2, 4};
+
+struct Case {
+  const char* name;
+  Scene scene;
+  const char* moving;
+  GateSet gates;
+  int max_bounces, samples;
+};
+
+void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
+  const TangentBasis basis = make_basis(c.scene, {translate(c.scene, c.moving, {0, 1, 0})});
+  std::vector<EstimatorOptions> options;
+  for (const double rate : kRates) options.push_back({.max_bounces = c.max_bounces, .light = rate});
+  options.push_back({.max_bounces = c.max_bounces});
+  for (EstimatorOptions& o : options)
+    o.mix = measure_mix(c.scene, c.gates, o, &basis, {2, 0, 0}, Purpose::images,
+                        {double(seeds * c.samples), double(seeds * c.samples), double(seeds * c.samples)});
+  const SamplingMix& chosen = *options.back().mix;
+  const SampleRange range{0, c.samples};
+  std::vector<PixelBatches> images(options.size());
+  std::vector<double> seconds(options.size());
+  for (int seed = 0; seed < seeds; ++seed)
+    for (std::size_t i = 0; i < options.size(); ++i) {
+      const Renderer renderer(c.scene, c.gates, options[i], &basis);
+      const Stream stream{static_cast<std::uint64_t>(81 + seed), 0, 1};
+      const double start = cpu_seconds();
+      const GatedImage image =
+          derivative ? renderer.derive(Term::interior, stream, range)[0] : renderer.render(stream, range);
+      seconds[i] += (cpu_seconds() - start) / seeds;
+      images[i].add(image);
+    }
+  for (std::FILE* out : {csv, stdout}) {
+    std::fprintf(out, "%s,%s,%g,%g", c.name, derivative ? "derivative" : "image",
+                 derivative ? chosen.interior : chosen.image, derivative ? chosen.interior_light : chosen.image_light);
+    for (std::size_t i = 0; i < options.size(); ++i) {
+      double square = 0, variance = 0;
+      for (std::size_t k = 0; k < images[i].mean().data.size(); ++k) {
+        variance += images[i].variance(k);
+        square += images[i].mean().data[k] * images[i].mean().data[k] - images[i].variance(k);
+      }
+      std::fprintf(out, ",%.3g", seeds * variance * seconds[i] / square);
+    }
+    std::fprintf(out, "\n");
+    std::fflush(out);
+  }
+}
+
+std::vector<Case> cases() {
+  std::vector<Case> result;
+  const Scene cove = load_scene(PROJECT_ROOT "/scenes/cove/scene.yaml");
+  result.push_back({"cove", cove, "lamp", GateSet(GateShape::boxcar(0.75), {5.0, 5.75, 6.5, 7.25, 8.0, 8.75}), 6, 64});
+  result.push_back({"cove steady", cove, "lamp", GateSet(GateShape::steady(), {0}), 6, 64});
+  const Scene box = load_scene(PROJECT_ROOT "/tests/data/cornell/scene.yaml");
+  const auto add = [&](const char* name, const GateSet& gates) {
+    result.push_back({name, box, "smallbox", gates, 4, 64});
+  };
+  add("box steady", GateSet(GateShape::steady(), {0}));
+  for (const double width : {0.5, 0.2, 0.1, 0.02, 0.005}) {
+    static char name[5][32];
+    static int count = 0;
+    std::snprintf(name[count], sizeof name[count], "box %g", width);
+    add(name[count++], GateSet(GateShape::boxcar(width), {8 + width / 2}));
+  }
+  return result;
+}
+
+}  // namespace
+}  // namespace isochron::benchmarks
+
+int main(int argc, char** argv) {
+  using namespace isochron::benchmarks;
+  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_light_rate CSV [SEEDS]", 16, 2);
+  isochron::set_thread_count(1);
+  for (std::FILE* out : {arguments.csv.get(), stdout}) {
+    std::fprintf(out, "scene,of,share of connections,measured rate");
+    for (const double rate : kRates) std::fprintf(out, ",%g", rate);
+    std::fprintf(out, ",default\n");
+  }
+  for (const Case& c : cases())
+    for (const bool derivative : {false, true}) measure(c, derivative, arguments.number, arguments.csv.get());
+}
