@@ -110,6 +110,21 @@ void print_costs(const Inspection& inspection) {
   }
 }
 
+/// How a problem's paths are found.
+void print_techniques(const Problem& problem) {
+  const auto print = [](const char* what, double connections, double light) {
+    fmt::print(
+        "  {:<24} {:>4.0f} % ellipsoidal connections, {:>4.0f} % standard sampling, {:g} light subpaths per standard "
+        "path\n",
+        what, 100 * connections, 100 * (1 - connections), connections < 1 ? light : 0);
+  };
+  const SamplingMix image = *problem.image_estimator().mix, gradient = *problem.estimator().mix;
+  fmt::print("\nHow paths are found:\n");
+  print("images", image.image, image.image_light);
+  print("images, for gradients", gradient.image, gradient.image_light);
+  print("interior", gradient.interior, gradient.interior_light);
+}
+
 void print_advice(const Problem& problem, const Inspection& inspection) {
   const Advice& advice = inspection.advice;
   const Reduction& kept = advice.reduction.kept;
@@ -165,6 +180,7 @@ int inspect_experiment(const InspectCommand& command) {
              problem.gates().size(), full_bounces(experiment));
   for (const PointInspection& p : inspection.points) print_point(problem, p);
   print_costs(inspection);
+  print_techniques(problem);
   print_advice(problem, inspection);
   write_file_atomically(folder + "/inspect.csv", inspection_csv(problem, inspection));
   write_file_atomically(folder + "/inspect.yaml", advice_yaml(experiment, inspection.advice.after));

@@ -51,9 +51,9 @@ constexpr double kConnectionsWork = 4;
 /// see 1.2 to 4 times.
 constexpr double kCostHandicapOfStandard[] = {1.1, 1};
 
-/// Paths of the trial of light subpaths at most and, where the job is small, at least, and what each takes in paths by standard
-/// sampling: one without and one with light subpaths and all their joints.
-constexpr double kLightPaths = 16384, kFewestLightPaths = 2048, kLightWork = 8;
+/// Paths of the trial of light subpaths at most and, where the job is small, at least, what each takes in paths by standard
+/// sampling (one without and one with light subpaths and all their joints), and the trial's part of the job's work.
+constexpr double kLightPaths = 16384, kFewestLightPaths = 1024, kLightWork = 6, kLightTrialPart = 0.04;
 
 double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;

@@ -8,9 +8,9 @@ what the experiment looks for.
 from . import mesh
 
 ROOM = 1.0  # half of its width
-CASE = ((-0.5, 0.55, -0.35), (0.5, 0.95, 0.15))  # two corners
-SLIT = (-0.13, -0.07)  # in z, across the whole case
-LAMP = ((-0.3, 0.62, -0.02), (0.3, 0.62, 0.12))
+CASE = ((-0.5, 0.5, -0.4), (0.5, 0.95, 0.2))  # two corners
+SLIT = (-0.16, -0.1)  # in z, across the whole case
+LAMP = ((-0.3, 0.65, 0.0), (0.3, 0.65, 0.1))
 
 SCENE = """\
 # Written by scripts/make_scenes.py; lengths in scene units, y is up.
