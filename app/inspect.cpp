@@ -113,10 +113,9 @@ void print_costs(const Inspection& inspection) {
 /// How a problem's paths are found.
 void print_techniques(const Problem& problem) {
   const auto print = [](const char* what, double connections, double light) {
-    fmt::print(
-        "  {:<24} {:>4.0f} % ellipsoidal connections, {:>4.0f} % standard sampling, {:g} light subpaths per standard "
-        "path\n",
-        what, 100 * connections, 100 * (1 - connections), connections < 1 ? light : 0);
+    const double others = 100 * (1 - connections);
+    fmt::print("  {:<24} {:>3.0f} % ellipsoidal connections, {:>3.0f} % standard sampling, {:>3.0f} % light subpaths\n",
+               what, 100 * connections, others * (1 - light), others * light);
   };
   const SamplingMix image = *problem.image_estimator().mix, gradient = *problem.estimator().mix;
   fmt::print("\nHow paths are found:\n");

@@ -42,7 +42,8 @@ struct ConnectionRates {
 struct SamplingMix {
   double image = 0, interior = 0;
   ConnectionRates interior_rates = {}, path_length_rates = {};
-  /// Samples with light subpaths (LightSubpaths) per sample of standard sampling. Where it is not zero, connections have them, too.
+  /// The part, 0 to below 1, of the samples not taken by connections that are with light subpaths (LightSubpaths); the others are
+  /// standard. Where it is not zero, connections have them, too.
   double image_light = 0, interior_light = 0;
   /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives do not act on the gates, but for light that the camera
   /// sees an emitter by. Needs connections in the interior term.

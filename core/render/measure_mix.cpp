@@ -6,7 +6,7 @@
 
 #include "core/base/listed_sum.h"
 #include "core/image/stored_image.h"
-#include "core/render/light_rate.h"
+#include "core/render/light_share.h"
 
 namespace isochron {
 namespace {
@@ -163,7 +163,7 @@ struct Trial {
   EstimatorOptions options;
   Purpose purpose;
   double job;    ///< samples per pixel that it decides about
-  double light;  ///< rate of light subpaths
+  double light;  ///< share of light subpaths
 
   /// The best of kShares, or `by_width` where it cannot tell. `term`: of the derivative along one column; null: of images.
   double choose(double by_width, const TangentBasis* column, const Term* term, const Stream& stream,
@@ -247,8 +247,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     if (options.light || options.max_bounces < 2 || coverage < widths.below_is_ellipsoidal ||
         !(paths >= kFewestLightPaths))
       return 0.0;
-    return measure_light_rate(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
-                              work);
+    return measure_light_share(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
+                               work);
   };
   const auto choose = [&](const TrialWidths& widths, double otherwise, double samples, const TangentBasis* column,
                           const Term* term) {

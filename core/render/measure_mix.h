@@ -24,7 +24,7 @@ struct Job {
 /// along a random combination of them. Depends only on the arguments. For gradients, variance is that of
 /// sums over blocks of a quarter of the image's width. Gates much wider or narrower than where the techniques
 /// cross need no trial; other sampling than automatic none either. How often light subpaths are used has a trial of its own, before (see
-/// measure_light_rate). Where connections find all of a term and paths
+/// measure_light_share). Where connections find all of a term and paths
 /// bounce once, so that each technique could find them all, rates are chosen by a trial of that term's derivative.
 /// Each trial takes about a tenth of the work of what it decides about at most; where that is too little to tell
 /// techniques apart there is none, and the width of the gates decides. `trial_work`, where given, gets the work of all

@@ -154,7 +154,7 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
                        const GatePass& lengths, const Pass& pass, Partition partition) const {
   const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
-  worker.balance.rates = {share, used, light, light > 0 ? 1.0 : 0.0, pair_coupling_gain_};
+  worker.balance.rates = {share, used, light / (1 - light), light > 0 ? 1.0 : 0.0, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -178,10 +178,13 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
     if (of_walks.value || of_walks.pairs)
       points.in_pixel(Technique::walk, pixel, walks * share,
                       [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
-    points.in_pixel(Technique::standard, pixel, rate * (1 - share),
-                    [&](Rng& rng) { standard.start(pixel, scale / rate, rng); });
-    points.in_pixel(Technique::light_subpath, pixel, rate * light * (1 - share),
-                    [&](Rng& rng) { light_subpaths.sample(pixel, scale / rate, splat_scale, rng); });
+    // Weights are per standard sample.
+    const double others = 1 - share, standard_rate = rate * (1 - light);
+    points.in_pixel(Technique::standard, pixel, standard_rate * others,
+                    [&](Rng& rng) { standard.start(pixel, scale / standard_rate, rng); });
+    points.in_pixel(Technique::light_subpath, pixel, rate * light * others, [&](Rng& rng) {
+      light_subpaths.sample(pixel, scale / standard_rate, splat_scale / (1 - light), rng);
+    });
   });
   standard.finish();
 }

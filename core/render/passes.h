@@ -124,7 +124,7 @@ class Passes {
   bool interior_pairs() const;
 
   /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling. `rates` hold where
-  /// there are no others; `light` samples with light subpaths come with each standard one.
+  /// there are no others; `light`: see SamplingMix::interior_light.
   void run_paths(Worker& worker, double share, const ConnectionRates& rates, double light, const GatePass& lengths,
                  const Pass& pass, Partition partition) const;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;

@@ -135,10 +135,10 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "narrow as "
              "Dirac's. Not for captures, lights without an extent or glass",
              {.unset = !options.keep_length, .otherwise = "where gates are narrower than 2 % of the smallest emitter"});
-  keys.value("light", optional_number(options.light, {.low = 0, .high = 100}),
-             "light subpaths: walks from the emitters, joined with the paths from the camera, per path by standard "
-             "sampling. For "
-             "light that leaves its case by a slit. Not of captures",
+  keys.value("light", optional_number(options.light, {.low = 0, .high = 1, .high_open = true}),
+             "the part of the samples (but for ellipsoidal connections) with light subpaths: walks from the emitters, "
+             "joined with the "
+             "paths from the camera. For light that leaves its case by a slit. Not of captures",
              {.unset = !options.light, .otherwise = "`auto`: measured; else `0`"});
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");

@@ -61,7 +61,7 @@ TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
   const auto& [name, share, shape] = GetParam();
   const Scene scene = glossy_box(diffuse(Rgb(0.6)));
   const GateSet gates(shape, {5.0, 6.5});
-  const EstimatorOptions ours = with_light(3, share, 1.5);
+  const EstimatorOptions ours = with_light(3, share, 0.6);
   expect_equal_images(scene, gates, ours);
   const TangentBasis basis =
       make_basis(scene, {translate(scene, "light", {0.4, 0, 0.3}), change_material(scene, "panel", "roughness"),
@@ -98,7 +98,7 @@ INSTANTIATE_TEST_SUITE_P(Mixes, LightSubpathsIn,
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(LightSubpaths, LeaveGlassInTheDirectionsOfImportance) {
-  expect_equal_images(glossy_box(glass(0.3, 1.5)), GateSet(GateShape::gaussian(1.5), {5.0, 7.0}), with_light(4, 0, 1),
+  expect_equal_images(glossy_box(glass(0.3, 1.5)), GateSet(GateShape::gaussian(1.5), {5.0, 7.0}), with_light(4, 0, 0.5),
                       128);
 }
 
@@ -111,7 +111,7 @@ TEST(LightSubpaths, OfLightsWithoutAnExtent) {
                   .direction = normalize(Vec3{0.2, -1, -0.3}),
                   .intensity = Rgb(4)};
   scene.lights = {point, spot};
-  expect_equal_images(scene, GateSet(GateShape::gaussian(1.5), {3.0, 5.0}), with_light(3, 0, 1));
+  expect_equal_images(scene, GateSet(GateShape::gaussian(1.5), {3.0, 5.0}), with_light(3, 0, 0.5));
 }
 
 }  // namespace

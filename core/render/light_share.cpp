@@ -1,4 +1,4 @@
-#include "core/render/light_rate.h"
+#include "core/render/light_share.h"
 
 #include <algorithm>
 #include <array>
@@ -7,14 +7,21 @@
 namespace isochron {
 namespace {
 
-/// Rates that are compared. The second is that of the trial.
-constexpr std::array kRates = {0.0, 1.0, 0.25, 0.5, 2.0, 4.0};
-/// By how much another rate than none must look better.
-constexpr double kClearlyBetter = 0.8;
+/// Shares that are compared, and the one that the trial has.
+constexpr std::array kShares = {0.0, 0.2, 0.35, 0.5, 0.65, 0.8};
+constexpr double kTrialShare = 0.5;
+/// By how much another share than none must look better; and of those that do the least that comes so close to the best is taken, as
+/// other terms of a derivative take their part of the time, too.
+constexpr double kClearlyBetter = 0.8, kAsGoodAsTheBest = 1.25;
 
-/// Second moments of what samples find, by kRates.
+/// Samples with light subpaths per standard one.
+double rate_of(double share) {
+  return share / (1 - share);
+}
+
+/// Second moments of what samples find, by kShares.
 struct Moments {
-  std::array<double, kRates.size()> of{};
+  std::array<double, kShares.size()> of{};
   void add(const Moments& other) {
     for (std::size_t i = 0; i < of.size(); ++i) of[i] += other.of[i];
   }
@@ -50,8 +57,8 @@ class MomentSink final : public Sink {
         squares += most * most;
       });
     }
-    for (std::size_t i = 0; i < kRates.size(); ++i)
-      moments_.of[i] += squares * (1 + kRates[1] * ratio_) / (1 + kRates[i] * ratio_);
+    for (std::size_t i = 0; i < kShares.size(); ++i)
+      moments_.of[i] += squares * (1 + rate_of(kTrialShare) * ratio_) / (1 + rate_of(kShares[i]) * ratio_);
   }
 
  private:
@@ -64,8 +71,8 @@ class MomentSink final : public Sink {
 
 }  // namespace
 
-double measure_light_rate(const Scene& scene, const GateSet& gates, EstimatorOptions options,
-                          const TangentBasis* column, const Stream& stream, double paths, double& work) {
+double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOptions options,
+                           const TangentBasis* column, const Stream& stream, double paths, double& work) {
   options.mix = SamplingMix{};
   options.keep_length = false;
   const SampleRange range{
@@ -73,11 +80,11 @@ double measure_light_rate(const Scene& scene, const GateSet& gates, EstimatorOpt
   Moments moments;
   double work_of[2];
   for (const int i : {0, 1}) {
-    options.light = kRates[i];
+    options.light = i * kTrialShare;
     const Passes passes(scene, gates, options, column, nullptr);
     if (passes.scene.emitters.empty() || (column && !passes.has(Term::interior))) return 0;
     const PassKind kind = column ? PassKind::interior : PassKind::primal;
-    const int partitions = passes.partitions_for(range, kRates.size());
+    const int partitions = passes.partitions_for(range, kShares.size());
     moments = passes.sum_of<Moments>(kind, partitions, [&](int partition) {
       Moments own;
       MomentSink sink(passes, column, own);
@@ -91,13 +98,16 @@ double measure_light_rate(const Scene& scene, const GateSet& gates, EstimatorOpt
     work_of[i] = passes.work();
     work += work_of[i];
   }
+  // Of as many samples.
+  const double of_standard = work_of[0], of_light = (work_of[1] - (1 - kTrialShare) * work_of[0]) / kTrialShare;
   const auto cost = [&](std::size_t i) {
-    return moments.of[i] * (work_of[0] + kRates[i] / kRates[1] * (work_of[1] - work_of[0]));
+    return moments.of[i] / (1 - kShares[i]) * ((1 - kShares[i]) * of_standard + kShares[i] * of_light);
   };
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < kRates.size(); ++i)
-    if (cost(i) < (best == 0 ? kClearlyBetter : 1) * cost(best)) best = i;
-  return kRates[best];
+  double best = kClearlyBetter * cost(0);
+  for (std::size_t i = 1; i < kShares.size(); ++i) best = std::min(best, cost(i));
+  for (std::size_t i = 1; i < kShares.size(); ++i)
+    if (cost(i) <= std::min(kAsGoodAsTheBest * best, kClearlyBetter * cost(0))) return kShares[i];
+  return 0;
 }
 
 }  // namespace isochron

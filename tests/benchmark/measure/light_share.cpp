@@ -1,6 +1,6 @@
-// What light subpaths bring: isochron_light_rate CSV [SEEDS]. Variance x CPU seconds over the mean square, summed over pixels and
-// gates, of images and of the interior term of a derivative, by rates of samples with light subpaths per standard one, and by the
-// rate that is measured by default (its trial not counted). Lower is better.
+// What light subpaths bring: isochron_light_share CSV [SEEDS]. Variance x CPU seconds over the mean square, summed over pixels and
+// gates, of images and of the interior term of a derivative, by shares of samples with light subpaths, and by the
+// share that is measured by default (its trial not counted). Lower is better.
 #include <cstdio>
 #include <optional>
 #include <vector>
@@ -17,7 +17,7 @@ namespace {
 
 using namespace testing;
 
-constexpr double kRates[] = {0, 0.25, 0.5, 1, 2, 4};
+constexpr double kShares[] = {0, 0.2, 0.35, 0.5, 0.65, 0.8};
 
 struct Case {
   const char* name;
@@ -30,7 +30,7 @@ struct Case {
 void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
   const TangentBasis basis = make_basis(c.scene, {translate(c.scene, c.moving, {0, 1, 0})});
   std::vector<EstimatorOptions> options;
-  for (const double rate : kRates) options.push_back({.max_bounces = c.max_bounces, .light = rate});
+  for (const double share : kShares) options.push_back({.max_bounces = c.max_bounces, .light = share});
   options.push_back({.max_bounces = c.max_bounces});
   for (EstimatorOptions& o : options)
     o.mix = measure_mix(c.scene, c.gates, o, &basis, {2, 0, 0}, Purpose::images,
@@ -89,11 +89,11 @@ std::vector<Case> cases() {
 
 int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
-  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_light_rate CSV [SEEDS]", 16, 2);
+  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_light_share CSV [SEEDS]", 16, 2);
   isochron::set_thread_count(1);
   for (std::FILE* out : {arguments.csv.get(), stdout}) {
-    std::fprintf(out, "scene,of,share of connections,measured rate");
-    for (const double rate : kRates) std::fprintf(out, ",%g", rate);
+    std::fprintf(out, "scene,of,share of connections,measured share");
+    for (const double share : kShares) std::fprintf(out, ",%g", share);
     std::fprintf(out, ",default\n");
   }
   for (const Case& c : cases())
