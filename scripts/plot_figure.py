@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Draws what scripts/figure computed.
 
-usage: plot_figure.py 1|8|9 FOLDER PNG
+usage: plot_figure.py 1|8|9|cove FOLDER PNG
 """
 
 import pathlib
@@ -20,7 +20,7 @@ import use_package
 from isochron import exr
 from isochron.pictures import sheets
 
-EXPERIMENT1 = pathlib.Path(__file__).resolve().parent.parent / "experiments/figure1.yaml"
+EXPERIMENTS = pathlib.Path(__file__).resolve().parent.parent / "experiments"
 GATED = "radiance per scene unit of path length"
 
 
@@ -58,7 +58,7 @@ def figure1(folder):
     steady = exr.read(folder / "steady/render.exr")["gate000.Y"]
     gated = exr.read(folder / "gated/render.exr")
     derivative = exr.read(folder / "derivative/turn.exr")
-    centers = yaml.safe_load(EXPERIMENT1.read_text())["gates"]["centers"]
+    centers = yaml.safe_load((EXPERIMENTS / "figure1.yaml").read_text())["gates"]["centers"]
     figure, axes = plt.subplots(2, 1 + len(centers), figsize=(2.05 * (1 + len(centers)) + 0.9, 4.5), layout="constrained")
     show_image(axes[0, 0], steady, "steady state")
     axes[1, 0].axis("off")
@@ -116,10 +116,30 @@ def figure9(folder):
     return figure
 
 
+def cove(folder):
+    centers = yaml.safe_load((EXPERIMENTS / "cove.yaml").read_text())["gates"]["centers"]
+    rows = {"without": "without", "with": "with light subpaths"}
+    images, derivatives = ({row: exr.read(folder / row / name) for row in rows} for name in ("render.exr", "height.exr"))
+    figure, axes = plt.subplots(4, len(centers), figsize=(1.75 * len(centers) + 1, 7.4), layout="constrained")
+    scale = np.percentile(np.abs(list(derivatives["with"].values())), 99)
+    for line, (row, name) in enumerate(rows.items()):
+        axes[line, 0].set_ylabel(f"image, {name}", fontsize=8)
+        axes[2 + line, 0].set_ylabel(f"derivative, {name}", fontsize=8)
+        for g, center in enumerate(centers):
+            gate = f"gate{g:03d}.Y"
+            brightest = max(np.percentile(images["with"][gate], 98), 1e-30)
+            axes[line, g].imshow(sheets.srgb(images[row][gate] / brightest), cmap="gray", vmin=0, vmax=1, interpolation="nearest")
+            axes[line, g].set_title(f"path length {center:g}" if line == 0 else "", fontsize=9)
+            show_derivative(axes[2 + line, g], derivatives[row][f"total.{gate}"], scale, "")
+            axes[line, g].set(xticks=[], yticks=[])
+    color_bar(figure, axes[2:], scale, f"derivative by the lamp's height:\n{GATED}, per scene unit")
+    return figure
+
+
 def main(arguments):
-    figures = {"1": figure1, "8": figure8, "9": figure9}
+    figures = {"1": figure1, "8": figure8, "9": figure9, "cove": cove}
     if len(arguments) != 3 or arguments[0] not in figures:
-        print("usage: plot_figure.py 1|8|9 FOLDER PNG", file=sys.stderr)
+        print("usage: plot_figure.py 1|8|9|cove FOLDER PNG", file=sys.stderr)
         return 2
     figure = figures[arguments[0]](pathlib.Path(arguments[1]))
     path = pathlib.Path(arguments[2])

@@ -10,9 +10,10 @@ namespace {
 /// Shares that are compared, and the one that the trial has.
 constexpr std::array kShares = {0.0, 0.2, 0.35, 0.5, 0.65, 0.8};
 constexpr double kTrialShare = 0.5;
-/// By how much another share than none must look better; and of those that do the least that comes so close to the best is taken, as
-/// other terms of a derivative take their part of the time, too.
-constexpr double kClearlyBetter = 0.8, kAsGoodAsTheBest = 1.25;
+/// By how much another share than none must look better, for images and for derivatives: what rays leave out, the differential of
+/// every joint, takes as long again (corridor). Of those that do the least that comes so close to the best is taken, as other terms
+/// of a derivative take their part of the time, too.
+constexpr double kClearlyBetter[] = {0.8, 0.5}, kAsGoodAsTheBest = 1.25;
 
 /// Samples with light subpaths per standard one.
 double rate_of(double share) {
@@ -103,10 +104,11 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
   const auto cost = [&](std::size_t i) {
     return moments.of[i] / (1 - kShares[i]) * ((1 - kShares[i]) * of_standard + kShares[i] * of_light);
   };
-  double best = kClearlyBetter * cost(0);
+  const double without = kClearlyBetter[column != nullptr] * cost(0);
+  double best = without;
   for (std::size_t i = 1; i < kShares.size(); ++i) best = std::min(best, cost(i));
   for (std::size_t i = 1; i < kShares.size(); ++i)
-    if (cost(i) <= std::min(kAsGoodAsTheBest * best, kClearlyBetter * cost(0))) return kShares[i];
+    if (cost(i) <= std::min(kAsGoodAsTheBest * best, without)) return kShares[i];
   return 0;
 }
 

@@ -233,6 +233,13 @@ def hidden_share(folder):
     return markdown(["10^-6 x", "bounces", *shares], lines)
 
 
+def light_share(folder):
+    shares = ("0", "0.2", "0.35", "0.5", "0.65", "0.8", "default")
+    lines = [[f"{r['scene']}, {r['of']}", r["share of connections"], r["measured share"], *(number(float(r[s])) for s in shares)]
+             for r in read_rows(folder / "light_share.csv")]
+    return markdown(["", "connections", "light", *shares], lines)
+
+
 def captures(folder):
     return capture_cost.table_of(read_rows(folder / "capture_cost.csv"))
 
@@ -254,7 +261,7 @@ def checks(folder):
 
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, cubes, hidden_share, captures, stated_errors, egg, checks)},
+                               growth_of_cost, cubes, hidden_share, light_share, captures, stated_errors, egg, checks)},
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),
