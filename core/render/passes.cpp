@@ -150,9 +150,30 @@ bool Passes::interior_pairs() const {
   return mix.interior > 0 && options.antithetic && scene.differentiable.lengths && any_slope();
 }
 
+void Passes::visit(std::span<const TechniqueUse> uses, const GatePick& pick, const Pass& pass,
+                   Partition partition) const {
+  const int pixels = scene.camera.pixels();
+  const double scale = scene.scene.detector.gain / pass.range.count();
+  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(pixels));
+  std::vector<PointSet> of_image;
+  for (const TechniqueUse& use : uses) of_image.push_back(points.of_image(use.technique));
+  for_each_pixel(partition, pixels, [&](int pixel) {
+    for (std::size_t i = 0; i < uses.size(); ++i) {
+      const TechniqueUse& use = uses[i];
+      const double rate = use.in_pixel ? use.rate * pick.rate(pixel) : use.rate;
+      if (!(rate > 0)) continue;
+      const double own_scale = use.in_pixel ? scale / rate : scale / pixels / rate;
+      const auto sample = [&](Rng& rng) { use.sample(pixel, own_scale, rng); };
+      if (use.in_pixel)
+        points.in_pixel(use.technique, pixel, rate, sample);
+      else
+        points.in_image(of_image[i], pixel, rate, sample);
+    }
+  });
+}
+
 void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, double light,
                        const GatePass& lengths, const Pass& pass, Partition partition) const {
-  const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
   const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
   worker.balance.rates = {share, used, light / (1 - light), light > 0 ? 1.0 : 0.0, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
@@ -163,67 +184,66 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
       camera_pairs(worker, pairs);
   StandardPaths standard(worker, lengths.pairs);
   LightSubpaths light_subpaths(worker, lengths.pairs);
-  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
-  const PointSet of_lengths = points.of_image(Technique::camera_lengths);
-  const PointSet of_pairs = points.of_image(Technique::camera_pairs);
-  for_each_pixel(partition, scene.camera.pixels(), [&](int pixel) {
-    const bool from_camera = !scene.captures();
-    if (lengths.value && from_camera)
-      points.in_image(of_lengths, pixel, share * used.camera_lengths,
-                      [&](Rng& rng) { camera_lengths.sample_from_camera(splat_scale / used.camera_lengths, rng); });
-    if (lengths.pairs && from_camera)
-      points.in_image(of_pairs, pixel, share * used.camera_pairs,
-                      [&](Rng& rng) { camera_pairs.sample_from_camera(splat_scale / used.camera_pairs, rng); });
-    const double rate = worker.pick.rate(pixel), walks = rate * used.walk;
-    if (of_walks.value || of_walks.pairs)
-      points.in_pixel(Technique::walk, pixel, walks * share,
-                      [&](Rng& rng) { connections.sample_walk(pixel, scale / walks, rng); });
-    // Weights are per standard sample.
-    const double others = 1 - share, standard_rate = rate * (1 - light);
-    points.in_pixel(Technique::standard, pixel, standard_rate * others,
-                    [&](Rng& rng) { standard.start(pixel, scale / standard_rate, rng); });
-    points.in_pixel(Technique::light_subpath, pixel, rate * light * others, [&](Rng& rng) {
-      light_subpaths.sample(pixel, scale / standard_rate, splat_scale / (1 - light), rng);
-    });
-  });
+  const bool from_camera = !scene.captures();
+  const double others = 1 - share;
+  const TechniqueUse uses[] = {
+      {Technique::camera_lengths, from_camera && lengths.value ? share * used.camera_lengths : 0, false,
+       [&](int, double scale, Rng& rng) { camera_lengths.sample_from_camera(scale, rng); }},
+      {Technique::camera_pairs, from_camera && lengths.pairs ? share * used.camera_pairs : 0, false,
+       [&](int, double scale, Rng& rng) { camera_pairs.sample_from_camera(scale, rng); }},
+      {Technique::walk, of_walks.value || of_walks.pairs ? share * used.walk : 0, true,
+       [&](int pixel, double scale, Rng& rng) { connections.sample_walk(pixel, scale, rng); }},
+      {Technique::standard, others * (1 - light), true,
+       [&](int pixel, double scale, Rng& rng) { standard.start(pixel, scale, rng); }},
+      {Technique::light_subpath, others * light, true,
+       [&](int pixel, double scale, Rng& rng) { light_subpaths.sample(pixel, scale, rng); }},
+  };
+  visit(uses, worker.pick, pass, partition);
   standard.finish();
 }
 
-void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
-  const double scale = scene.scene.detector.gain / pass.range.count(), splat_scale = scale / scene.camera.pixels();
-  PrimaryBoundary primary(worker, edges(), *guide_, narrow());
-  SecondaryBoundary secondary(worker, edges(), *guide_, narrow());
-  const double edges_rate = guide_->rate(BoundaryGuide::primary),
-               borders_rate = guide_->rate(BoundaryGuide::pixel_border),
-               from_edge_rate = guide_->rate(BoundaryGuide::from_edge),
-               from_light_rate = guide_->rate(BoundaryGuide::from_light),
-               from_camera_rate = guide_->rate(BoundaryGuide::from_camera);
-  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(scene.camera.pixels()));
-  const PointSet of_edges = points.of_image(Technique::primary_edge);
-  const PointSet of_borders = points.of_image(Technique::pixel_border);
-  const PointSet of_segments = points.of_image(Technique::from_edge);
-  const PointSet of_light_edges = points.of_image(Technique::from_light);
-  for_each_pixel(partition, scene.camera.pixels(), [&](int pixel) {
-    // Segments between surfaces or to a light: a capture's serve the pixel that they are drawn for, a camera's whichever sees
-    // them.
-    const auto segments = [&](Technique technique, const PointSet& of_image, double rate, auto&& sample) {
-      const double own_rate = rate * worker.pick.rate(pixel);
-      if (scene.captures())
-        points.in_pixel(technique, pixel, own_rate, [&](Rng& rng) { sample(scale / own_rate, rng); });
-      else
-        points.in_image(of_image, pixel, rate, [&](Rng& rng) { sample(splat_scale / rate, rng); });
+/// What searches for boundaries.
+struct Passes::Searches {
+  PrimaryBoundary primary;
+  SecondaryBoundary secondary;
+
+  Searches(const Passes& passes, Worker& worker, const BoundaryGuide& guide)
+      : primary(worker, passes.edges(), guide, passes.narrow()),
+        secondary(worker, passes.edges(), guide, passes.narrow()) {}
+
+  /// Segments between surfaces or to a light: a capture's serve the pixel that they are drawn for, a camera's whichever sees
+  /// them.
+  std::array<TechniqueUse, BoundaryGuide::kTechniques> uses(const BoundaryGuide& guide, bool captures) {
+    const auto use = [&](Technique t, bool in_pixel, auto&& sample) {
+      return TechniqueUse{t, guide.rate(t), in_pixel, sample};
     };
-    points.in_image(of_edges, pixel, edges_rate, [&](Rng& rng) { primary.sample(splat_scale / edges_rate, rng); });
-    points.in_image(of_borders, pixel, borders_rate,
-                    [&](Rng& rng) { primary.sample_pixel_border(splat_scale / borders_rate, rng); });
-    segments(Technique::from_edge, of_segments, from_edge_rate,
-             [&](double share, Rng& rng) { secondary.sample_from_edge(pixel, share, rng); });
-    segments(Technique::from_light, of_light_edges, from_light_rate,
-             [&](double share, Rng& rng) { secondary.sample_from_light(pixel, share, rng); });
-    const double rate = from_camera_rate * worker.pick.rate(pixel);
-    points.in_pixel(Technique::from_camera, pixel, rate,
-                    [&](Rng& rng) { secondary.sample_from_camera(pixel, scale / rate, rng); });
-  });
+    return {use(Technique::primary_edge, false, [this](int, double scale, Rng& rng) { primary.sample(scale, rng); }),
+            use(Technique::pixel_border, false,
+                [this](int, double scale, Rng& rng) { primary.sample_pixel_border(scale, rng); }),
+            use(Technique::from_edge, captures,
+                [this](int pixel, double scale, Rng& rng) { secondary.sample_from_edge(pixel, scale, rng); }),
+            use(Technique::from_light, captures,
+                [this](int pixel, double scale, Rng& rng) { secondary.sample_from_light(pixel, scale, rng); }),
+            use(Technique::from_camera, true,
+                [this](int pixel, double scale, Rng& rng) { secondary.sample_from_camera(pixel, scale, rng); })};
+  }
+};
+
+void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
+  Searches searches(*this, worker, *guide_);
+  visit(searches.uses(*guide_, scene.captures()), worker.pick, pass, partition);
+}
+
+BoundaryGuide::Each<bool> Passes::possible_searches() const {
+  BoundaryGuide::Each<bool> possible;
+  const auto set = [&](Technique t, bool value) { possible[BoundaryGuide::table(t)] = value; };
+  const bool captures = scene.captures(), secondary = edges().has_secondary();
+  set(Technique::primary_edge, edges().has_primary() && !captures);
+  set(Technique::pixel_border, scene.flows.camera_possible());
+  set(Technique::from_edge, secondary && (!captures || options.max_bounces > 1));
+  set(Technique::from_light, secondary && !scene.lights.empty() && !(scene.confocal() && options.max_bounces == 1));
+  set(Technique::from_camera, secondary && (options.boundary.from_camera || captures));
+  return possible;
 }
 
 void Passes::learn() const {
@@ -233,20 +253,13 @@ void Passes::learn() const {
     ready->edges->update(scene, options.boundary.wedge);
   else
     ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->at_first() : nullptr);
-  Guide::Each<bool> possible;
-  const bool captures = scene.captures(), secondary_edges = edges().has_secondary();
-  possible[Guide::primary] = edges().has_primary() && !captures;
-  possible[Guide::pixel_border] = scene.flows.camera_possible();
-  possible[Guide::from_edge] = secondary_edges && (!captures || options.max_bounces > 1);
-  possible[Guide::from_light] =
-      secondary_edges && !scene.lights.empty() && !(scene.confocal() && options.max_bounces == 1);
-  possible[Guide::from_camera] = secondary_edges && (options.boundary.from_camera || captures);
+  const Guide::Each<bool> possible = possible_searches();
   const Guide& unguided = guide_.emplace(possible);
-  const auto searches = std::count(possible.begin(), possible.end(), true);
-  if (searches == 0) return;
-  const long long rounds =
-      std::llround(options.guiding_samples * scene.camera.pixels() / static_cast<double>(searches));
-  if (rounds < kFewestLearningRounds || captures) return;
+  const auto count_possible = std::count(possible.begin(), possible.end(), true);
+  if (count_possible == 0) return;
+  const int pixels = scene.camera.pixels();
+  const long long rounds = std::llround(options.guiding_samples * pixels / static_cast<double>(count_possible));
+  if (rounds < kFewestLearningRounds || scene.captures()) return;
   constexpr int kPartitions = kMostPartitions;  // their sums are few records
   std::vector<std::vector<GuideRecord>> records(kPartitions);
   std::vector<Guide::Each<double>> costs(kPartitions);
@@ -256,24 +269,18 @@ void Passes::learn() const {
     Worker worker(scene, gates, options, every_gate, sink);
     auto& cost = costs[partition];
     cost.fill(0);
-    const auto run = [&](Guide::Search technique, auto&& search) {
-      if (!possible[technique]) return;
-      const double before = worker.work();
-      search();
-      cost[technique] += worker.work() - before;
-    };
-    PrimaryBoundary primary(worker, edges(), unguided, narrow());
-    SecondaryBoundary secondary(worker, edges(), unguided, narrow());
-    const double splat_scale = 1.0 / scene.camera.pixels();
+    Searches searches(*this, worker, unguided);
+    const auto uses = searches.uses(unguided, false);
     for (long long round = partition; round < rounds; round += kPartitions) {
       throw_if_stopped();
-      const int pixel = static_cast<int>(round * scene.camera.pixels() / rounds) % scene.camera.pixels();
+      const int pixel = static_cast<int>(round * pixels / rounds) % pixels;
       Rng rng(kLearningStream, static_cast<std::uint64_t>(round), 0);
-      run(Guide::primary, [&] { primary.sample(splat_scale, rng); });
-      run(Guide::pixel_border, [&] { primary.sample_pixel_border(splat_scale, rng); });
-      run(Guide::from_edge, [&] { secondary.sample_from_edge(0, splat_scale, rng); });
-      run(Guide::from_light, [&] { secondary.sample_from_light(0, splat_scale, rng); });
-      run(Guide::from_camera, [&] { secondary.sample_from_camera(pixel, 1, rng); });
+      for (const TechniqueUse& use : uses) {
+        if (!(use.rate > 0)) continue;
+        const double before = worker.work();
+        use.sample(pixel, use.in_pixel ? 1 : 1.0 / pixels, rng);
+        cost[Guide::table(use.technique)] += worker.work() - before;
+      }
     }
     records[partition] = std::move(sink.records);
     count(worker);

@@ -6,6 +6,7 @@
 #include <bit>
 #include <mutex>
 #include <optional>
+#include <span>
 
 #include "core/base/partition_sum.h"
 #include "core/base/random.h"
@@ -127,7 +128,11 @@ class Passes {
   /// there are no others; `light`: see SamplingMix::interior_light.
   void run_paths(Worker& worker, double share, const ConnectionRates& rates, double light, const GatePass& lengths,
                  const Pass& pass, Partition partition) const;
+  struct Searches;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
+  /// All samples of a partition by techniques, gates and pixels by `pick`.
+  void visit(std::span<const TechniqueUse> uses, const GatePick& pick, const Pass& pass, Partition partition) const;
+  BoundaryGuide::Each<bool> possible_searches() const;
 
   void learn() const;
 

@@ -20,17 +20,13 @@ GateWeights Balance::for_value_and_slope(const Path& path, int pixel, bool pairs
 GateWeights Balance::standard(const Path& path, int pixel, bool pairs) const {
   if (!(rates.ellipsoidal_share > 0 || rates.light > 0)) return {};
   const double of_standard = rates.light > 0 ? 1 / (1 + rates.light * light_ratio(path, pixel).all) : 1;
-  return for_value_and_slope(path, pixel, pairs, [&](double connections) {
-    return (1 - connections) / (1 - rates.ellipsoidal_share) * of_standard;
-  });
+  return for_value_and_slope(path, pixel, pairs, [&](double connections) { return (1 - connections) * of_standard; });
 }
 
 GateWeights Balance::light(const Path& path, int pixel, int camera_vertices, bool pairs) const {
   const LightRatio ratio = light_ratio(path, pixel, camera_vertices);
-  const double of_light = ratio.of_joint / (1 + rates.light * ratio.all);
-  return for_value_and_slope(path, pixel, pairs, [&](double connections) {
-    return (1 - connections) / (1 - rates.ellipsoidal_share) * of_light;
-  });
+  const double of_light = rates.light * ratio.of_joint / (1 + rates.light * ratio.all);
+  return for_value_and_slope(path, pixel, pairs, [&](double connections) { return (1 - connections) * of_light; });
 }
 
 LightRatio Balance::light_ratio(const Path& path, int pixel, int joint) const {
@@ -104,9 +100,8 @@ double Balance::connection(const Path& path, int pixel, const TargetLength& targ
   });
   if (!(part > 0)) return 0;
   // No other technique finds lengths at a jump.
-  const double share = rates.ellipsoidal_share, gain = target.pair ? rates.pair_coupling_gain : 1;
-  const double ours = target.jump[side] || share == 1 ? 1 : of_connections(path, pixel, gain);
-  return ours / share * part;
+  if (target.jump[side] || rates.ellipsoidal_share == 1) return part;
+  return part * of_connections(path, pixel, target.pair ? rates.pair_coupling_gain : 1);
 }
 
 double Balance::gathered(const Path& path, int on_arc, double pdf_on_arc) const {
@@ -126,7 +121,7 @@ double Balance::border(const Path& path, int pixel, double tau, const Vec3& tang
   const double by_arcs =
       !scene_.outside(x, q) ? 0 : border_pdf * (pdf_on_arc ? *pdf_on_arc : surface_arc_pdf(x, q, y)) * tries(last - 2);
   const double sum = from_q + by_arcs;
-  return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / (sum * rates.ellipsoidal_share) : 0;
+  return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / sum : 0;
 }
 
 /// The part of connections, whose density is multiplied by `gain`, against all other techniques.

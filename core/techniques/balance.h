@@ -43,12 +43,11 @@ class Balance {
 
   TechniqueRates rates;
 
-  // The part that a technique takes of the complete path x0 .. x(K) of a pixel, over its share of the samples (of light subpaths: that
-  // of standard sampling, which they share).
+  // The part that a technique takes of the complete path x0 .. x(K) of a pixel. Parts of all techniques add up to one.
 
   /// `pairs`: the slope of the gate is shared with ellipsoidal connections in coupled pairs.
   GateWeights standard(const Path& path, int pixel, bool pairs) const;
-  /// Of light subpaths joined behind so many camera vertices, per standard sample.
+  /// Of light subpaths joined behind so many camera vertices.
   GateWeights light(const Path& path, int pixel, int camera_vertices, bool pairs) const;
   /// Of connections that put vertex number `on_arc` of the path on an arc, where the path is as long as that side of the target:
   /// emitter arcs put the last one, surface arcs one before. `pdf_on_arc`: of the point that was found, per area and length.

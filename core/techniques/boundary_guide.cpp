@@ -80,11 +80,11 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
   std::vector<std::vector<GuideRecord>> of_table(kTables), of_technique(kTechniques);
   for (const GuideRecord& r : records) {
     of_table[r.table].push_back(r);
-    of_technique[std::min<int>(r.table, from_camera)].push_back(r);
+    of_technique[std::min(r.table, kTechniques - 1)].push_back(r);
   }
   const std::vector<double> uniform(1, 1.0);
   for (int table = 0; table < kTables; ++table) {
-    const auto& all = of_technique[std::min<int>(table, from_camera)];
+    const auto& all = of_technique[std::min(table, kTechniques - 1)];
     const auto& own = of_table[table];
     const double trust = own.size() / (own.size() + static_cast<double>(kFewRecords));
     const double trust_all = all.size() / (all.size() + static_cast<double>(kFewRecords));

@@ -7,6 +7,7 @@
 
 #include "core/films/sinks.h"
 #include "core/scene/sensors/pinhole.h"
+#include "core/techniques/technique.h"
 
 namespace isochron {
 
@@ -44,12 +45,9 @@ struct GuideRecord {
 
 class BoundaryGuide {
  public:
-  /// Those of sample_points.h that search for boundaries, in the order of their histograms: from_camera has several, so it
-  /// comes last.
-  enum Search { primary, pixel_border, from_edge, from_light, from_camera };
   static constexpr int kTechniques = 5;
 
-  /// One value for each technique.
+  /// One value for each technique that searches for boundaries, by table().
   template <class T>
   using Each = std::array<T, kTechniques>;
 
@@ -61,13 +59,13 @@ class BoundaryGuide {
   BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records, const Each<double>& cost);
 
   /// How often a technique is used per sample, on average; 0 where it finds nothing.
-  double rate(Search t) const { return rate_[t]; }
+  double rate(Technique t) const { return rate_[table(t)]; }
   /// The histogram of a technique; `from_camera` has one per tile of the image for D next to the camera, and one for
   /// all others.
   const Warp& warp(int table) const { return warps_[table]; }
-  static int table(Search t) { return t; }
+  static constexpr int table(Technique t) { return static_cast<int>(t) - static_cast<int>(Technique::primary_edge); }
   static int table_from_camera(const CameraModel& camera, int pixel, int bounces) {
-    if (bounces > 1) return from_camera;
+    if (bounces > 1) return table(Technique::from_camera);
     const int x = pixel % camera.width * kTiles / camera.width, y = pixel / camera.width * kTiles / camera.height;
     return kTechniques + y * kTiles + x;
   }

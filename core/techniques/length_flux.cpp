@@ -50,9 +50,7 @@ void EllipsoidalConnections::connect_front(const TargetLength& target, int pixel
     // A circle begins with radius zero: the length of its arc is 2 pi times the distance, per length of the path.
     const double circle = 2 * kPi * scene_.height_over(emitter, q.point.p);
     if (worker_.contributes(worker_.path))
-      worker_.emit_length_flux(worker_.path, q.pixel,
-                               q.value * (-circle * inverse_probability / worker_.balance.rates.ellipsoidal_share),
-                               target.tau[0]);
+      worker_.emit_length_flux(worker_.path, q.pixel, q.value * (-circle * inverse_probability), target.tau[0]);
     worker_.path.pop();
   });
 }

@@ -5,13 +5,13 @@
 
 namespace isochron {
 
-void LightSubpaths::sample(int pixel, double scale, double splat_scale, Rng& rng) {
+void LightSubpaths::sample(int pixel, double scale, Rng& rng) {
   const int max_bounces = worker_.options.max_bounces;
   const Vec3 direction = worker_.direction_through(pixel, rng);
   light_.trace(worker_, rng);
   if (light_.vertices().empty()) return;
   worker_.start_at_sensor(path_, pixel);
-  join(-1, Rgb(splat_scale));
+  join(-1, Rgb(scale * worker_.pick.rate(pixel) / scene_.pixels()));
   if (max_bounces < 2) return;
   const auto x1 = worker_.trace_camera(direction);
   if (!x1) return;

@@ -19,9 +19,9 @@ class LightSubpaths {
         pairs_(pairs),
         path_(worker.options.max_bounces) {}
 
-  /// One camera path from `pixel` and one light subpath, with all their joints: contributions to the pixel are scaled by `scale`,
-  /// those to whichever pixel the camera sees the light subpath in by `splat_scale`.
-  void sample(int pixel, double scale, double splat_scale, Rng& rng);
+  /// One camera path from `pixel` and one light subpath, with all their joints; contributions are scaled by `scale`, those to
+  /// whichever pixel the camera sees the light subpath in by what it would be if all pixels had as many samples, over their number.
+  void sample(int pixel, double scale, Rng& rng);
 
  private:
   /// Joins the camera path, so far as it goes, with every vertex of the light subpath. `pixel`: -1 where the camera itself is joined.

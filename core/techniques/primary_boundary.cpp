@@ -52,7 +52,7 @@ PrimaryBoundary::PrimaryBoundary(Worker& worker, const BoundaryEdges& edges, con
 }
 
 void PrimaryBoundary::sample(double scale, Rng& rng) {
-  const int table = BoundaryGuide::table(BoundaryGuide::primary);
+  const int table = BoundaryGuide::table(Technique::primary_edge);
   const Warp& warp = guide_.warp(table);
   const double x = warp.sample(rng.fine_uniform());
   const BoundaryEdges::Sample point = edges_.sample_primary(x);
@@ -109,7 +109,7 @@ void PrimaryBoundary::sample(double scale, Rng& rng) {
 
 void PrimaryBoundary::sample_pixel_border(double scale, Rng& rng) {
   const CameraModel& camera = scene_.camera;
-  const int table = BoundaryGuide::table(BoundaryGuide::pixel_border);
+  const int table = BoundaryGuide::table(Technique::pixel_border);
   const double x = guide_.warp(table).sample(rng.uniform());
   // Pixels in rows, with one column and one row more than the image has, for the borders at its end.
   const int borders = 2 * (camera.width + 1) * (camera.height + 1);

@@ -8,22 +8,9 @@
 #include "core/base/progress.h"
 #include "core/base/random.h"
 #include "core/paths/options.h"
+#include "core/techniques/technique.h"
 
 namespace isochron {
-
-/// Ways to find paths that a pass may combine; tells their random numbers apart.
-enum class Technique : std::uint32_t {
-  standard,        ///< from the pixel, by standard sampling
-  walk,            ///< from the pixel, with ellipsoidal connections
-  camera_lengths,  ///< connections of the camera itself, lengths drawn from the gates
-  camera_pairs,    ///< the same, in pairs from the gates' derivative
-  primary_edge,
-  pixel_border,
-  from_edge,
-  from_camera,
-  from_light,
-  light_subpath  ///< from the pixel and from an emitter
-};
 
 /// One of `count` parts of the samples of each pixel.
 struct SamplePart {

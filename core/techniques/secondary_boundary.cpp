@@ -22,7 +22,7 @@ SecondaryBoundary::SecondaryBoundary(Worker& worker, const BoundaryEdges& edges,
       guide_(guide),
       techniques_(worker.options.boundary),
       at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
-      camera_over_edge_rate_(guide.rate(BoundaryGuide::from_camera) / guide.rate(BoundaryGuide::from_edge)),
+      camera_over_edge_rate_(guide.rate(Technique::from_camera) / guide.rate(Technique::from_edge)),
       aimed_share_(techniques_.aimed && scene_.emitters.have_extent ? 0.5 : 0),
       light_side_(worker, narrow_gates && techniques_.light_arcs),
       any_may_move_(scene_.flows.keep_length() &&
@@ -65,12 +65,12 @@ void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
   connections_.clear();
   walk_to_camera(g, pixel, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
   finish(g, Found::from_edge, rng);
-  worker_.sink.note_guide(BoundaryGuide::table(BoundaryGuide::from_edge), x);
+  worker_.sink.note_guide(BoundaryGuide::table(Technique::from_edge), x);
 }
 
 void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
   Segment g;
-  const int table = BoundaryGuide::table(BoundaryGuide::from_light);
+  const int table = BoundaryGuide::table(Technique::from_light);
   const double x = guide_.warp(table).sample(rng.fine_uniform());
   g.y = edges_.sample_secondary(x);
   const int count = static_cast<int>(scene_.lights.size());

@@ -77,7 +77,7 @@ class SecondaryBoundary {
   };
   enum class Found { from_edge, from_camera, from_light };
 
-  const Warp& edge_warp() const { return guide_.warp(BoundaryGuide::table(BoundaryGuide::from_edge)); }
+  const Warp& edge_warp() const { return guide_.warp(BoundaryGuide::table(Technique::from_edge)); }
   /// For edge points drawn from D, vertex `bounces` of a path through the pixel.
   const Warp& camera_warp(int pixel, int bounces) const { return guide_.warp(camera_table(pixel, bounces)); }
   int camera_table(int pixel, int bounces) const {

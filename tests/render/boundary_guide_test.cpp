@@ -87,10 +87,11 @@ TEST(BoundaryGuide, EdgePointsFollowTheirDensity) {
 /// Learned from contributions at one end: draws go there, and nowhere is left out.
 TEST(BoundaryGuide, LearnsWhereContributionsAre) {
   std::vector<GuideRecord> records;
-  for (int i = 0; i < 1000; ++i) records.push_back({BoundaryGuide::from_edge, 0.25 * (i + 0.5) / 1000, 1});
-  for (int i = 0; i < 10; ++i) records.push_back({BoundaryGuide::primary, 0.5, 4});
+  for (int i = 0; i < 1000; ++i)
+    records.push_back({BoundaryGuide::table(Technique::from_edge), 0.25 * (i + 0.5) / 1000, 1});
+  for (int i = 0; i < 10; ++i) records.push_back({BoundaryGuide::table(Technique::primary_edge), 0.5, 4});
   const BoundaryGuide guide({true, false, true, false, true}, records, {1, 0, 4, 0, 5});
-  const Warp& warp = guide.warp(BoundaryGuide::table(BoundaryGuide::from_edge));
+  const Warp& warp = guide.warp(BoundaryGuide::table(Technique::from_edge));
   EXPECT_GT(warp.below(0.25), 0.75);
   for (int i = 0; i < 100; ++i) EXPECT_GT(warp.density((i + 0.5) / 100), 0.2);
   // Three techniques are possible: without guiding each has a rate of 1/3. Rates for the same total cost of 10/3: in
@@ -99,14 +100,14 @@ TEST(BoundaryGuide, LearnsWhereContributionsAre) {
   // nothing, is rarely used.
   double moment = 0;
   for (const GuideRecord& r : records)
-    if (r.table == BoundaryGuide::from_edge) moment += r.square / warp.density(r.x);
+    if (r.table == BoundaryGuide::table(Technique::from_edge)) moment += r.square / warp.density(r.x);
   EXPECT_LT(moment, 400);
-  const double of_primary = std::sqrt(40 / guide.warp(BoundaryGuide::primary).density(0.5)),
+  const double of_primary = std::sqrt(40 / guide.warp(BoundaryGuide::table(Technique::primary_edge)).density(0.5)),
                of_edge = std::sqrt(moment / 4), scale = 10 / (of_primary + 4 * of_edge);
-  EXPECT_NEAR(guide.rate(BoundaryGuide::primary), std::pow(of_primary * scale, 10.0 / 18) / 3, 1e-12);
-  EXPECT_NEAR(guide.rate(BoundaryGuide::from_edge), std::pow(of_edge * scale, 1000.0 / 1008) / 3, 1e-3);
-  EXPECT_EQ(guide.rate(BoundaryGuide::from_camera), 0.125 / 3);
-  EXPECT_EQ(guide.rate(BoundaryGuide::pixel_border), 0);
+  EXPECT_NEAR(guide.rate(Technique::primary_edge), std::pow(of_primary * scale, 10.0 / 18) / 3, 1e-12);
+  EXPECT_NEAR(guide.rate(Technique::from_edge), std::pow(of_edge * scale, 1000.0 / 1008) / 3, 1e-3);
+  EXPECT_EQ(guide.rate(Technique::from_camera), 0.125 / 3);
+  EXPECT_EQ(guide.rate(Technique::pixel_border), 0);
 }
 
 /// What one sample adds to one value of an image counts by the square of its sum, the rest by the sum of its squares; with
@@ -130,7 +131,7 @@ TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
       sink.add(3, Rgb(-0.5, 0, 0), 5, kValueOnly);
       sink.add(3, Rgb(0, 4, 0), 7, kValueOnly);
       sink.add(4, Rgb(0, 0, -2), 5, kValueOnly);
-      sink.note_guide(BoundaryGuide::primary, 0.5);
+      sink.note_guide(BoundaryGuide::table(Technique::primary_edge), 0.5);
     }
     double mean = 0;
     for (const GuideRecord& r : sink.records) mean += r.square / samples;
@@ -141,7 +142,7 @@ TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
 
 TEST(BoundaryGuide, LearnsNothingFromNothing) {
   const BoundaryGuide guide({true, true, true, false, true}, {}, {1, 1, 1, 0, 1});
-  EXPECT_EQ(guide.rate(BoundaryGuide::primary), 0.25);
+  EXPECT_EQ(guide.rate(Technique::primary_edge), 0.25);
   EXPECT_EQ(guide.warp(0).density(0.3), 1);
 }
 

@@ -68,11 +68,10 @@ BoundaryGuide uneven_guide() {
   cost.fill(1000);
   std::vector<GuideRecord> records;
   Rng rng(Stream{test_seed(11), 0, 0}, 0, 0);
-  for (const int technique : {BoundaryGuide::from_edge, BoundaryGuide::from_camera})
+  for (const Technique technique : {Technique::from_edge, Technique::from_camera})
     for (int i = 0; i < 500; ++i) {
       const double u = rng.uniform();
-      records.push_back({BoundaryGuide::table(static_cast<BoundaryGuide::Search>(technique)), u * u,
-                         technique == BoundaryGuide::from_edge ? 1.0 : 3.0});
+      records.push_back({BoundaryGuide::table(technique), u * u, technique == Technique::from_edge ? 1.0 : 3.0});
     }
   return {{true, false, true, false, true}, records, cost};
 }
@@ -93,7 +92,7 @@ TEST(BoundaryWeights, AddUpToOne) {
   Worker worker(prepared, gates, options, pick, sink);
   const BoundaryEdges edges(prepared);
   const BoundaryGuide guide = uneven_guide();
-  ASSERT_NE(guide.rate(BoundaryGuide::from_edge), guide.rate(BoundaryGuide::from_camera));
+  ASSERT_NE(guide.rate(Technique::from_edge), guide.rate(Technique::from_camera));
   BoundaryWeights weights(worker, edges, guide);
   int found[4] = {0, 0, 0, 0}, shared[4] = {0, 0, 0, 0}, at_lengths = 0;
   for (int i = 0; i < 100000; ++i) {

@@ -102,8 +102,7 @@ double part_of_connections(const Finder& f, const PathSink::Found& found, Target
   const int first = f.worker.balance.rates.light_connections > 0 ? 1 : std::max(1, last - 1);
   for (int on_arc = first; on_arc <= last; ++on_arc)
     if (const double pdf = pdf_on_arc(f.prepared, found.path, on_arc); pdf > 0)
-      sum += f.worker.balance.rates.ellipsoidal_share *
-             f.worker.balance.connection(found.path, found.pixel, target, 0, on_arc, pdf);
+      sum += f.worker.balance.connection(found.path, found.pixel, target, 0, on_arc, pdf);
   return sum;
 }
 
@@ -136,9 +135,9 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
       f.worker.balance.rates.ellipsoidal_share = share;
       const GateWeights standard = f.worker.balance.standard(found.path, found.pixel, true);
       const double of_value = part_of_connections(f, found, {});
-      EXPECT_NEAR(of_value + (1 - share) * standard.value, 1, 1e-9);
+      EXPECT_NEAR(of_value + standard.value, 1, 1e-9);
       for (int gate = 0; gate < 3; ++gate)
-        EXPECT_NEAR(part_of_connections(f, found, pair_target(gate)) + (1 - share) * standard.slope, 1, 1e-9);
+        EXPECT_NEAR(part_of_connections(f, found, pair_target(gate)) + standard.slope, 1, 1e-9);
       shared += of_value > 0.01 && standard.value > 0.01;
     }
     // Of light subpaths, by every joint.
@@ -150,14 +149,14 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
         double of_light = 0;
         for (int joint = 0; joint <= found.path.size() - 3; ++joint) {
           const GateWeights part = f.worker.balance.light(found.path, found.pixel, joint, true);
-          of_light += light * part.value;
-          sum.slope += light * part.slope;
+          of_light += part.value;
+          sum.slope += part.slope;
         }
         sum.value += of_light;
         const double by_arcs = share > 0 ? part_of_connections(f, found, {}) : 0;
-        EXPECT_NEAR(by_arcs + (1 - share) * sum.value, 1, 1e-9);
+        EXPECT_NEAR(by_arcs + sum.value, 1, 1e-9);
         const double pairs = share > 0 ? part_of_connections(f, found, pair_target(1)) : 0;
-        EXPECT_NEAR(pairs + (1 - share) * sum.slope, 1, 1e-9);
+        EXPECT_NEAR(pairs + sum.slope, 1, 1e-9);
         shared_by_light += of_light > 0.01 && of_light < 0.99;
       }
     }
