@@ -26,8 +26,8 @@ constexpr int kMostBatches = 12, kFewestBatches = 3;
 constexpr int kPixels = 4096, kFewestPixels = 576;
 constexpr int kBlocks = 4;         ///< across the image
 constexpr double kPaths = 300000;  ///< of standard sampling, about, and of as much work of each other share
-/// A trial's work is this part of that of the job at most.
-constexpr double kTrialPart = 0.1;
+/// The work of all trials is this part of that of the job at most; that of light subpaths takes its part of it.
+constexpr double kTrialPart = 0.1, kLightTrialPart = 0.04;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
 /// Trials of fewer paths than this overrule the width of the gates only where they differ by this factor.
@@ -52,8 +52,8 @@ constexpr double kConnectionsWork = 4;
 constexpr double kCostHandicapOfStandard[] = {1.1, 1};
 
 /// Paths of the trial of light subpaths at most and, where the job is small, at least, what each takes in paths by standard
-/// sampling (one without and one with light subpaths and all their joints), and the trial's part of the job's work.
-constexpr double kLightPaths = 16384, kFewestLightPaths = 1024, kLightWork = 6, kLightTrialPart = 0.04;
+/// sampling (one without and one with light subpaths and all their joints).
+constexpr double kLightPaths = 16384, kFewestLightPaths = 1024, kLightWork = 6;
 
 double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;
@@ -164,12 +164,13 @@ struct Trial {
   Purpose purpose;
   double job;    ///< samples per pixel that it decides about
   double light;  ///< share of light subpaths
+  double part;   ///< of the job's work, at most
 
   /// The best of kShares, or `by_width` where it cannot tell. `term`: of the derivative along one column; null: of images.
   double choose(double by_width, const TangentBasis* column, const Term* term, const Stream& stream,
                 double& work) const {
     const double triangles = static_cast<double>(scene.triangles.size());
-    const double budget = kTrialPart * pixels_of(scene) * job - 3 * kSamplesPerTriangle * triangles;
+    const double budget = part * pixels_of(scene) * job - 3 * kSamplesPerTriangle * triangles;
     const double paths = std::min(kPaths, budget / 3);
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
     // At least so many that the smallest batches have a sample of pure connections.
@@ -203,7 +204,7 @@ struct Trial {
         cheapest = std::min(cheapest, renderers[i]->work() / (range.end * pixels_of(small)));
       }
       // Where samples take other work than assumed, fewer batches have to do.
-      const double allowed = kTrialPart * pixels_of(scene) * job * cheapest;
+      const double allowed = part * pixels_of(scene) * job * cheapest;
       if (spent * (b + 2) / (b + 1) > allowed) batches = b + 1;
       if (b + 1 == batches) work += spent;
     }
@@ -240,13 +241,13 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   const SamplingMix by_width = sampling_mix(plain, gates, scene);
   SamplingMix best;
   // Next-event estimation finds light of one bounce. Standard sampling must have a part.
+  const bool light_is_open = !options.light && options.max_bounces > 1;
+  const double part = kTrialPart - (light_is_open ? kLightTrialPart : 0);
   const auto choose_light = [&](const TrialWidths& widths, double samples, const TangentBasis* column) {
-    const double budget =
-        kTrialPart * pixels_of(scene) * samples - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+    const double budget = kLightTrialPart * pixels_of(scene) * samples -
+                          2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
     const double paths = std::min(kLightPaths, budget / kLightWork);
-    if (options.light || options.max_bounces < 2 || coverage < widths.below_is_ellipsoidal ||
-        !(paths >= kFewestLightPaths))
-      return 0.0;
+    if (!light_is_open || coverage < widths.below_is_ellipsoidal || !(paths >= kFewestLightPaths)) return 0.0;
     return measure_light_share(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
                                work);
   };
@@ -255,7 +256,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     const double light = term ? best.interior_light : best.image_light;
     if (coverage < widths.below_is_ellipsoidal) return 1.0;
     if (width > widths.above_is_standard) return 0.0;
-    return Trial{scene, gates, options, purpose, samples, light}.choose(otherwise, column, term, stream, work);
+    return Trial{scene, gates, options, purpose, samples, light, part}.choose(otherwise, column, term, stream, work);
   };
   best.image_light = choose_light(kImage, job.image, nullptr);
   best.image = choose(kImage, by_width.image, job.image, nullptr, nullptr);
