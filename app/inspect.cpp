@@ -117,7 +117,10 @@ void print_techniques(const Problem& problem) {
     fmt::print("  {:<24} {:>3.0f} % ellipsoidal connections, {:>3.0f} % standard sampling, {:>3.0f} % light subpaths\n",
                what, 100 * connections, others * (1 - light), others * light);
   };
-  const SamplingMix image = *problem.image_estimator().mix, gradient = *problem.estimator().mix;
+  const auto mix_of = [&](const EstimatorOptions& options) {
+    return sampling_mix(options, problem.gates(), problem.scene());
+  };
+  const SamplingMix image = mix_of(problem.image_estimator()), gradient = mix_of(problem.estimator());
   fmt::print("\nHow paths are found:\n");
   print("images", image.image, image.image_light);
   print("images, for gradients", gradient.image, gradient.image_light);

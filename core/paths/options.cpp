@@ -64,6 +64,7 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
   mix.keep_length = mix.interior > 0 && possible &&
                     options.keep_length.value_or(gates.shape().width() < kSteep * emitter_size(scene));
   if (options.light && !scene.capture) mix.image_light = mix.interior_light = *options.light;
+  if (options.max_bounces == 0) mix.image_light = mix.interior_light = 0;
   return mix;
 }
 

@@ -18,7 +18,7 @@ enum class ArcPick { contribution, uniform };
 /// others.
 enum class Numbers { low_discrepancy, independent };
 
-/// How the visibility term finds boundary segments. Each can be left out, to measure what it brings; the mean stays, except under Dirac
+/// How the visibility term finds boundary segments. Each can be left out (YAML: `estimator.techniques`), to measure what it brings; the mean stays, except under Dirac
 /// gates, where only lengths drawn from the gates are met.
 struct BoundaryTechniques {
   bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
@@ -38,7 +38,7 @@ struct ConnectionRates {
 };
 
 /// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
-/// standard. Strictly between, multiple importance sampling combines the two. Rates hold where connections take all.
+/// standard or have light subpaths. Strictly between, multiple importance sampling combines the two. Rates hold where connections take all.
 struct SamplingMix {
   double image = 0, interior = 0;
   ConnectionRates interior_rates = {}, path_length_rates = {};
@@ -48,6 +48,9 @@ struct SamplingMix {
   /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives do not act on the gates, but for light that the camera
   /// sees an emitter by. Needs connections in the interior term.
   bool keep_length = false;
+  /// Whether every sample of a camera's images, or of the interior term, adds to its own pixel only.
+  bool image_stays_in_pixels() const { return image == 0 && image_light == 0; }
+  bool interior_stays_in_pixels() const { return interior == 0 && interior_light == 0; }
   bool operator==(const SamplingMix&) const = default;
 };
 
@@ -81,7 +84,7 @@ struct EstimatorOptions {
 /// Whether the paths of a scene can keep their lengths: all emitters have an extent, and nothing is of glass.
 bool may_keep_length(const Scene& scene);
 
-/// What a renderer makes of `sampling`, `mix` and `keep_length`.
+/// What a renderer makes of `sampling`, `mix`, `light` and `keep_length`.
 SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, const Scene& scene);
 
 /// The terms of the derivative (paper Eq. 13). A sample of `interior` and `path_length` is a camera path with all its

@@ -294,11 +294,14 @@ class PreparedScene {
   std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
     return end_point(closest_camera_hit(direction), camera.position, direction);
   }
+  /// Whether a triangle that lies on y's is what is seen there along d.
+  bool covered(const SurfacePoint& y, const Vec3& d) const {
+    return y.triangle >= 0 && stacked.may_cover(y.triangle, y.n, d) && top_face(y.triangle, y.p, d) != y.triangle;
+  }
   /// Whether light from x meets y, which is the last point on its way or covered by nothing that lies on it.
   bool visible(const SurfacePoint& x, const SurfacePoint& y) const {
     const Vec3 d = y.p - x.p;
-    if (y.triangle >= 0 && stacked.may_cover(y.triangle, y.n, d) && top_face(y.triangle, y.p, d) != y.triangle)
-      return false;
+    if (covered(y, d)) return false;
     return !caster.occluded(offset_ray_origin(x, d), offset_ray_origin(y, -d));
   }
 

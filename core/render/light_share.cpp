@@ -47,7 +47,8 @@ class MomentSink final : public Sink {
     double squares = 0;
     if (!rates_) {
       gates_.for_each_value(length, [&](int, double w) { squares += w * w; });
-      squares *= value.max() * value.max();
+      const double counted = value.max() * use.value;
+      squares *= counted * counted;
     } else if (!rates_->touched().empty()) {
       const ColumnRates::Rates& rates = (*rates_)[0];
       gates_.for_each_derivative(length, [&](int, double w, double slope) {

@@ -26,7 +26,7 @@ struct Job {
 /// cross need no trial; other sampling than automatic none either. How often light subpaths are used has a trial of its own, before (see
 /// measure_light_share). Where connections find all of a term and paths
 /// bounce once, so that each technique could find them all, rates are chosen by a trial of that term's derivative.
-/// Each trial takes about a tenth of the work of what it decides about at most; where that is too little to tell
+/// Together trials take about a tenth of the work of what they decide about at most; where that is too little to tell
 /// techniques apart there is none, and the width of the gates decides. `trial_work`, where given, gets the work of all
 /// trials (see Renderer::work).
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,

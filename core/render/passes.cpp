@@ -68,6 +68,8 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
         "estimator.keep_length: paths cannot keep their lengths in captures, with lights without an extent, glass, "
         "standard sampling or "
         "gates of any length (allowed here: false)");
+  if (options.light.value_or(0) > 0 && scene.captures())
+    throw InputError("estimator.light: paths of captures have no light subpaths (allowed here: 0)");
   if (gates.shape().is_dirac()) check_dirac();
   // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
   // (measured on the cube and the box, 0.1 % to 10 %).
@@ -175,7 +177,7 @@ void Passes::visit(std::span<const TechniqueUse> uses, const GatePick& pick, con
 void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, double light,
                        const GatePass& lengths, const Pass& pass, Partition partition) const {
   const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
-  worker.balance.rates = {share, used, light / (1 - light), light > 0 ? 1.0 : 0.0, pair_coupling_gain_};
+  worker.balance.rates = {share, used, light / (1 - light), light > 0 && options.max_bounces > 1, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;

@@ -55,9 +55,9 @@ class Passes {
   /// Whether the term can be other than zero, so that a pass over it is worth while.
   bool has(Term term) const;
   /// Whether every sample of images or of the term adds to its own pixel only, and pixels are statistically independent.
-  bool stays_in_pixels() const { return (mix.image == 0 && mix.image_light == 0) || scene.captures(); }
+  bool stays_in_pixels() const { return mix.image_stays_in_pixels() || scene.captures(); }
   bool stays_in_pixels(Term term) const {
-    return (term == Term::interior && mix.interior == 0 && mix.interior_light == 0) || scene.captures();
+    return (term == Term::interior && mix.interior_stays_in_pixels()) || scene.captures();
   }
 
   /// Whether the term draws lengths from the gates.
@@ -124,7 +124,7 @@ class Passes {
   /// Whether the interior term takes the continuous part of dW in pairs.
   bool interior_pairs() const;
 
-  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling. `rates` hold where
+  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling and light subpaths. `rates` hold where
   /// there are no others; `light`: see SamplingMix::interior_light.
   void run_paths(Worker& worker, double share, const ConnectionRates& rates, double light, const GatePass& lengths,
                  const Pass& pass, Partition partition) const;

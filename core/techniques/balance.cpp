@@ -53,7 +53,7 @@ template <class LengthPdf>
 double Balance::part_of_arc(const Path& path, int on_arc, double pdf_on_arc, bool gathered,
                             LengthPdf&& length_pdf) const {
   const int last = path.size() - 1;
-  const bool by_light = rates.light_connections > 0 && !gathered;
+  const bool by_light = rates.light_connections && !gathered;
   if (last == 1 || (gathered && last == 2)) return on_arc == last ? 1 : 0;  // x0 makes no other connections
   const SurfacePoint &q = path.vertex[last - 1], &y = path.vertex[last];
   if (is_light(y.triangle) && !by_light) return on_arc == last - 1 ? 1 : 0;  // no circle goes through a point
@@ -74,10 +74,10 @@ double Balance::part_of_arc(const Path& path, int on_arc, double pdf_on_arc, boo
     if (outside(last - 2)) count(last - 1, pdf_y);
   }
   if (by_light && last > 2) {
-    double others = rates.light_connections * pdf_y * step_from_light_pdf(path, last - 1);
+    double others = pdf_y * step_from_light_pdf(path, last - 1);
     for (int k = last - 2; k > 0; --k) {
-      others *= LightWalk::kPickNext / step_pdf(path, k - 1, path.vertex[k]);
-      if (outside(k - 1) && outside(k)) count(k, others);
+      others /= step_pdf(path, k - 1, path.vertex[k]);
+      if (outside(k - 1) && outside(k)) count(k, others * LightWalk::pick_probability(last - 2 - k));
       others *= step_from_light_pdf(path, k);
     }
   }
@@ -88,7 +88,7 @@ double Balance::connection(const Path& path, int pixel, const TargetLength& targ
                            double pdf_on_arc) const {
   // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
   // densities of the length differ between the two techniques.
-  const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !(rates.light_connections > 0));
+  const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !rates.light_connections);
   const double camera_rate = target.pair ? rates.connections.camera_pairs : rates.connections.camera_lengths;
   const double part = part_of_arc(path, on_arc, pdf_on_arc, false, [&](int from) {
     const double rate = from == 0 ? camera_rate : rates.connections.walk;
@@ -124,7 +124,8 @@ double Balance::border(const Path& path, int pixel, double tau, const Vec3& tang
   return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / sum : 0;
 }
 
-/// The part of connections, whose density is multiplied by `gain`, against all other techniques.
+/// The part of connections, whose density is multiplied by `gain`, against all other techniques. Light arcs, which find few paths that
+/// other arcs do not, are left out of the estimate.
 double Balance::of_connections(const Path& path, int pixel, double gain) const {
   const int last = path.size() - 1;
   const SurfacePoint& y = path.vertex[last];
@@ -154,7 +155,8 @@ double Balance::of_connections(const Path& path, int pixel, double gain) const {
                      (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
                      (2 * kPi * kCurves * area_rate);
   }
-  if (rates.light > 0) standard *= 1 + rates.light * light_ratio(path, pixel).all;
+  // Of the samples that are no connections, one in 1 + rates.light is standard.
+  if (rates.light > 0) standard *= (1 + rates.light * light_ratio(path, pixel).all) / (1 + rates.light);
   const double ours = gain * rates.ellipsoidal_share * ellipsoidal;
   return ours / (ours + (1 - rates.ellipsoidal_share) * standard);
 }

@@ -23,10 +23,10 @@ namespace isochron {
 
 /// How often each technique is used.
 struct TechniqueRates {
-  double ellipsoidal_share = 0;      ///< of the samples; the others are standard
+  double ellipsoidal_share = 0;      ///< of the samples; the others are standard or have light subpaths
   ConnectionRates connections = {};  ///< of ellipsoidal connections
   double light = 0;                  ///< samples with light subpaths per standard one
-  double light_connections = 0;      ///< connections with light subpaths per sample of connections: 0 or 1
+  bool light_connections = false;    ///< whether connections have light subpaths, too
   double pair_coupling_gain = 1;     ///< factor on the density of coupled pairs
 };
 
@@ -53,7 +53,8 @@ class Balance {
   /// emitter arcs put the last one, surface arcs one before. `pdf_on_arc`: of the point that was found, per area and length.
   double connection(const Path& path, int pixel, const TargetLength& target, int side, int on_arc,
                     double pdf_on_arc) const;
-  /// The same of a path that was gathered for its vertex 0: without the vertices of light subpaths, and other techniques.
+  /// The same of a path that was gathered for its vertex 0 (EllipsoidalConnections::gather): only arcs find it, and none of light
+  /// subpaths.
   double gathered(const Path& path, int on_arc, double pdf_on_arc) const;
   /// Of a path of length tau that ends on a border of an emitter: found by an arc of density `pdf_on_arc` (per area and length), or
   /// without one from its last scattering vertex. `tangent`: unit, of the border; `border_pdf`: of its points, per length.

@@ -64,6 +64,8 @@ class BoundaryGuide {
   /// all others.
   const Warp& warp(int table) const { return warps_[table]; }
   static constexpr int table(Technique t) { return static_cast<int>(t) - static_cast<int>(Technique::primary_edge); }
+  static_assert(static_cast<int>(Technique::from_camera) - static_cast<int>(Technique::primary_edge) ==
+                kTechniques - 1);
   static int table_from_camera(const CameraModel& camera, int pixel, int bounces) {
     if (bounces > 1) return table(Technique::from_camera);
     const int x = pixel % camera.width * kTiles / camera.width, y = pixel / camera.width * kTiles / camera.height;

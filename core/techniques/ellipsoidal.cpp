@@ -10,7 +10,7 @@ namespace isochron {
 void EllipsoidalConnections::sample_from_camera(double scale, Rng& rng) {
   worker_.start_at_sensor(worker_.path, 0);
   draw_targets(pass_, worker_.gates, worker_.pick, GatePick::kImage, rng, targets_);
-  if (connects_light() && !targets_.empty()) light_.trace(worker_, rng);
+  light_is_traced_ = false;
   for (const TargetLength& target : targets_) {
     if (scene_.emitters.seen_by_camera) connect_emitter(target, GatePick::kImage, Rgb(scale), rng);
     // Of paths that keep their lengths only those that the camera sees an emitter by have a slope.
@@ -53,7 +53,7 @@ void EllipsoidalConnections::gather(std::span<const double> lengths, int max_bou
 
 void EllipsoidalConnections::connect_along(int pixel, double scale, int max_bounces, Rng& rng) {
   Path& path = worker_.path;
-  if (connects_light()) light_.trace(worker_, rng);
+  light_is_traced_ = false;
   Rgb throughput(1.0);
   for (int bounce = 1; bounce <= max_bounces; ++bounce) {
     const double needed = path.length.back() + scene_.distance_to_emitters(path.back().p);
@@ -97,6 +97,8 @@ void EllipsoidalConnections::connect_surface(const TargetLength& target, int pix
 }
 
 void EllipsoidalConnections::connect_light(const TargetLength& target, int pixel, const Rgb& throughput, Rng& rng) {
+  if (!light_is_traced_) light_.trace(worker_, rng);
+  light_is_traced_ = true;
   const int picked = light_.pick(rng.uniform());
   Path& path = worker_.path;
   // Its number of vertices, and q, have to be left.

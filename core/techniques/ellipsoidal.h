@@ -7,8 +7,8 @@
 // Where paths keep their lengths (theory section 7) the ends of circles count, too: at the borders of emitters (EmitterBorders), and
 // where circles begin, at the foot of the last scattering vertex q (front arcs: q on a conic from which the way to the foot has
 // the length that is left).
-// Both need all their segments outside of dielectrics: only there is the locus an ellipsoid of the optical length. A path
-// that ends outside is found by emitter arcs, also if it went through dielectrics before.
+// All need the segments next to the point on the arc outside of dielectrics: only there is the locus an ellipsoid of the optical length.
+// A path that ends outside is found by emitter arcs, also if it went through dielectrics before.
 // Every crossing arc is sampled once; only which of them get their visibility tested is a random choice, so the density
 // of a technique is one over the arc's span. (The choice by contribution evaluates all arcs and tests as many of them as
 // cost about as much again; the uniform one evaluates and tests only one arc.)
@@ -85,7 +85,7 @@ class EllipsoidalConnections {
   EllipsoidBvh::Focus scattering_focus(const SurfacePoint& x, const Vec3& w) const {
     return {x.p, scene_.two_sided(x.triangle) && dot(x.n, w) < 0 ? -x.n : x.n, 0, 1, true};
   }
-  bool connects_light() const { return !receiver_ && worker_.balance.rates.light_connections > 0; }
+  bool connects_light() const { return !receiver_ && worker_.balance.rates.light_connections; }
 
   /// An arc to test.
   struct Choice {
@@ -141,6 +141,8 @@ class EllipsoidalConnections {
   LengthReceiver* const receiver_;
   EmitterBorders borders_;
   LightWalk light_;
+  bool light_is_traced_ =
+      false;  ///< for the sample: late, as its first random numbers, which are the most even, are for other arcs
   std::vector<TargetLength> targets_;
   std::vector<ArcPair> arcs_;
   Vec3 back_;  ///< unit direction from the path's last vertex to the one before

@@ -15,7 +15,9 @@ void LightSubpaths::sample(int pixel, double scale, Rng& rng) {
   if (max_bounces < 2) return;
   const auto x1 = worker_.trace_camera(direction);
   if (!x1) return;
-  path_.push(scene_, *x1);
+  const double distance = length(x1->p - scene_.camera.position);
+  if (!(distance > 0)) return;  // a camera on a surface sees nothing
+  path_.push(scene_, *x1, distance);
   Rgb throughput(1.0);
   for (int bounce = 1;; ++bounce) {
     join(pixel, throughput * scale);

@@ -19,8 +19,8 @@ class LightSubpaths {
         pairs_(pairs),
         path_(worker.options.max_bounces) {}
 
-  /// One camera path from `pixel` and one light subpath, with all their joints; contributions are scaled by `scale`, those to
-  /// whichever pixel the camera sees the light subpath in by what it would be if all pixels had as many samples, over their number.
+  /// One camera path from `pixel` and one light subpath, with all their joints. Contributions to the pixel are scaled by `scale`. Those of
+  /// the camera's own joints may land on any pixel: they are scaled as if all pixels had as many samples.
   void sample(int pixel, double scale, Rng& rng);
 
  private:

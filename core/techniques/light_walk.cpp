@@ -13,7 +13,7 @@ void LightWalk::trace(Worker& worker, Rng& rng) {
   Vec3 w = scene.sample_emission(emitter_, u3, u4);
   const double cosine = is_light(emitter_.triangle) ? 1 : dot(emitter_.n, w);
   const double direction_pdf = scene.emission_pdf(emitter_, w);
-  if (!(direction_pdf > 0)) return;
+  if (!(direction_pdf > 0) || scene.covered(emitter_, -w)) return;
   const Rgb emitted = scene.emitted(emitter_, w) * (cosine / (pdf * direction_pdf));
   // Roulette takes walks whose throughput starts at one.
   Rgb throughput(1.0);

@@ -34,14 +34,13 @@ class LightWalk {
   void trace(Worker& worker, Rng& rng);
 
   const std::vector<LightVertex>& vertices() const { return vertices_; }
-  /// Of connections: one of the vertices, each with kPickNext times the probability of the one before, or -1 where the walk has
-  /// ended.
-  static constexpr double kPickNext = 0.5;
+  /// For connections: vertex i with probability 2^-(i + 1), whatever the walk's length, as weights must not depend on that; -1 where
+  /// the walk has ended before. Most of the light in a case has been reflected once or twice.
   int pick(double u) const {
     const double i = -std::log2(u);
     return i < static_cast<double>(vertices_.size()) ? static_cast<int>(i) : -1;
   }
-  static double pick_probability(int i) { return std::ldexp(kPickNext, -i); }
+  static double pick_probability(int i) { return std::ldexp(1, -(i + 1)); }
   /// Completes a path that ends next to vertex i: by that and those before. `remove` undoes it.
   void append(const PreparedScene& scene, int i, Path& path) const {
     for (int k = i; k >= 0; --k) path.push(scene, vertices_[k].point);

@@ -28,6 +28,7 @@ void set_automatic(Experiment& experiment) {
   experiment.estimator.pick = ArcPick::contribution;
   experiment.estimator.numbers = Numbers::low_discrepancy;
   experiment.estimator.keep_length.reset();
+  experiment.estimator.light.reset();
   experiment.gradient.method = GradientMethod::analytic;
 }
 
@@ -37,6 +38,7 @@ Method with_sampling(const std::string& name, Sampling sampling, bool antithetic
             experiment.estimator.sampling = sampling;
             experiment.estimator.antithetic = antithetic;
             experiment.estimator.keep_length = false;
+            experiment.estimator.light = 0;
           }};
 }
 
@@ -86,6 +88,7 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
                      [](Experiment& e) {
                        set_automatic(e);
                        e.estimator.keep_length = false;
+                       e.estimator.light = 0;
                        e.estimator.sampling = Sampling::ellipsoidal;
                        e.estimator.pick = ArcPick::uniform;
                        e.estimator.numbers = Numbers::independent;
@@ -134,6 +137,7 @@ bool MethodRun::same_as(const MethodRun& other) const {
     options.mix = sampling_mix(options, problem.gates(), problem.scene());
     options.sampling = Sampling::automatic;
     options.keep_length.reset();
+    options.light.reset();
     return options;
   };
   return settled(problem_) == settled(other.problem_);

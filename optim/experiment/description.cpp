@@ -11,6 +11,7 @@
 #include "core/scene/scene_loader.h"
 #include "optim/experiment/choices.h"
 #include "optim/experiment/number_file.h"
+#include "optim/experiment/technique_names.h"
 
 namespace isochron {
 namespace {
@@ -140,6 +141,11 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "joined with the "
              "paths from the camera. For light that leaves its case by a slit. Not of captures",
              {.unset = !options.light, .otherwise = "`auto`: measured; else `0`"});
+  keys.value("techniques", techniques(options),
+             "which techniques may be used, to measure what each brings. Of the visibility term's the mean does not "
+             "depend on them, but "
+             "under Dirac gates",
+             {.unset = !leaves_out_techniques(options), .otherwise = "all"});
   keys.value("guiding", field::boolean(e.guiding),
              "visibility: learn where boundaries matter from a small part of the samples");
   keys.value("follow", field::non_negative(options.follow),

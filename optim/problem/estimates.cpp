@@ -92,7 +92,7 @@ std::vector<DerivativeEstimate> differences(const Problem& problem, int count, s
   const int samples = problem.experiment().samples.primal;
   require_replicates("primal", samples);
   const Stream stream = problem.stream(Pass::finite_difference, iteration);
-  const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image == 0;
+  const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image_stays_in_pixels();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
   return {collect_whole("total", samples, replicates, independent, count, poll,
                         [&](SampleRange range) { return difference(stream, range); })};

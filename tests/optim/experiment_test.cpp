@@ -139,6 +139,15 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"seed: 3", "estimator: {sampling: best}", "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
       {"seed: 3", "estimator: {hidden_shapes: []}", "11:28: estimator.hidden_shapes: holds no name (at least one)"},
       {"seed: 3", "estimator: {antithetic: 1}", "11:25: estimator.antithetic: '1' is neither (true or false)"},
+      {"seed: 3", "estimator: {light: 1}", "11:20: estimator.light: 1 is out of range (a number from 0 to below 1)"},
+      {"seed: 3", "estimator: {techniques: [standard, magic]}",
+       "11:36: estimator.techniques[1]: there is no technique 'magic' (standard, ellipsoidal, light, wedge, "},
+      {"seed: 3", "estimator: {techniques: [light, wedge]}",
+       "11:25: estimator.techniques: leaves no technique that finds paths (standard, ellipsoidal or both)"},
+      {"seed: 3", "estimator: {techniques: [standard], sampling: ellipsoidal}",
+       "11:25: estimator.techniques: leaves out what `sampling` asks for (with sampling: auto, any)"},
+      {"seed: 3", "estimator: {techniques: [standard, wedge], light: 0.5}",
+       "11:25: estimator.techniques: leaves out light subpaths, which `light` asks for"},
   };
   expect_messages(folder, cases);
   const auto table_error = [&](const std::string& table) -> std::string {
@@ -211,6 +220,15 @@ TEST(Experiment, OverridesAreCheckedLikeTheFile) {
   EXPECT_FALSE(changed.guiding);
   EXPECT_EQ(changed.estimator.follow, 0.5);
   EXPECT_EQ(changed.estimator.follow_radius, 0);
+  const EstimatorOptions few = load_experiment(file, {"estimator.techniques=[standard, wedge]"}).estimator;
+  EXPECT_EQ(few.sampling, Sampling::standard);
+  EXPECT_EQ(few.light, 0);
+  EXPECT_EQ(few.boundary, (BoundaryTechniques{true, false, false, false, false}));
+  const EstimatorOptions most =
+      load_experiment(file, {"estimator.techniques=[standard, ellipsoidal, light, aimed]", "estimator.light=0.4"})
+          .estimator;
+  EXPECT_EQ(most.sampling, Sampling::automatic);
+  EXPECT_EQ(most.light, 0.4);
   EXPECT_EQ(load_experiment(file, {"optimizer.iterations="}).optimizer.iterations, OptimizerSpec().iterations);
   EXPECT_EQ(load_experiment(file, {"parameters[0]="}).parameters.size(), 1u);
   for (const char* wrong : {"optimizer.iterations=-9", "parameters[7].initial=1", "nothing=1", "gates.sigma=x",
@@ -258,7 +276,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
   folder.write("table.txt", "-1 0\n0 1\n0 0.5\n1.5 0\n");
   const std::string vertices =
       "seed: 9007199254740993\nestimator: {sampling: ellipsoidal, antithetic: false, pick: uniform, "
-      "numbers: independent, hidden: 0.3, hidden_shapes: [block, lamp], guiding: false, follow: 0.25, follow_radius: "
+      "numbers: independent, hidden: 0.3, hidden_shapes: [block, lamp], techniques: [ellipsoidal, aimed, at_length], "
+      "guiding: false, follow: 0.25, follow_radius: "
       "2.5}\n"
       "gradient: {method: finite_difference, step: 0.003, common_numbers: false}\nresolution: [12, 9]\n";
   const std::string gates = "{kind: gaussian, centers: [4.5, 5.5], sigma: 0.3}";
@@ -310,6 +329,8 @@ TEST(Experiment, ResolvedFileReadsBackTheSame) {
     EXPECT_EQ(back.estimator.numbers, Numbers::independent);
     EXPECT_FALSE(back.guiding);
     EXPECT_EQ(back.estimator.hidden, 0.3);
+    EXPECT_EQ(back.estimator.boundary, (BoundaryTechniques{false, true, false, true, false}));
+    EXPECT_EQ(back.estimator.light, 0);
     EXPECT_EQ(back.hidden_shapes, (std::vector<std::string>{"block", "lamp"}));
     EXPECT_EQ(back.estimator.follow, 0.25);
     EXPECT_EQ(back.estimator.follow_radius, 2.5);

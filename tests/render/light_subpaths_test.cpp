@@ -1,14 +1,14 @@
-// Light subpaths: combined with standard sampling, and with ellipsoidal connections, they give what standard sampling alone
-// gives, in images and in derivatives; and what they find has less noise where light leaves its case by a slit.
+// Light subpaths: combined with standard sampling, and with ellipsoidal connections, they give what these alone give, in
+// images and in derivatives; and they are used where light leaves its case by a slit.
 //
 // Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each, below 2e-3 for the file), fixed seeds.
-// Standard errors are below 1 % of the image and 2 % of the derivatives' scale: what lacks 9 % of one fails. Light subpaths
-// take more than a third of the paths here, by every joint.
-#include "core/techniques/light_subpaths.h"
-
+// Standard errors are below 1 % of the image and 2 % of the derivatives' scale, 10 % by the block's motion: what lacks 9 % of the
+// former fails. How paths are shared has a test without noise (weights_test.cpp).
 #include <gtest/gtest.h>
 
+#include "core/base/error.h"
 #include "core/render/measure_mix.h"
+#include "tests/render/pixel_statistics.h"
 #include "tests/render/support.h"
 
 namespace isochron::testing {
@@ -112,6 +112,43 @@ TEST(LightSubpaths, OfLightsWithoutAnExtent) {
                   .intensity = Rgb(4)};
   scene.lights = {point, spot};
   expect_equal_images(scene, GateSet(GateShape::gaussian(1.5), {3.0, 5.0}), with_light(3, 0, 0.5));
+}
+
+TEST(LightSubpaths, AreTakenWhereTheyHelp) {
+  const auto settled = [](const Scene& scene, const GateSet& gates) {
+    EstimatorOptions options{.max_bounces = 4};
+    options.mix = measure_mix(scene, gates, options, nullptr, {3, 0, 0}, Purpose::images);
+    return options;
+  };
+  Scene cove = load_scene(PROJECT_ROOT "/scenes/cove/scene.yaml");
+  cove.camera.width = cove.camera.height = 16;
+  const GateSet wide(GateShape::gaussian(0.6), {6.5, 8});
+  const EstimatorOptions with = settled(cove, wide);
+  EXPECT_GT(with.mix->image_light, 0);
+  // Pixel by pixel, for the same work.
+  double cost[2];
+  for (const bool light : {false, true}) {
+    EstimatorOptions options = with;
+    if (!light) options.light = 0;
+    const Renderer renderer(cove, wide, options);
+    PixelBatches pixels;
+    for (int b = 0; b < 16; ++b) pixels.add(renderer.render({4, 0, 0}, {b * 32, (b + 1) * 32}));
+    cost[light] = pixels.mean_variance() * renderer.work();
+  }
+  EXPECT_LT(cost[1], 0.3 * cost[0]);
+  Scene box = load_scene(TEST_DATA "/cornell/scene.yaml");
+  box.camera.width = box.camera.height = 16;
+  EXPECT_EQ(settled(box, GateSet(GateShape::steady(), {0})).mix->image_light, 0);
+}
+
+TEST(LightSubpaths, AreRefusedInCaptures) {
+  Scene scene;
+  scene.capture.emplace();
+  scene.capture->columns = scene.capture->rows = scene.camera.width = scene.camera.height = 1;
+  scene.capture->sensor = {{{0, 0, 0}, {0, 0, 1}}};
+  scene.camera.look_at = {0, 0, 1};
+  add_shape(scene, "board", quad({-1, -1, 1}, {-1, 1, 1}, {1, 1, 1}, {1, -1, 1}), diffuse(Rgb(0.5)));
+  EXPECT_THROW(Renderer(scene, GateSet(GateShape::gaussian(0.1), {2.0}), {.light = 0.5}, nullptr), InputError);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "core/techniques/ellipsoidal.h"
+#include "core/techniques/light_subpaths.h"
 #include "core/techniques/standard_paths.h"
 #include "support.h"
 #include "tests/seed.h"
@@ -17,11 +18,13 @@ struct PathSink final : Sink {
     Path path;
     int pixel;
     Rgb value;
+    double part = 1;  ///< of the value of a gate
   };
   std::vector<Found> found;
   bool differential() const override { return false; }
   void note_path(const Path& path) override { found.push_back({path, -1, {}}); }
-  void add(int pixel, const Rgb& value, double, GateWeights) override {
+  void add(int pixel, const Rgb& value, double, GateWeights use) override {
+    found.back().part = use.value;
     found.back().pixel = pixel;
     found.back().value = value;
   }
@@ -99,7 +102,7 @@ double part_of_connections(const Finder& f, const PathSink::Found& found, Target
   target.tau[0] = found.path.length.back();
   double sum = 0;
   const int last = found.path.size() - 1;
-  const int first = f.worker.balance.rates.light_connections > 0 ? 1 : std::max(1, last - 1);
+  const int first = f.worker.balance.rates.light_connections ? 1 : std::max(1, last - 1);
   for (int on_arc = first; on_arc <= last; ++on_arc)
     if (const double pdf = pdf_on_arc(f.prepared, found.path, on_arc); pdf > 0)
       sum += f.worker.balance.connection(found.path, found.pixel, target, 0, on_arc, pdf);
@@ -165,12 +168,12 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
     f.worker.balance.rates.ellipsoidal_share = 1;
     f.worker.balance.rates.connections = {0.3, 2, 0.1};
-    for (const double light : {0.0, 1.0}) {
+    for (const bool light : {false, true}) {
       f.worker.balance.rates.light_connections = light;
       for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
         EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
     }
-    f.worker.balance.rates.light_connections = 0;
+    f.worker.balance.rates.light_connections = false;
   }
   EXPECT_GT(shared, 500);
   EXPECT_GT(shared_by_light, 500);
@@ -184,7 +187,7 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
   f.worker.balance.rates.ellipsoidal_share = 1;
   f.worker.balance.rates.connections = {0.3, 2, 0.1};
   int compared = 0;
-  for (const auto& [path, pixel, value] : f.sink.found) {
+  for (const auto& [path, pixel, value, part] : f.sink.found) {
     if (path.size() != 3) continue;
     const double surface = pdf_on_arc(f.prepared, path, 1), emitter = pdf_on_arc(f.prepared, path, 2);
     if (!(surface > 0 && emitter > 0)) continue;
@@ -222,7 +225,7 @@ TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
     });
     const int on_arc = from_camera ? 1 : 2;
     int compared = 0;
-    for (const auto& [path, pixel, value] : f.sink.found) {
+    for (const auto& [path, pixel, value, part] : f.sink.found) {
       if (path.size() != 3) continue;
       const SurfacePoint &x = path.vertex[0], &q = path.vertex[1], &y = path.vertex[2];
       const Scattering s(x.p, q, y.p);
@@ -256,7 +259,7 @@ TEST_P(Weights, OfNextEventsAndRaysAddUpToOne) {
   Finder f = finder();
   f.find_by_standard_sampling(4000);
   int found_of[4] = {0, 0, 0, 0};
-  for (const auto& [path, pixel, value] : f.sink.found) {
+  for (const auto& [path, pixel, value, part] : f.sink.found) {
     const int last = path.size() - 1;
     const SurfacePoint& y = path.back();
     Rgb expected = f.prepared.emitted(y, normalize(path.vertex[last - 1].p - y.p));
@@ -271,6 +274,68 @@ TEST_P(Weights, OfNextEventsAndRaysAddUpToOne) {
   }
   EXPECT_GT(found_of[2], 500);
   EXPECT_GT(found_of[3], 500);
+}
+
+/// What light subpaths hand on, by whichever joint, and standard sampling: contribution over the sum of all densities.
+TEST_P(Weights, OfLightSubpathsAreOverTheSumOfAllDensities) {
+  constexpr double kLight = 1.5;
+  Finder f = finder();
+  f.options.max_bounces = 3;
+  f.worker.balance.rates.light = kLight;
+  f.find_by_standard_sampling(2000);
+  const std::size_t by_standard = f.sink.found.size();
+  std::vector<int> from(by_standard, -1);
+  LightSubpaths light(f.worker, false);
+  for (int i = 0; i < 6000; ++i) {
+    Rng rng(Stream{test_seed(4), 0, 0}, i, 0);
+    light.sample(i % f.prepared.pixels(), 1, rng);
+    from.resize(f.sink.found.size(), i % f.prepared.pixels());
+  }
+  int of_bounces[4] = {0, 0, 0, 0}, by_camera = 0;
+  for (std::size_t i = 0; i < f.sink.found.size(); ++i) {
+    const auto& [path, pixel, value, part] = f.sink.found[i];
+    const int last = path.size() - 1;
+    if (last < 2) continue;
+    const SurfacePoint& y = path.back();
+    const Vec3 w1 = normalize(path.vertex[1].p - path.vertex[0].p);
+    const auto to_area = [&](int a, int b) { return solid_angle_to_area(path.vertex[a].p, path.vertex[b]); };
+    // Per area, of vertex k: from the camera through a point of the pixel, and from the light.
+    std::vector<double> a(last + 1), b(last + 1);
+    const Vec3 to_q = normalize(path.vertex[last - 1].p - y.p);
+    Rgb contribution = f.prepared.emitted(y, to_q) * (f.prepared.camera.image_area_per_solid_angle(w1) * to_area(0, 1));
+    a[1] = f.prepared.camera.image_area_per_solid_angle(w1) * to_area(0, 1);
+    b[last] = f.prepared.emitter_pdf(y.triangle);
+    b[last - 1] = kInvPi * dot(y.n, to_q) * to_area(last, last - 1);
+    for (int k = 1; k < last; ++k) {
+      const SurfacePoint& x = path.vertex[k];
+      const Scattering s(path.vertex[k - 1].p, x, path.vertex[k + 1].p);
+      const Bsdf& bsdf = f.prepared.bsdf_of(x.triangle);
+      contribution *= bsdf_value(f.prepared, x, s) * (std::abs(s.cos_i) * to_area(k, k + 1));
+      a[k + 1] = bsdf.pdf(s) * to_area(k, k + 1);
+      if (k > 1) b[k - 1] = bsdf.pdf(s.reversed()) * to_area(k, k - 1);
+    }
+    double standard = b[last] + a[last], of_light = 0, of_camera = 0;
+    for (int k = 1; k < last; ++k) standard *= a[k];
+    for (int joint = 0; joint < last - 1; ++joint) {
+      double density = 1;
+      for (int k = 1; k <= last; ++k) density *= k <= joint ? a[k] : b[k];
+      // The camera's own joints serve all pixels, as many times as there are samples of any.
+      (joint == 0 ? of_camera : of_light) += density;
+    }
+    of_camera *= f.prepared.pixels() / f.pick.rate(pixel);
+    const double sum = standard + kLight * (of_light + of_camera);
+    double expected = contribution.r / sum;
+    const double handed_on = value.r * part;
+    if (from[i] >= 0) {
+      expected *= kLight;
+      const double of_own = expected * f.pick.rate(from[i]) / f.pick.rate(pixel);
+      if (std::abs(handed_on - of_own) < std::abs(handed_on - expected)) expected = of_own, ++by_camera;
+      ++of_bounces[last - 1];
+    }
+    EXPECT_NEAR(handed_on, expected, 1e-6 * expected);
+  }
+  for (const int bounces : {1, 2, 3}) EXPECT_GT(of_bounces[bounces], 200) << bounces;
+  EXPECT_GT(by_camera, 200);
 }
 
 INSTANTIATE_TEST_SUITE_P(Blocks, Weights, ::testing::Values("diffuse", "glass"),

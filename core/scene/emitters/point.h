@@ -46,18 +46,15 @@ struct PointLight {
     if (!(value > 0)) return {};
     return {direction * (slope / value), w * (slope / value)};
   }
-  /// A direction in which light leaves: of a point uniform, of a spot uniform in its cone, of a wall by the cosine.
+  /// A direction in which light leaves a point, uniform, or a spot, uniform in its cone. Not of a wall.
   Vec3 sample_direction(double u0, double u1) const {
-    if (kind == Kind::wall) return sample_cosine(direction, u0, u1);
     const double cosine = 1 - u0 * spread(), sine = std::sqrt(std::max(0.0, 1 - cosine * cosine));
     const SineCosine phi = sincos_2pi(u1);
     return Frame(direction).to_world({sine * phi.cosine, sine * phi.sine, cosine});
   }
   /// Its density per solid angle.
   double direction_pdf(const Vec3& w) const {
-    const double cosine = dot(w, direction);
-    if (kind == Kind::wall) return cosine > 0 ? cosine * kInvPi : 0;
-    return cosine >= 1 - spread() ? 1 / (2 * kPi * spread()) : 0;
+    return dot(w, direction) >= 1 - spread() ? 1 / (2 * kPi * spread()) : 0;
   }
   /// What it is picked by, comparable to area x radiance of a shape.
   double power() const {

@@ -1,8 +1,10 @@
 // What light subpaths bring: isochron_light_share CSV [SEEDS]. Variance x CPU seconds over the mean square, summed over pixels and
 // gates, of images and of the interior term of a derivative, by shares of samples with light subpaths, and by the
 // share that is measured by default (its trial not counted). Lower is better.
+#include <fmt/format.h>
+
 #include <cstdio>
-#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/base/cpu_time.h"
@@ -20,7 +22,7 @@ using namespace testing;
 constexpr double kShares[] = {0, 0.2, 0.35, 0.5, 0.65, 0.8};
 
 struct Case {
-  const char* name;
+  std::string name;
   Scene scene;
   const char* moving;
   GateSet gates;
@@ -50,7 +52,7 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
       images[i].add(image);
     }
   for (std::FILE* out : {csv, stdout}) {
-    std::fprintf(out, "%s,%s,%g,%g", c.name, derivative ? "derivative" : "image",
+    std::fprintf(out, "%s,%s,%g,%g", c.name.c_str(), derivative ? "derivative" : "image",
                  derivative ? chosen.interior : chosen.image, derivative ? chosen.interior_light : chosen.image_light);
     for (std::size_t i = 0; i < options.size(); ++i) {
       double square = 0, variance = 0;
@@ -71,16 +73,12 @@ std::vector<Case> cases() {
   result.push_back({"cove", cove, "lamp", GateSet(GateShape::boxcar(0.75), {5.0, 5.75, 6.5, 7.25, 8.0, 8.75}), 6, 64});
   result.push_back({"cove steady", cove, "lamp", GateSet(GateShape::steady(), {0}), 6, 64});
   const Scene box = load_scene(PROJECT_ROOT "/tests/data/cornell/scene.yaml");
-  const auto add = [&](const char* name, const GateSet& gates) {
+  const auto add = [&](const std::string& name, const GateSet& gates) {
     result.push_back({name, box, "smallbox", gates, 4, 64});
   };
   add("box steady", GateSet(GateShape::steady(), {0}));
-  for (const double width : {0.5, 0.2, 0.1, 0.02, 0.005}) {
-    static char name[5][32];
-    static int count = 0;
-    std::snprintf(name[count], sizeof name[count], "box %g", width);
-    add(name[count++], GateSet(GateShape::boxcar(width), {8 + width / 2}));
-  }
+  for (const double width : {0.5, 0.2, 0.1, 0.02, 0.005})
+    add(fmt::format("box {:g}", width), GateSet(GateShape::boxcar(width), {8 + width / 2}));
   return result;
 }
 
