@@ -7,7 +7,8 @@
 namespace isochron {
 namespace {
 
-/// Shares that are compared, and the one that the trial has.
+/// Shares that are compared (isochron_light_share measures what each brings), and the one that the trial has: with it both kinds of
+/// samples find what the other does not.
 constexpr std::array kShares = {0.0, 0.2, 0.35, 0.5, 0.65, 0.8};
 constexpr double kTrialShare = 0.5;
 /// By how much another share than none must look better, for images and for derivatives: what rays leave out, the differential of

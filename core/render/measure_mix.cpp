@@ -53,7 +53,7 @@ constexpr double kCostHandicapOfStandard[] = {1.1, 1};
 
 /// Paths of the trial of light subpaths at most and, where the job is small, at least, what each takes in paths by standard
 /// sampling (one without and one with light subpaths and all their joints).
-constexpr double kLightPaths = 16384, kFewestLightPaths = 1024, kLightWork = 6;
+constexpr double kLightPaths = 16384, kFewestLightPaths = 400, kLightWork = 6;
 
 double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;

@@ -54,7 +54,7 @@ STEPS = {
                         _script("plot_gate_width.py", _csv("width_growth"), "experiments/figures/width_growth.png"))),
     "boundary": Step((_built("boundary", _csv("boundary"), "64"),)),
     "hidden_share": Step((_built("hidden_share", _csv("hidden_share"), "16"),)),
-    "light_share": Step((_built("light_share", _csv("light_share"), "8"),)),
+    "light_share": Step((_built("light_share", _csv("light_share"), "4"),)),
     "capture_cost": Step((_script("capture_cost.py", "measure", _csv("capture_cost")),)),
     "stated_errors": Step((_script("error_coverage.py", "measure", _csv("error_coverage")),)),
     "checks": Step((_script("check_experiments.py", _csv("checks")),)),

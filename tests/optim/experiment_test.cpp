@@ -139,7 +139,7 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"seed: 3", "estimator: {sampling: best}", "11:23: estimator.sampling: 'best' is not known (allowed: auto, stan"},
       {"seed: 3", "estimator: {hidden_shapes: []}", "11:28: estimator.hidden_shapes: holds no name (at least one)"},
       {"seed: 3", "estimator: {antithetic: 1}", "11:25: estimator.antithetic: '1' is neither (true or false)"},
-      {"seed: 3", "estimator: {light: 1}", "11:20: estimator.light: 1 is out of range (a number from 0 to below 1)"},
+      {"seed: 3", "estimator: {light: 1}", "11:20: estimator.light: 1 is out of range (a number at least 0, below 1)"},
       {"seed: 3", "estimator: {techniques: [standard, magic]}",
        "11:36: estimator.techniques[1]: there is no technique 'magic' (standard, ellipsoidal, light, wedge, "},
       {"seed: 3", "estimator: {techniques: [light, wedge]}",
