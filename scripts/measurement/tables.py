@@ -235,7 +235,7 @@ def hidden_share(folder):
 
 def light_share(folder):
     shares = ("0", "0.2", "0.35", "0.5", "0.65", "0.8", "default")
-    lines = [[f"{r['scene']}, {r['of']}", r["share of connections"], r["measured share"], *(number(float(r[s])) for s in shares)]
+    lines = [[f"{r['scene']}, {r['of']}", r["share of connections"], r["measured share"], *(number(r[s]) if float(r[s]) > 0 else "noise" for s in shares)]
              for r in read_rows(folder / "light_share.csv")]
     return markdown(["", "connections", "light", *shares], lines)
 
