@@ -71,10 +71,15 @@ struct Path {
   }
 };
 
+/// Whether a point on an emitter's triangle, or the light in its place, gives paths that end there a derivative.
+inline bool emitter_has_gradient(const PreparedScene& scene, int triangle) {
+  return scene.has_moving_vertex(triangle) ||
+         (!is_light(triangle) && scene.differentiable.emission[scene.shape_index(triangle)]);
+}
+
 /// Whether the path x0 ... x(last) of `path`, followed by a point on an emitter's triangle, can have a gradient.
 inline bool path_has_gradient(const PreparedScene& scene, const Path& path, int last, int emitter_triangle) {
-  return path.has_gradient[last] || scene.has_moving_vertex(emitter_triangle) ||
-         (!is_light(emitter_triangle) && scene.differentiable.emission[scene.shape_index(emitter_triangle)]);
+  return path.has_gradient[last] || emitter_has_gradient(scene, emitter_triangle);
 }
 
 /// Directions at a scattering vertex x towards its neighbours `before` (camera side) and `after` (light side).

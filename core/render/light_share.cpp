@@ -82,9 +82,10 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
       0, std::max(1, static_cast<int>(paths / (double{1} * scene.camera.width * scene.camera.height)))};
   Moments moments;
   double work_of[2];
+  SceneCache cache(scene, CasterUpdate::rebuild);
   for (const int i : {0, 1}) {
     options.light = i * kTrialShare;
-    const Passes passes(scene, gates, options, column, nullptr);
+    const Passes passes(scene, gates, options, column, &cache);
     if (passes.scene.emitters.empty() || (column && !passes.has(Term::interior))) return 0;
     const PassKind kind = column ? PassKind::interior : PassKind::primal;
     const int partitions = passes.partitions_for(range, kShares.size());

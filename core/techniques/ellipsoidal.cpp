@@ -162,14 +162,7 @@ void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const Elli
 }
 
 Directions EllipsoidalConnections::scattering_to(const Vec3& w) const {
-  Directions d;
-  d.n = worker_.path.back().n;
-  d.w_o = back_;
-  d.w_i = w;
-  d.cos_o = dot(d.n, d.w_o);
-  d.cos_i = dot(d.n, d.w_i);
-  d.cos_io = dot(d.w_o, d.w_i);
-  return d;
+  return Directions::between(worker_.path.back().n, w, back_);
 }
 
 EllipsoidBvh::Focus EllipsoidalConnections::focus() const {

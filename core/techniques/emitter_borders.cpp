@@ -34,10 +34,11 @@ void EmitterBorders::sample(double tau, int pixel, const Rgb& throughput, Rng& r
   for (const Crossing& crossing : crossings_) {
     if (!worker_.visible(q, crossing.point.y)) continue;
     worker_.path.push(scene_, crossing.point.y);
-    if (worker_.contributes(worker_.path))
-      worker_.emit_length_flux(worker_.path, pixel,
-                               crossing.value * (crossing.inverse_probability * weight(tau, pixel, crossing.point, {})),
-                               tau);
+    if (worker_.contributes(worker_.path)) {
+      const Point& at = crossing.point;
+      const double part = worker_.balance.border(worker_.path, pixel, tau, at.tangent, at.pdf, {});
+      worker_.emit_length_flux(worker_.path, pixel, crossing.value * (crossing.inverse_probability * part), tau);
+    }
     worker_.path.pop();
   }
 }
@@ -70,10 +71,6 @@ std::optional<EmitterBorders::Point> EmitterBorders::pick(double u_emitter, doub
 
 double EmitterBorders::outwards(const SurfacePoint& q, const Point& border) const {
   return dot(LengthFlow(q, border.y).x, isochron::cross(border.tangent, border.y.n));
-}
-
-double EmitterBorders::weight(double tau, int pixel, const Point& border, std::optional<double> pdf_on_arc) const {
-  return worker_.balance.border(worker_.path, pixel, tau, border.tangent, border.pdf, pdf_on_arc);
 }
 
 void EmitterBorders::cross(int triangle, double radius, double inverse_probability, const Rgb& throughput) {

@@ -29,9 +29,6 @@ class EmitterBorders {
   /// X . (outward normal of the border at y) of a path that ends q, y.
   double outwards(const SurfacePoint& q, const Point& border) const;
 
-  /// Multiple importance weight of the worker's complete path of length tau, which ends on a border. `pdf_on_arc`: of q on its arc, per area and length; empty: found from q.
-  double weight(double tau, int pixel, const Point& border, std::optional<double> pdf_on_arc) const;
-
  private:
   struct Crossing {
     Point point;

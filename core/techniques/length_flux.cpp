@@ -84,10 +84,9 @@ void EllipsoidalConnections::connect_border(const TargetLength& target, int pixe
     worker_.path.push(scene_, y);
     if (worker_.contributes(worker_.path)) {
       const double sign = std::copysign(1.0, borders_.outwards(q.point, *border));
-      worker_.emit_length_flux(
-          worker_.path, q.pixel,
-          q.value * (sign * inverse_probability * borders_.weight(target.tau[0], q.pixel, *border, q.pdf)),
-          target.tau[0]);
+      const double part =
+          worker_.balance.border(worker_.path, q.pixel, target.tau[0], border->tangent, border->pdf, q.pdf);
+      worker_.emit_length_flux(worker_.path, q.pixel, q.value * (sign * inverse_probability * part), target.tau[0]);
     }
     worker_.path.pop();
   });

@@ -45,7 +45,7 @@ void LightSubpaths::join(int pixel, const Rgb& throughput) {
     if (camera_vertices == 0) {
       value *= scene_.camera.image_area_per_solid_angle(w);
     } else {
-      const Directions at_x{x.n, w, back, dot(x.n, w), dot(x.n, back), dot(w, back)};
+      const Directions at_x = Directions::between(x.n, w, back);
       value *= bsdf_value(scene_, x, at_x) * std::abs(at_x.cos_i);
     }
     if (value.is_black()) continue;

@@ -37,8 +37,7 @@ void LightWalk::trace(Worker& worker, Rng& rng) {
 }
 
 bool LightWalk::has_gradient(const PreparedScene& scene, int i) const {
-  const int y = emitter_.triangle;
-  if (scene.has_moving_vertex(y) || (!is_light(y) && scene.differentiable.emission[scene.shape_index(y)])) return true;
+  if (emitter_has_gradient(scene, emitter_.triangle)) return true;
   return std::any_of(vertices_.begin(), vertices_.begin() + i + 1,
                      [&](const LightVertex& z) { return scene.has_gradient(z.point.triangle); });
 }

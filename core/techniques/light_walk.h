@@ -16,13 +16,7 @@ struct LightVertex {
 
   /// What it sends in the unit direction w, with the cosine there.
   Rgb leaving(const PreparedScene& scene, const Vec3& w) const {
-    Directions d;
-    d.n = point.n;
-    d.w_i = towards_light;
-    d.w_o = w;
-    d.cos_i = dot(d.n, d.w_i);
-    d.cos_o = dot(d.n, d.w_o);
-    d.cos_io = dot(d.w_i, d.w_o);
+    const Directions d = Directions::between(point.n, towards_light, w);
     return throughput * bsdf_value(scene, point, d) * std::abs(d.cos_o);
   }
 };

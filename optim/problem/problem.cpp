@@ -103,6 +103,8 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       caster_update_(caster_update(experiment_, scene_)),
       cache_(std::make_unique<SceneCache>(scene_, caster_update_)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
+  if (scene_.capture && experiment_.estimator.light.value_or(0) > 0)
+    experiment_.estimator_keys.at("light").fail("paths of captures have no light subpaths", "allowed here: 0");
   if (counts_) {
     settle_unused(*counts_, readings_, experiment_.target.capture);
     require_usable(*counts_, experiment_.target.capture);

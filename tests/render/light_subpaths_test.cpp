@@ -23,15 +23,6 @@ void PrintTo(const LightCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-/// The validation scene with a glossy panel, and `block`.
-Scene glossy_box(const Material& block) {
-  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
-  scene.camera.width = scene.camera.height = 16;
-  replace_material(scene, "panel", conductor(Rgb(0.7), 0.5, true));
-  replace_material(scene, "block", block);
-  return scene;
-}
-
 EstimatorOptions with_light(int bounces, double share, double light) {
   EstimatorOptions options{.max_bounces = bounces};
   options.mix = SamplingMix{share, share};
@@ -59,7 +50,7 @@ class LightSubpathsIn : public ::testing::TestWithParam<LightCase> {};
 
 TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
   const auto& [name, share, shape] = GetParam();
-  const Scene scene = glossy_box(diffuse(Rgb(0.6)));
+  const Scene scene = glossy_validation_scene(16, 0.5, diffuse(Rgb(0.6)));
   const GateSet gates(shape, {5.0, 6.5});
   const EstimatorOptions ours = with_light(3, share, 0.6);
   expect_equal_images(scene, gates, ours);
@@ -98,12 +89,12 @@ INSTANTIATE_TEST_SUITE_P(Mixes, LightSubpathsIn,
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(LightSubpaths, LeaveGlassInTheDirectionsOfImportance) {
-  expect_equal_images(glossy_box(glass(0.3, 1.5)), GateSet(GateShape::gaussian(1.5), {5.0, 7.0}), with_light(4, 0, 0.5),
-                      128);
+  expect_equal_images(glossy_validation_scene(16, 0.5, glass(0.3, 1.5)), GateSet(GateShape::gaussian(1.5), {5.0, 7.0}),
+                      with_light(4, 0, 0.5), 128);
 }
 
 TEST(LightSubpaths, OfLightsWithoutAnExtent) {
-  Scene scene = glossy_box(diffuse(Rgb(0.6)));
+  Scene scene = glossy_validation_scene(16, 0.5, diffuse(Rgb(0.6)));
   PointLight point{.name = "point", .position = {0.3, 0.4, 0.2}, .intensity = Rgb(0.5)};
   PointLight spot{.name = "spot",
                   .kind = PointLight::Kind::spot,

@@ -98,6 +98,15 @@ inline TangentBasis make_basis(const Scene& scene, const std::vector<Motion>& mo
   return basis;
 }
 
+/// The validation scene in so many pixels across, with a glossy panel and with `block` as its block's material.
+inline Scene glossy_validation_scene(int width, double roughness, const Material& block) {
+  Scene scene = load_scene(PROJECT_ROOT "/tests/data/validation/scene.yaml");
+  scene.camera.width = scene.camera.height = width;
+  replace_material(scene, "panel", conductor(Rgb(0.7), roughness, true));
+  replace_material(scene, "block", block);
+  return scene;
+}
+
 struct Estimate {
   double mean = 0, standard_error = 0;
 };

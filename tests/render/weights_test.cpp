@@ -30,15 +30,6 @@ struct PathSink final : Sink {
   }
 };
 
-/// The validation scene, its panel glossy and its block as given.
-Scene box_with(const Material& block) {
-  Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
-  scene.camera.width = scene.camera.height = 8;
-  replace_material(scene, "panel", conductor(Rgb(0.7), 0.4, true));
-  replace_material(scene, "block", block);
-  return scene;
-}
-
 /// Every pixel and gate counts, each otherwise.
 GatedImage positive_adjoint(const Scene& scene, int gates) {
   GatedImage adjoint(scene.camera.width, scene.camera.height, gates, 1);
@@ -58,7 +49,7 @@ struct Finder {
   Worker worker;
 
   explicit Finder(const Material& block)
-      : scene(box_with(block)),
+      : scene(glossy_validation_scene(8, 0.4, block)),
         prepared(scene, nullptr),
         pick(gates, positive_adjoint(scene, 3)),
         worker(prepared, gates, options, pick, sink) {}

@@ -20,6 +20,9 @@ struct Directions {
   Vec3 n, w_i, w_o;
   double cos_i, cos_o, cos_io;  ///< n.w_i, n.w_o, w_i.w_o
 
+  static Directions between(const Vec3& n, const Vec3& w_i, const Vec3& w_o) {
+    return {n, w_i, w_o, dot(n, w_i), dot(n, w_o), dot(w_i, w_o)};
+  }
   /// The same light path the other way.
   Directions reversed() const { return {n, w_o, w_i, cos_o, cos_i, cos_io}; }
 };

@@ -68,12 +68,11 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
   const TangentBasis basis = testing::make_basis(scene, {testing::translate(scene, setting.moving, {0, 1, 0})});
   for (const double width : {1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 3e-4, 1e-4, 1e-5}) {
     const GateSet gates(GateShape::gaussian(width * setting.center), {setting.center});
-    for (const Method& method :
-         {Method{"standard", Sampling::standard, true, {}},
-          Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false, false},
-          Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true, false},
-          Method{"ellipsoidal, kept lengths", Sampling::ellipsoidal, true, true},
-          Method{"automatic", Sampling::automatic, true, {}}}) {
+    for (const Method& method : {Method{"standard", Sampling::standard, true, {}},
+                                 Method{"ellipsoidal, uncoupled", Sampling::ellipsoidal, false, false},
+                                 Method{"ellipsoidal, coupled pairs", Sampling::ellipsoidal, true, false},
+                                 Method{"ellipsoidal, kept lengths", Sampling::ellipsoidal, true, true},
+                                 Method{"automatic", Sampling::automatic, true, {}}}) {
       EstimatorOptions options;
       options.max_bounces = setting.max_bounces;
       options.sampling = method.sampling;

@@ -6,12 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/cpu_time.h"
 #include "core/base/parallel.h"
 #include "core/render/renderer.h"
 #include "tests/benchmark/measure/arguments.h"
+#include "tests/benchmark/measure/relative_cost.h"
 #include "tests/benchmark/scenes.h"
-#include "tests/render/pixel_statistics.h"
 #include "tests/render/scene_building.h"
 
 namespace isochron::benchmarks {
@@ -93,32 +92,16 @@ void measure(const Case& c, int bounces, Of of, int seeds, std::FILE* csv) {
   const GateSet gates(GateShape::gaussian(0.02), centers);
   constexpr SampleRange kSamples{0, 256};
   constexpr const char* kNames[] = {"image", "derivative", "derivative beside gain", "image without names"};
-  std::vector<PixelBatches> images(shares().size());
-  std::vector<double> seconds(shares().size());
-  for (int seed = 0; seed < seeds; ++seed)
-    for (std::size_t i = 0; i < shares().size(); ++i) {
-      const EstimatorOptions options{.max_bounces = bounces, .hidden = shares()[i]};
-      const Renderer renderer(c.scene, gates, options, &basis);
-      const Stream stream{static_cast<std::uint64_t>(81 + seed), 0, 1};
-      const double start = cpu_seconds();
-      const GatedImage image = of == Of::image || of == Of::image_without_names
-                                   ? renderer.render(stream, kSamples)
-                                   : renderer.derive(Term::interior, stream, kSamples)[0];
-      seconds[i] += (cpu_seconds() - start) / seeds;
-      images[i].add(image);
-    }
+  std::vector<EstimatorOptions> options;
+  for (const auto& share : shares()) options.push_back({.max_bounces = bounces, .hidden = share});
+  const bool is_image = of == Of::image || of == Of::image_without_names;
+  const std::vector<double> costs =
+      relative_costs(c.scene, gates, options, basis, seeds, [&](const Renderer& renderer, const Stream& stream) {
+        return is_image ? renderer.render(stream, kSamples) : renderer.derive(Term::interior, stream, kSamples)[0];
+      });
   for (std::FILE* out : {csv, stdout}) {
     std::fprintf(out, "%s,%d,%s", c.name, bounces, kNames[static_cast<int>(of)]);
-    for (std::size_t i = 0; i < shares().size(); ++i) {
-      double square = 0, variance = 0;
-      for (std::size_t k = 0; k < images[i].mean().data.size(); ++k) {
-        variance += images[i].variance(k);
-        square += images[i].mean().data[k] * images[i].mean().data[k] - images[i].variance(k);
-      }
-      std::fprintf(out, ",%.3g", seeds * variance * seconds[i] / square);
-    }
-    std::fprintf(out, "\n");
-    std::fflush(out);
+    write_costs(costs, out);
   }
 }
 

@@ -7,11 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "core/base/cpu_time.h"
 #include "core/base/parallel.h"
 #include "core/render/measure_mix.h"
 #include "tests/benchmark/measure/arguments.h"
-#include "tests/render/pixel_statistics.h"
+#include "tests/benchmark/measure/relative_cost.h"
 #include "tests/render/support.h"
 
 namespace isochron::benchmarks {
@@ -39,31 +38,14 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
                         {double(seeds * c.samples), double(seeds * c.samples), double(seeds * c.samples)});
   const SamplingMix& chosen = *options.back().mix;
   const SampleRange range{0, c.samples};
-  std::vector<PixelBatches> images(options.size());
-  std::vector<double> seconds(options.size());
-  for (int seed = 0; seed < seeds; ++seed)
-    for (std::size_t i = 0; i < options.size(); ++i) {
-      const Renderer renderer(c.scene, c.gates, options[i], &basis);
-      const Stream stream{static_cast<std::uint64_t>(81 + seed), 0, 1};
-      const double start = cpu_seconds();
-      const GatedImage image =
-          derivative ? renderer.derive(Term::interior, stream, range)[0] : renderer.render(stream, range);
-      seconds[i] += (cpu_seconds() - start) / seeds;
-      images[i].add(image);
-    }
+  const std::vector<double> costs =
+      relative_costs(c.scene, c.gates, options, basis, seeds, [&](const Renderer& renderer, const Stream& stream) {
+        return derivative ? renderer.derive(Term::interior, stream, range)[0] : renderer.render(stream, range);
+      });
   for (std::FILE* out : {csv, stdout}) {
     std::fprintf(out, "%s,%s,%g,%g", c.name.c_str(), derivative ? "derivative" : "image",
                  derivative ? chosen.interior : chosen.image, derivative ? chosen.interior_light : chosen.image_light);
-    for (std::size_t i = 0; i < options.size(); ++i) {
-      double square = 0, variance = 0;
-      for (std::size_t k = 0; k < images[i].mean().data.size(); ++k) {
-        variance += images[i].variance(k);
-        square += images[i].mean().data[k] * images[i].mean().data[k] - images[i].variance(k);
-      }
-      std::fprintf(out, ",%.3g", seeds * variance * seconds[i] / square);
-    }
-    std::fprintf(out, "\n");
-    std::fflush(out);
+    write_costs(costs, out);
   }
 }
 
