@@ -34,18 +34,48 @@ std::string share_of_term(const PointInspection& p, const Statistics& s, int ter
   return p.found[term] ? percent(s, i) : fmt::format("{:>15}", "-");
 }
 
-/// One row per bounce, gate or shape: light, then the gradient by terms.
+/// One row per bounce, gate or shape: light, then the gradient by terms, then `more`, under its title.
 void print_rows(const PointInspection& p, const std::string& title, const std::vector<std::string>& names,
-                const Statistics& light, const Statistics& gradient, const std::vector<std::string>& more = {}) {
+                const Statistics& light, const Statistics& gradient, const std::string& title_of_more = "",
+                const std::vector<std::string>& more = {}) {
   std::size_t width = title.size();
   for (const std::string& name : names) width = std::max(width, name.size());
   fmt::print("  {:>{}} {:>15} {:>15} {:>15} {:>15}{}\n", title, width, "light", "interior", "visibility", "path_length",
-             more.empty() ? "" : "   bias if paths stop here");
+             title_of_more);
   for (std::size_t i = 0; i < names.size(); ++i) {
     fmt::print("  {:>{}} {}", names[i], width, percent(light, i));
     for (int t = 0; t < 3; ++t) fmt::print(" {}", share_of_term(p, gradient, t, t * names.size() + i));
     fmt::print("{}\n", more.empty() ? "" : "   " + more[i]);
   }
+}
+
+/// Those that were used, with what they take of the work.
+void print_by_technique(const PointInspection& p) {
+  const auto rows_of = [](const Statistics& all, const std::vector<int>& used, int blocks) {
+    Statistics rows;
+    for (int b = 0; b < blocks; ++b)
+      for (const int t : used) {
+        rows.mean.push_back(all.mean[b * kTechniques + t]);
+        rows.standard_error.push_back(all.standard_error[b * kTechniques + t]);
+      }
+    return rows;
+  };
+  std::vector<int> used;
+  std::vector<std::string> names, work;
+  for (int t = 0; t < kTechniques; ++t) {
+    std::string parts;
+    bool any = false;
+    for (const auto& pass : p.work) {
+      parts += pass[t] > 0 ? fmt::format("{:8.1f}", 100 * pass[t]) : fmt::format("{:>8}", "-");
+      any |= pass[t] > 0;
+    }
+    if (!any) continue;
+    used.push_back(t);
+    names.push_back(name(static_cast<Technique>(t)));
+    work.push_back(parts);
+  }
+  print_rows(p, "technique", names, rows_of(p.shares.light_by_technique, used, 1),
+             rows_of(p.shares.by_technique, used, 3), "   % of the work: images, terms", work);
 }
 
 void print_point(const Problem& problem, const PointInspection& p) {
@@ -76,7 +106,7 @@ void print_point(const Problem& problem, const PointInspection& p) {
     bias.push_back(fmt::format("{:7.2f} +-{:5.2f}", 100 * r.value, 100 * r.standard_error));
   }
   print_rows(p, "bounces", names, sum(most + 1, gates, [&](int b, int g) { return b * gates + g; }),
-             p.shares.by_bounces, bias);
+             p.shares.by_bounces, "   bias if paths stop here", bias);
   names.clear();
   for (int g = 0; g < gates; ++g) names.push_back(fmt::format("{} ({})", g, gate_label(problem, g)));
   print_rows(p, "gate (center)", names, sum(gates, most + 1, [&](int g, int b) { return b * gates + g; }),
@@ -84,6 +114,7 @@ void print_point(const Problem& problem, const PointInspection& p) {
   names.clear();
   for (const Shape& s : problem.scene().shapes) names.push_back(s.name);
   print_rows(p, "shape", names, p.shares.light_by_shape, p.shares.by_shape);
+  print_by_technique(p);
 }
 
 std::string numbers(const std::array<int, kPasses>& n) {

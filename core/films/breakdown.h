@@ -1,4 +1,4 @@
-// Where light and gradients come from: by number of bounces, gate and shape.
+// Where light and gradients come from: by number of bounces, gate, shape and technique.
 #pragma once
 #include <cstddef>
 #include <vector>
@@ -9,8 +9,9 @@ namespace isochron {
 
 /// Gated images sorted by where their light comes from.
 struct ImageBreakdown {
-  GatedImage image;              ///< [pixel][bounces * gates + gate][channel], bounces from 0 to max_bounces
-  std::vector<double> by_shape;  ///< light on paths that meet a shape (emitters included), summed over the image
+  GatedImage image;                  ///< [pixel][bounces * gates + gate][channel], bounces from 0 to max_bounces
+  std::vector<double> by_shape;      ///< light on paths that meet a shape (emitters included), summed over the image
+  std::vector<double> by_technique;  ///< light that each technique brings, summed over the image
 };
 
 /// Sums of adjoint * dI sorted by where they come from, for several adjoints at once.
@@ -21,6 +22,7 @@ struct GradientBreakdown {
   /// [shape][column], of the first adjoint: of paths that meet a shape (emitters included; one path may meet several);
   /// of the visibility term: by the shape that the edge is part of.
   std::vector<double> by_shape;
+  std::vector<double> by_technique;  ///< [technique][column], of the first adjoint
   std::size_t index(int bounces, int column) const {
     return (static_cast<std::size_t>(bounces) * columns + column) * adjoints;
   }

@@ -33,6 +33,7 @@ void ImageBreakdownSink::add(int pixel, const Rgb& value, double length, GateWei
       sum += w * weighted[c];
     }
     for (int shape : origin_.shapes()) breakdown_.by_shape[shape] += sum;
+    breakdown_.by_technique[origin_.technique()] += sum;
   });
 }
 
@@ -53,6 +54,7 @@ void GradientBreakdownSink::add_to_gate(int pixel, int gate, const Rgb& value, d
       breakdown_.by_gate[static_cast<std::size_t>(gate) * breakdown_.columns + column] += first;
       for (int shape : origin_.shapes())
         breakdown_.by_shape[static_cast<std::size_t>(shape) * breakdown_.columns + column] += first;
+      breakdown_.by_technique[origin_.technique() * breakdown_.columns + column] += first;
     }
 }
 

@@ -1,4 +1,4 @@
-// Sinks that keep account of where light and its derivatives come from: by number of bounces, gate and shape.
+// Sinks that keep account of where light and its derivatives come from: by number of bounces, gate, shape and technique.
 // Exact: one pass sorts the paths, so that what is left out by fewer bounces is known without the noise of a
 // difference.
 #pragma once
@@ -10,13 +10,15 @@
 
 namespace isochron {
 
-/// Bounces and shapes of the path that contributions are attributed to.
+/// Technique, bounces and shapes of the path that contributions are attributed to.
 class PathOrigin {
  public:
   explicit PathOrigin(const PreparedScene& scene) : scene_(scene) {}
   void note_path(const Path& path);
   void note_boundary(int bounces, int triangle);
+  void note_technique(Technique technique) { technique_ = technique; }
   int bounces() const { return bounces_; }
+  std::size_t technique() const { return static_cast<std::size_t>(technique_); }
   /// Each once.
   const std::vector<int>& shapes() const { return shapes_; }
 
@@ -24,6 +26,7 @@ class PathOrigin {
   void add_shape(int triangle);
 
   const PreparedScene& scene_;
+  Technique technique_ = Technique::standard;
   int bounces_ = 0;
   std::vector<int> shapes_;
 };
@@ -34,6 +37,7 @@ class ImageBreakdownSink final : public Sink {
       : origin_(scene), gates_(gates), breakdown_(breakdown) {}
 
   bool differential() const override { return false; }
+  void note_technique(Technique technique) override { origin_.note_technique(technique); }
   void note_path(const Path& path) override { origin_.note_path(path); }
   void add(int pixel, const Rgb& value, double length, GateWeights use) override;
 
@@ -56,6 +60,7 @@ class GradientBreakdownSink final : public Sink {
         breakdown_(breakdown) {}
 
   bool differential() const override { return true; }
+  void note_technique(Technique technique) override { origin_.note_technique(technique); }
   void note_path(const Path& path) override { origin_.note_path(path); }
   void note_boundary(int bounces, int triangle) override { origin_.note_boundary(bounces, triangle); }
   void bind(const LocalDifferential& differential) override { rates_.bind(differential); }

@@ -13,6 +13,7 @@
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/paths/path_differential.h"
+#include "core/paths/technique.h"
 
 namespace isochron {
 
@@ -30,6 +31,8 @@ class Sink {
   /// Whether contributions are derivatives: `bind` comes before them, and paths without a gradient may be left out.
   virtual bool differential() const = 0;
 
+  /// What finds the paths of the next contributions.
+  virtual void note_technique(Technique) {}
   /// The complete path (last vertex on an emitter) that the next contributions belong to.
   virtual void note_path(const Path&) {}
   /// The next contributions belong to a boundary segment at an edge of the triangle, on paths of so many bounces.

@@ -104,9 +104,11 @@ struct SampleRange {
 /// How many times as long as a ray a triangle takes that is tested for an arc, measured on the cube and the box.
 inline constexpr double kRaysPerArc = 1.3;
 
-/// Work of so many rays, and triangles tested for arcs, in rays.
-inline double work(long long rays, long long arcs) {
-  return static_cast<double>(rays) + kRaysPerArc * static_cast<double>(arcs);
-}
+/// So many rays, and triangles tested for arcs.
+struct RayCounts {
+  long long rays = 0, arcs = 0;
+
+  double in_rays() const { return static_cast<double>(rays) + kRaysPerArc * static_cast<double>(arcs); }
+};
 
 }  // namespace isochron

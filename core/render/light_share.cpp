@@ -16,11 +16,6 @@ constexpr double kTrialShare = 0.5;
 /// of a derivative take their part of the time, too.
 constexpr double kClearlyBetter[] = {0.8, 0.5}, kAsGoodAsTheBest = 1.25;
 
-/// Samples with light subpaths per standard one.
-double rate_of(double share) {
-  return share / (1 - share);
-}
-
 /// Second moments of what samples find, by kShares.
 struct Moments {
   std::array<double, kShares.size()> of{};
@@ -61,7 +56,7 @@ class MomentSink final : public Sink {
       });
     }
     for (std::size_t i = 0; i < kShares.size(); ++i)
-      moments_.of[i] += squares * (1 + rate_of(kTrialShare) * ratio_) / (1 + rate_of(kShares[i]) * ratio_);
+      moments_.of[i] += squares * (1 + light_rate(kTrialShare) * ratio_) / (1 + light_rate(kShares[i]) * ratio_);
   }
 
  private:

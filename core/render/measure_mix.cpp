@@ -1,5 +1,6 @@
 #include "core/render/measure_mix.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
@@ -7,6 +8,7 @@
 #include "core/base/listed_sum.h"
 #include "core/image/stored_image.h"
 #include "core/render/light_share.h"
+#include "core/render/share_trial.h"
 
 namespace isochron {
 namespace {
@@ -19,22 +21,15 @@ struct TrialWidths {
 };
 constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
-constexpr double kShares[] = {0, 0.3, 1};
-constexpr int kSamples[] = {16, 8, 4};  ///< per pixel and batch at most, of each share: for about the same work
-constexpr int kMostBatches = 12, kFewestBatches = 3;
+constexpr int kTrialSamples = 4;  ///< per pixel and batch: two of each kind
+constexpr int kMostBatches = 32, kFewestBatches = 4;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
 constexpr int kPixels = 4096, kFewestPixels = 576;
-constexpr int kBlocks = 4;         ///< across the image
-constexpr double kPaths = 300000;  ///< of standard sampling, about, and of as much work of each other share
+constexpr int kBlocks = 4;  ///< across the image
 /// The work of all trials is this part of that of the job at most; that of light subpaths takes its part of it.
 constexpr double kTrialPart = 0.1, kLightTrialPart = 0.04;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
-/// Trials of fewer paths than this overrule the width of the gates only where they differ by this factor.
-constexpr double kConfidentTrialPaths = 100000, kShortTrialPenalty = 1.5;
-/// The combination must look this much better than either technique alone, per purpose: trials are noisy, and what it
-/// can lose where it is not the best is more than what it can win.
-constexpr double kMaxCostRatioOfCombination[] = {0.75, 0.5};
 /// How often to use the techniques of ellipsoidal connections: all equally, or mostly the camera's own pairs, which share
 /// low-discrepancy points over the whole image. No rate is zero, as a trial may miss what is rare. The second must look a tenth
 /// better than the first.
@@ -45,12 +40,8 @@ constexpr double kClearlyFaster = 0.9;
 constexpr int kRateSamples = 1, kRateBatches = 16;
 /// Samples of standard sampling that take about as long as one by ellipsoidal connections.
 constexpr double kConnectionsWork = 4;
-/// By how much standard sampling must look better than ellipsoidal, per purpose. For images it may look slightly worse:
-/// low-discrepancy numbers, which trials do without, gain more for its pixels (cube, width 2 %: 1.7 times; box, 0.5 and 1 %:
-/// nothing). For gradients neither is favoured: where standard sampling is twice as good (the tree's fourteen gates) trials
-/// see 1.2 to 4 times.
-constexpr double kCostHandicapOfStandard[] = {1.1, 1};
-
+/// The same of one sample of a trial, of which half are connections.
+constexpr double kTrialSampleWork = (1 + kConnectionsWork) / 2;
 /// Paths of the trial of light subpaths at most and, where the job is small, at least, what each takes in paths by standard
 /// sampling (one without and one with light subpaths and all their joints).
 constexpr double kLightPaths = 16384, kFewestLightPaths = 400, kLightWork = 6;
@@ -162,65 +153,31 @@ struct Trial {
   const GateSet& gates;
   EstimatorOptions options;
   Purpose purpose;
-  double job;    ///< samples per pixel that it decides about
-  double light;  ///< share of light subpaths
-  double part;   ///< of the job's work, at most
+  double job;   ///< samples per pixel that it decides about
+  double part;  ///< of the job's work, at most
 
-  /// The best of kShares, or `by_width` where it cannot tell. `term`: of the derivative along one column; null: of images.
-  double choose(double by_width, const TangentBasis* column, const Term* term, const Stream& stream,
-                double& work) const {
-    const double triangles = static_cast<double>(scene.triangles.size());
-    const double budget = part * pixels_of(scene) * job - 3 * kSamplesPerTriangle * triangles;
-    const double paths = std::min(kPaths, budget / 3);
+  /// The best of kConnectionShares, or `by_width` where it cannot tell. `column`: of the interior term; null: of images.
+  double choose(double by_width, const TangentBasis* column, const Stream& stream, double& work) const {
+    const double budget =
+        part * pixels_of(scene) * job - kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+    // Of the trial, per batch and pixel.
+    const double affordable = budget / (kTrialSampleWork * kTrialSamples);
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
-    // At least so many that the smallest batches have a sample of pure connections.
-    const double per_pixel = kFewestBatches * kSamples[0] / kSamples[2];
-    if (!(paths >= fewest * per_pixel)) return by_width;
-    const Scene small = reduced(scene, std::clamp<double>(paths / per_pixel, fewest, kPixels));
-    const double samples = paths / pixels_of(small);
-    int batches = std::clamp(static_cast<int>(samples / kSamples[0]), kFewestBatches, kMostBatches);
-    int per_batch[3];
-    std::optional<Renderer> renderers[3];
-    std::vector<BlockVariance> variances;
-    for (int i = 0; i < 3; ++i) {
-      per_batch[i] = std::clamp(static_cast<int>(samples / batches * kSamples[i] / kSamples[0]), 1, kSamples[i]);
-      EstimatorOptions trial = options;
-      trial.mix = SamplingMix{kShares[i], kShares[i]};
-      trial.mix->image_light = trial.mix->interior_light = light;
-      // Where paths keep their lengths, a part of the variance is another term's.
-      trial.keep_length = false;
-      // What low-discrepancy numbers gain grows with the samples, and trials have others than what they decide about.
-      trial.numbers = Numbers::independent;
-      renderers[i].emplace(small, gates, trial, column);
-      variances.emplace_back(block_size(small, term ? purpose : Purpose::images));
-    }
-    for (int b = 0; b < batches; ++b) {
-      double spent = 0, cheapest = INFINITY;  // per sample and pixel
-      for (int i = 0; i < 3; ++i) {
-        const SampleRange range{b * per_batch[i], (b + 1) * per_batch[i]};
-        variances[i].add(term ? renderers[i]->derive_replicates(*term, stream, {range})[0].mean
-                              : renderers[i]->render_replicates(stream, {range}).mean);
-        spent += renderers[i]->work();
-        cheapest = std::min(cheapest, renderers[i]->work() / (range.end * pixels_of(small)));
-      }
-      // Where samples take other work than assumed, fewer batches have to do.
-      const double allowed = part * pixels_of(scene) * job * cheapest;
-      if (spent * (b + 2) / (b + 1) > allowed) batches = b + 1;
-      if (b + 1 == batches) work += spent;
-    }
-    if (batches < 2) return by_width;
-    double cost[3];
-    for (int i = 0; i < 3; ++i) {
-      const double work_per_image = renderers[i]->work() / batches;
-      cost[i] = variances[i].sum() * work_per_image;
-      // Nothing seen says nothing: a technique that never hit the gates is no good one.
-      if (!(cost[i] > 0)) cost[i] = INFINITY;
-    }
-    const bool gradients = purpose == Purpose::gradients;
-    const double penalty = paths < kConfidentTrialPaths ? kShortTrialPenalty : 1;
-    cost[by_width == 1 ? 2 : 0] /= penalty;
-    const int alone = cost[0] <= kCostHandicapOfStandard[gradients] * cost[2] ? 0 : 2;
-    return kShares[cost[1] < kMaxCostRatioOfCombination[gradients] * cost[alone] ? 1 : alone];
+    if (!(affordable >= fewest * kFewestBatches)) return by_width;
+    const Scene small = reduced(scene, std::clamp<double>(affordable / kFewestBatches, fewest, kPixels));
+    const bool sums = column && purpose == Purpose::gradients;
+    const auto cost = measure_shares({.scene = small,
+                                      .gates = gates,
+                                      .options = options,
+                                      .column = column,
+                                      .block = sums ? std::max(1, small.camera.width / kBlocks) : 1,
+                                      .samples = kTrialSamples,
+                                      .batches = kMostBatches,
+                                      .most_samples = part * pixels_of(scene) * job},
+                                     stream, work);
+    if (!cost) return by_width;
+    const auto best = std::min_element(cost->begin(), cost->end());
+    return std::isfinite(*best) ? kConnectionShares[best - cost->begin()] : by_width;
   }
 };
 
@@ -251,22 +208,21 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     return measure_light_share(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
                                work);
   };
-  const auto choose = [&](const TrialWidths& widths, double otherwise, double samples, const TangentBasis* column,
-                          const Term* term) {
-    const double light = term ? best.interior_light : best.image_light;
+  const auto choose = [&](const TrialWidths& widths, double otherwise, double samples, const TangentBasis* column) {
     if (coverage < widths.below_is_ellipsoidal) return 1.0;
     if (width > widths.above_is_standard) return 0.0;
-    return Trial{scene, gates, options, purpose, samples, light, part}.choose(otherwise, column, term, stream, work);
+    EstimatorOptions trial = options;
+    if (!trial.light) trial.light = column ? best.interior_light : best.image_light;
+    return Trial{scene, gates, trial, purpose, samples, part}.choose(otherwise, column, stream, work);
   };
   best.image_light = choose_light(kImage, job.image, nullptr);
-  best.image = choose(kImage, by_width.image, job.image, nullptr, nullptr);
+  best.image = choose(kImage, by_width.image, job.image, nullptr);
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
   best.interior_light = choose_light(kInterior, job.interior, &one);
   // Only walks find paths of more bounces, and a trial cannot judge rare ones.
   const bool has_rates = options.max_bounces == 1;
-  const Term interior = Term::interior;
-  best.interior = choose(kInterior, by_width.interior, has_rates ? job.interior / 2 : job.interior, &one, &interior);
+  best.interior = choose(kInterior, by_width.interior, has_rates ? job.interior / 2 : job.interior, &one);
   if (!has_rates) return best;
   // Without pairs there is nothing to choose between.
   EstimatorOptions chosen = options;

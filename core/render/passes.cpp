@@ -152,8 +152,7 @@ bool Passes::interior_pairs() const {
   return mix.interior > 0 && options.antithetic && scene.differentiable.lengths && any_slope();
 }
 
-void Passes::visit(std::span<const TechniqueUse> uses, const GatePick& pick, const Pass& pass,
-                   Partition partition) const {
+void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pass& pass, Partition partition) const {
   const int pixels = scene.camera.pixels();
   const double scale = scene.scene.detector.gain / pass.range.count();
   const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(pixels));
@@ -162,14 +161,19 @@ void Passes::visit(std::span<const TechniqueUse> uses, const GatePick& pick, con
   for_each_pixel(partition, pixels, [&](int pixel) {
     for (std::size_t i = 0; i < uses.size(); ++i) {
       const TechniqueUse& use = uses[i];
-      const double rate = use.in_pixel ? use.rate * pick.rate(pixel) : use.rate;
+      const double rate = use.in_pixel ? use.rate * worker.pick.rate(pixel) : use.rate;
       if (!(rate > 0)) continue;
       const double own_scale = use.in_pixel ? scale / rate : scale / pixels / rate;
+      worker.sink.note_technique(use.technique);
+      const RayCounts before{worker.rays, worker.arcs};
       const auto sample = [&](Rng& rng) { use.sample(pixel, own_scale, rng); };
       if (use.in_pixel)
         points.in_pixel(use.technique, pixel, rate, sample);
       else
         points.in_image(of_image[i], pixel, rate, sample);
+      RayCounts& own = worker.work_of[static_cast<std::size_t>(use.technique)];
+      own.rays += worker.rays - before.rays;
+      own.arcs += worker.arcs - before.arcs;
     }
   });
 }
@@ -177,7 +181,7 @@ void Passes::visit(std::span<const TechniqueUse> uses, const GatePick& pick, con
 void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, double light,
                        const GatePass& lengths, const Pass& pass, Partition partition) const {
   const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
-  worker.balance.rates = {share, used, light / (1 - light), light > 0 && options.max_bounces > 1, pair_coupling_gain_};
+  worker.balance.rates = {share, used, light_rate(light), light > 0 && options.max_bounces > 1, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -200,7 +204,8 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
       {Technique::light_subpath, others * light, true,
        [&](int pixel, double scale, Rng& rng) { light_subpaths.sample(pixel, scale, rng); }},
   };
-  visit(uses, worker.pick, pass, partition);
+  visit(uses, worker, pass, partition);
+  worker.sink.note_technique(Technique::standard);
   standard.finish();
 }
 
@@ -233,7 +238,7 @@ struct Passes::Searches {
 
 void Passes::run_visibility(Worker& worker, const Pass& pass, Partition partition) const {
   Searches searches(*this, worker, *guide_);
-  visit(searches.uses(*guide_, scene.captures()), worker.pick, pass, partition);
+  visit(searches.uses(*guide_, scene.captures()), worker, pass, partition);
 }
 
 BoundaryGuide::Each<bool> Passes::possible_searches() const {
@@ -301,6 +306,10 @@ void Passes::learn() const {
 void Passes::count(const Worker& worker) const {
   rays_ += worker.rays;
   arcs_ += worker.arcs;
+  for (int t = 0; t < kTechniques; ++t) {
+    counts_of_[t].rays += worker.work_of[t].rays;
+    counts_of_[t].arcs += worker.work_of[t].arcs;
+  }
   if (cache_) cache_->count_rays(worker.rays);
 }
 

@@ -2,8 +2,10 @@
 // find goes to a sink.
 #pragma once
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
+#include <functional>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -42,6 +44,16 @@ struct Pass {
   SampleRange range;
 };
 
+/// A technique as a pass uses it.
+struct TechniqueUse {
+  Technique technique;
+  double rate;  ///< samples per pixel and sample of the pass, on average; 0: none
+  bool
+      in_pixel;  ///< samples start in a pixel, which gets GatePick::rate times as many; else their points cover the whole image
+  /// One sample, which starts in `pixel` or comes with it; contributions are scaled by `scale`.
+  std::function<void(int pixel, double scale, Rng& rng)> sample;
+};
+
 /// The passes over a prepared scene. Safe to share between threads.
 class Passes {
  public:
@@ -75,6 +87,9 @@ class Passes {
   /// One partition of a term of the derivative, which was prepared; gates and pixels by `pick`. `sink` is differential.
   void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
 
+  /// What the density of connections is multiplied by in the weights of the slope of the gate, in the interior term.
+  double slope_gain() const { return interior_pairs() ? pair_coupling_gain_ : 1; }
+
   const GateSet gates;  ///< as the detector's time offset shifts them
   const EstimatorOptions options;
   const TangentBasis* const basis;
@@ -86,7 +101,12 @@ class Passes {
   /// Rays traced so far by all ranks. Collective: every rank has to call it.
   long long rays() const { return sum_over_ranks(rays_.load()); }
   /// Work done so far by all ranks, in rays. Collective.
-  double work() const { return isochron::work(rays(), sum_over_ranks(arcs_.load())); }
+  double work() const { return RayCounts{rays(), sum_over_ranks(arcs_.load())}.in_rays(); }
+  /// Of the samples of one technique so far. Collective.
+  double work_of(Technique technique) const {
+    const Counts& of = counts_of_[static_cast<std::size_t>(technique)];
+    return RayCounts{sum_over_ranks(of.rays.load()), sum_over_ranks(of.arcs.load())}.in_rays();
+  }
 
   /// Where the time of a pass counts; null: nowhere.
   PassTimes* times() const { return cache_ ? &cache_->times() : nullptr; }
@@ -130,13 +150,13 @@ class Passes {
                  const Pass& pass, Partition partition) const;
   struct Searches;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
-  /// All samples of a partition by techniques, gates and pixels by `pick`.
-  void visit(std::span<const TechniqueUse> uses, const GatePick& pick, const Pass& pass, Partition partition) const;
+  /// All samples of a partition by techniques; their work counts as theirs.
+  void visit(std::span<const TechniqueUse> uses, Worker& worker, const Pass& pass, Partition partition) const;
   BoundaryGuide::Each<bool> possible_searches() const;
 
   void learn() const;
 
-  /// Adds the rays and arcs of a worker that has done its work.
+  /// Adds the work of a worker that has done its work.
   void count(const Worker& worker) const;
 
   const BoundaryEdges& edges() const { return *ready->edges; }
@@ -144,6 +164,10 @@ class Passes {
   SceneCache* const cache_;
   double pair_coupling_gain_ = 1;
   mutable std::atomic<long long> rays_{0}, arcs_{0};
+  struct Counts {
+    std::atomic<long long> rays{0}, arcs{0};
+  };
+  mutable std::array<Counts, kTechniques> counts_of_;
   mutable std::once_flag learned_;
   mutable std::optional<BoundaryGuide> guide_;  ///< only of the visibility term
 };

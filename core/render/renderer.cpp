@@ -120,6 +120,10 @@ double Renderer::work() const {
   return impl_->work();
 }
 
+double Renderer::work_of(Technique technique) const {
+  return impl_->work_of(technique);
+}
+
 bool Renderer::pixels_are_independent() const {
   return impl_->stays_in_pixels();
 }
@@ -271,14 +275,16 @@ ImageBreakdown Renderer::render_breakdown(const Stream& stream, SampleRange rang
     void add(const Sum& other) {
       add_to(image.data, other.image.data);
       add_to(by_shape, other.by_shape);
+      add_to(by_technique, other.by_technique);
     }
-    void pack(Packer& packer) const { packer.put(image.data), packer.put(by_shape); }
-    void unpack(Unpacker& unpacker) { unpacker.get(image.data), unpacker.get(by_shape); }
+    void pack(Packer& packer) const { packer.put(image.data), packer.put(by_shape), packer.put(by_technique); }
+    void unpack(Unpacker& unpacker) { unpacker.get(image.data), unpacker.get(by_shape), unpacker.get(by_technique); }
   };
   Sum blank;
   const GatedImage shape = impl.blank();
   blank.image = GatedImage(shape.width, shape.height, shape.gates * (impl.options.max_bounces + 1), shape.channels);
   blank.by_shape.assign(impl.scene.scene.shapes.size(), 0.0);
+  blank.by_technique.assign(kTechniques, 0.0);
   if (impl.scene.emitters.empty()) return blank;
   const int partitions = impl.partitions_for(range, blank.image.data.size());
   const Sum sum = impl.sum_of<Sum>(PassKind::primal, partitions, [&](int partition) {
@@ -301,9 +307,14 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
       add_to(by_bounces, other.by_bounces);
       add_to(by_gate, other.by_gate);
       add_to(by_shape, other.by_shape);
+      add_to(by_technique, other.by_technique);
     }
-    void pack(Packer& packer) const { packer.put(by_bounces), packer.put(by_gate), packer.put(by_shape); }
-    void unpack(Unpacker& unpacker) { unpacker.get(by_bounces), unpacker.get(by_gate), unpacker.get(by_shape); }
+    void pack(Packer& packer) const {
+      packer.put(by_bounces), packer.put(by_gate), packer.put(by_shape), packer.put(by_technique);
+    }
+    void unpack(Unpacker& unpacker) {
+      unpacker.get(by_bounces), unpacker.get(by_gate), unpacker.get(by_shape), unpacker.get(by_technique);
+    }
   };
   Sum sum;
   sum.adjoints = static_cast<int>(count);
@@ -312,6 +323,7 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
   sum.by_bounces.assign((impl.options.max_bounces + 1) * columns * count, 0.0);
   sum.by_gate.assign(impl.gates.size() * columns, 0.0);
   sum.by_shape.assign(impl.scene.scene.shapes.size() * columns, 0.0);
+  sum.by_technique.assign(kTechniques * columns, 0.0);
   if (!impl.has(term) || columns == 0) return sum;
   impl.prepare(term);
   // Gates are picked by what they count for in any of the adjoints.

@@ -10,6 +10,7 @@
 #include "core/gates/gate.h"
 #include "core/image/image.h"
 #include "core/paths/options.h"
+#include "core/paths/technique.h"
 #include "core/scene/scene.h"
 
 namespace isochron {
@@ -67,6 +68,8 @@ class Renderer {
   long long rays() const;
   /// Work done so far, in rays: stands for time, but is the same on every machine.
   double work() const;
+  /// Of the samples of one technique.
+  double work_of(Technique technique) const;
 
  private:
   /// All but the background.

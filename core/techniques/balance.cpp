@@ -124,9 +124,14 @@ double Balance::border(const Path& path, int pixel, double tau, const Vec3& tang
   return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / sum : 0;
 }
 
-/// The part of connections, whose density is multiplied by `gain`, against all other techniques. Light arcs, which find few paths that
-/// other arcs do not, are left out of the estimate.
+/// The part of connections, whose density is multiplied by `gain`, against all other techniques.
 double Balance::of_connections(const Path& path, int pixel, double gain) const {
+  const double others = (1 - rates.ellipsoidal_share) / rates.ellipsoidal_share;
+  return 1 / (1 + others / (gain * connection_ratio(path, pixel)));
+}
+
+/// Light arcs, which find few paths that other arcs do not, are left out of the estimate.
+double Balance::connection_ratio(const Path& path, int pixel) const {
   const int last = path.size() - 1;
   const SurfacePoint& y = path.vertex[last];
   const double length = path.length[last], pdf_y = scene_.emitter_pdf(y.triangle);
@@ -157,8 +162,7 @@ double Balance::of_connections(const Path& path, int pixel, double gain) const {
   }
   // Of the samples that are no connections, one in 1 + rates.light is standard.
   if (rates.light > 0) standard *= (1 + rates.light * light_ratio(path, pixel).all) / (1 + rates.light);
-  const double ours = gain * rates.ellipsoidal_share * ellipsoidal;
-  return ours / (ours + (1 - rates.ellipsoidal_share) * standard);
+  return ellipsoidal / standard;
 }
 
 /// Density per area with which a walk at the path's vertex `from` continues to q (from the camera: by a random point of a

@@ -30,6 +30,11 @@ struct TechniqueRates {
   double pair_coupling_gain = 1;     ///< factor on the density of coupled pairs
 };
 
+/// Of a part, below one, of the samples that are no connections.
+inline double light_rate(double part) {
+  return part / (1 - part);
+}
+
 /// Densities of a path under samples with light subpaths over that under standard sampling, as if there were as many of
 /// both.
 struct LightRatio {
@@ -60,6 +65,10 @@ class Balance {
   /// without one from its last scattering vertex. `tangent`: unit, of the border; `border_pdf`: of its points, per length.
   double border(const Path& path, int pixel, double tau, const Vec3& tangent, double border_pdf,
                 std::optional<double> pdf_on_arc) const;
+
+  /// Density of the path under ellipsoidal connections over that under all other samples, as if there were as many of both; an
+  /// estimate. Infinite where only connections find it.
+  double connection_ratio(const Path& path, int pixel) const;
 
   /// See LightRatio. `joint`: the number of camera vertices before it; 0: the camera itself is joined.
   LightRatio light_ratio(const Path& path, int pixel, int joint = -1) const;

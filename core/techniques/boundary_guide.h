@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/films/sinks.h"
+#include "core/paths/technique.h"
 #include "core/scene/sensors/pinhole.h"
-#include "core/techniques/technique.h"
 
 namespace isochron {
 

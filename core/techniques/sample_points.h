@@ -8,7 +8,7 @@
 #include "core/base/progress.h"
 #include "core/base/random.h"
 #include "core/paths/options.h"
-#include "core/techniques/technique.h"
+#include "core/paths/technique.h"
 
 namespace isochron {
 

@@ -2,6 +2,7 @@
 // sink. What takes random numbers on every bounce is inline, so that their state stays in registers.
 #pragma once
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -35,8 +36,10 @@ struct Worker {
   Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator,
          const GatePick& gate_pick, Sink& target);
 
+  std::array<RayCounts, kTechniques> work_of{};  ///< that of the samples of Passes::visit
+
   /// Of the rays and arcs so far, in rays.
-  double work() const { return isochron::work(rays, arcs); }
+  double work() const { return RayCounts{rays, arcs}.in_rays(); }
 
   // Queries of the scene, whose rays are counted.
   bool visible(const SurfacePoint& x, const SurfacePoint& y) {

@@ -176,13 +176,14 @@ std::string advice_yaml(const Experiment& experiment, const Setting& setting) {
 
 std::string inspection_csv(const Problem& problem, const Inspection& inspection) {
   const std::string gate_names = gate_column_names(problem.experiment().gates);
-  std::string text = "point,quantity,term,bounces,gate,shape,share,standard_error" + gate_names + "\n";
+  std::string text = "point,quantity,term,bounces,gate,shape,technique,share,standard_error" + gate_names + "\n";
   const int gates = problem.gates().size(), most = full_bounces(problem.experiment());
   const auto& shapes = problem.scene().shapes;
   for (const PointInspection& p : inspection.points) {
     const auto row = [&](const char* quantity, const char* term, const std::string& bounces, const std::string& gate,
-                         const std::string& shape, double share, double error) {
-      text += fmt::format("{},{},{},{},{},{},{},{}", p.point.name, quantity, term, bounces, gate, shape, share, error);
+                         const std::string& shape, double share, double error, const char* technique = "") {
+      text += fmt::format("{},{},{},{},{},{},{},{},{}", p.point.name, quantity, term, bounces, gate, shape, technique,
+                          share, error);
       if (!gate.empty())
         text += gate_column_values(problem, std::stoi(gate));
       else
@@ -198,6 +199,20 @@ std::string inspection_csv(const Problem& problem, const Inspection& inspection)
     for (std::size_t s = 0; s < shapes.size(); ++s) {
       const auto [share, error] = entry(p.shares.light_by_shape, s);
       row("light", "", "", "", shapes[s].name, share, error);
+    }
+    for (int i = 0; i < kTechniques; ++i) {
+      const char* technique = name(static_cast<Technique>(i));
+      if (p.work[0][i] > 0) {
+        const auto [share, error] = entry(p.shares.light_by_technique, i);
+        row("light", "", "", "", "", share, error, technique);
+        row("work", "", "", "", "", p.work[0][i], 0, technique);
+      }
+      for (int t = 0; t < 3; ++t)
+        if (p.work[1 + t][i] > 0) {
+          const auto [share, error] = entry(p.shares.by_technique, t * kTechniques + i);
+          row("gradient", name(kTerms[t]), "", "", "", share, error, technique);
+          row("work", name(kTerms[t]), "", "", "", p.work[1 + t][i], 0, technique);
+        }
     }
     for (int t = 0; t < 3; ++t) {
       for (int b = 0; b <= most; ++b) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <numeric>
 #include <stdexcept>
 
 #include "core/base/cpu_time.h"
@@ -28,6 +29,31 @@ int samples_within(double seconds, Pass&& pass) {
   }
 }
 
+/// What each technique takes of the work of a pass over the samples.
+class WorkByTechnique {
+ public:
+  explicit WorkByTechnique(const Renderer& renderer) : renderer_(renderer), before_(now()) {}
+  /// Adds what was done since.
+  void add_to(std::array<double, kTechniques>& work) const {
+    const auto after = now();
+    for (int t = 0; t < kTechniques; ++t) work[t] += after[t] - before_[t];
+  }
+
+ private:
+  std::array<double, kTechniques> now() const {
+    std::array<double, kTechniques> work;
+    for (int t = 0; t < kTechniques; ++t) work[t] = renderer_.work_of(static_cast<Technique>(t));
+    return work;
+  }
+  const Renderer& renderer_;
+  const std::array<double, kTechniques> before_;
+};
+
+void make_shares(std::array<double, kTechniques>& work) {
+  const double all = std::accumulate(work.begin(), work.end(), 0.0);
+  for (double& w : work) w = all > 0 ? w / all : 0;
+}
+
 /// The sum over paths of 0 .. limit bounces of a sorted image.
 GatedImage image_up_to(const GatedImage& sorted, int gates, int limit) {
   GatedImage image(sorted.width, sorted.height, gates, sorted.channels);
@@ -47,10 +73,11 @@ class ShareCollector {
       slots.push_back(breakdown.image.mean(s) * breakdown.image.pixels() * breakdown.image.channels);
     light_.push_back(std::move(slots));
     by_shape_.push_back(breakdown.by_shape);
+    by_technique_.push_back(breakdown.by_technique);
   }
-  /// The three terms, each by bounces (first adjoint), gates and shapes, [.][column].
+  /// The three terms, each by bounces (first adjoint), gates, shapes and techniques, [.][column].
   struct Gradient {
-    std::vector<double> by_bounces, by_gate, by_shape;
+    std::vector<double> by_bounces, by_gate, by_shape, by_technique;
   };
   void add_gradient(Gradient gradient) { gradients_.push_back(std::move(gradient)); }
 
@@ -61,6 +88,7 @@ class ShareCollector {
       for (double s : slots) light += s / static_cast<double>(light_.size());
     shares.light = statistics(light_, light);
     shares.light_by_shape = statistics(by_shape_, light);
+    shares.light_by_technique = statistics(by_technique_, light);
 
     std::vector<double> mean(columns, 0.0);
     for (const Gradient& g : gradients_)
@@ -80,6 +108,7 @@ class ShareCollector {
     shares.by_bounces = project(&Gradient::by_bounces);
     shares.by_gate = project(&Gradient::by_gate);
     shares.by_shape = project(&Gradient::by_shape);
+    shares.by_technique = project(&Gradient::by_technique);
     return shares;
   }
 
@@ -93,7 +122,7 @@ class ShareCollector {
     }
     return batches.result();
   }
-  std::vector<std::vector<double>> light_, by_shape_;
+  std::vector<std::vector<double>> light_, by_shape_, by_technique_;
   std::vector<Gradient> gradients_;
 };
 
@@ -196,7 +225,9 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
   ShareCollector shares;
   ImageMean mean_target;
   for (int r = 0; r < kReplicates; ++r) {
+    const WorkByTechnique of_images(renderer);
     const ImageBreakdown breakdown = images(r, static_cast<int>(result.samples[0]));
+    of_images.add_to(result.work[0]);
     mean_target.add(target, 1);
     shares.add_light(breakdown);
     poll();
@@ -205,7 +236,9 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
     ShareCollector::Gradient sorted;
     for (int t = 0; t < 3; ++t) {
       const SampleRange range{0, static_cast<int>(result.samples[1 + t])};
+      const WorkByTechnique of_term(renderer);
       GradientBreakdown g = renderer.gradient_breakdown(kTerms[t], adjoint, stream(pass_of(kTerms[t]), r), range);
+      of_term.add_to(result.work[1 + t]);
       for (int b = 0; b <= most; ++b)
         for (int c = 0; c < columns; ++c) {
           for (int limit = b; limit <= most; ++limit)
@@ -216,6 +249,8 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
         }
       for (std::size_t i = 0; i < g.by_gate.size(); ++i) sorted.by_gate.push_back(unit[i % columns] * g.by_gate[i]);
       for (std::size_t i = 0; i < g.by_shape.size(); ++i) sorted.by_shape.push_back(unit[i % columns] * g.by_shape[i]);
+      for (std::size_t i = 0; i < g.by_technique.size(); ++i)
+        sorted.by_technique.push_back(unit[i % columns] * g.by_technique[i]);
       poll();
     }
     if (!std::all_of(limits.begin(), limits.end(), [](double x) { return std::isfinite(x); }))
@@ -223,6 +258,7 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
     result.gradient.add(std::move(limits));
     shares.add_gradient(std::move(sorted));
   }
+  for (auto& work : result.work) make_shares(work);
   result.shares = shares.result(columns);
   result.target = mean_target.mean();
   return result;

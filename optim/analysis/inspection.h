@@ -24,13 +24,13 @@ std::vector<InspectedPoint> points_to_inspect(const Parameters& parameters, cons
 /// The most bounces that the experiment knows: of its model or of its rendered target.
 int full_bounces(const Experiment& experiment);
 
-/// Shares of the light, [bounces][gate], and of the light on paths that meet a shape, [shape]; of the sum of
+/// Shares of the light, [bounces][gate], of the light on paths that meet a shape, [shape], and by [technique]; of the sum of
 /// all. Shares of the gradient by terms in the order of kTerms: of the projections on the whole gradient;
-/// [term][bounces], [term][gate] and [term][shape] (see GradientBreakdown::by_shape; paths may meet several
+/// [term][bounces], [term][gate], [term][technique] and [term][shape] (see GradientBreakdown::by_shape; paths may meet several
 /// shapes).
 struct Shares {
-  Statistics light, light_by_shape;
-  Statistics by_bounces, by_gate, by_shape;
+  Statistics light, light_by_shape, light_by_technique;
+  Statistics by_bounces, by_gate, by_shape, by_technique;
 };
 
 struct PointInspection {
@@ -42,7 +42,9 @@ struct PointInspection {
   std::array<bool, 3> can_be{};  ///< whether a term can be other than zero at all
   std::array<bool, 3> found{};   ///< whether it was in any sample
   PerPass samples{};             ///< per pixel and replicate, of images and terms
-  GatedImage target;             ///< mean over the replicates
+  /// What each technique takes of the work of images and terms.
+  std::array<std::array<double, kTechniques>, kPasses> work{};
+  GatedImage target;  ///< mean over the replicates
 };
 
 /// Measures light and gradient of the full model (full_bounces) in independent replicates, as many samples

@@ -1,9 +1,8 @@
-// The techniques that find paths, one by one, and how a pass uses one.
+// The techniques that find paths, one by one.
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <functional>
-
-#include "core/base/random.h"
 
 namespace isochron {
 
@@ -20,15 +19,19 @@ enum class Technique : std::uint32_t {
   from_light,      ///< one between an edge and a light without an extent
   from_camera      ///< an edge seen from a vertex of a camera path
 };
+inline constexpr int kTechniques = 10;
 
-/// A technique as a pass uses it.
-struct TechniqueUse {
-  Technique technique;
-  double rate;  ///< samples per pixel and sample of the pass, on average; 0: none
-  bool
-      in_pixel;  ///< samples start in a pixel, which gets GatePick::rate times as many; else their points cover the whole image
-  /// One sample, which starts in `pixel` or comes with it; contributions are scaled by `scale`.
-  std::function<void(int pixel, double scale, Rng& rng)> sample;
-};
+inline const char* name(Technique technique) {
+  constexpr std::array<const char*, kTechniques> kNames = {
+      "standard sampling",    "connections of walks", "connections of the camera", "pairs of the camera",
+      "light subpaths",       "edges in the image",   "borders of pixels",         "segments from edges",
+      "segments from lights", "segments from walks"};
+  return kNames[static_cast<std::size_t>(technique)];
+}
+
+/// Whether it connects two points by arcs of ellipsoids.
+inline bool is_connection(Technique t) {
+  return t == Technique::walk || t == Technique::camera_lengths || t == Technique::camera_pairs;
+}
 
 }  // namespace isochron
