@@ -62,7 +62,7 @@ class GradientBreakdownSink final : public Sink {
   bool differential() const override { return true; }
   void note_technique(Technique technique) override { origin_.note_technique(technique); }
   void note_path(const Path& path) override { origin_.note_path(path); }
-  void note_boundary(int bounces, int triangle) override { origin_.note_boundary(bounces, triangle); }
+  void note_boundary(int bounces, int triangle, double) override { origin_.note_boundary(bounces, triangle); }
   void bind(const LocalDifferential& differential) override { rates_.bind(differential); }
   void add(int pixel, const Rgb& value, double length, GateWeights use) override;
   void add_length_rate(int pixel, int gate, const Rgb& value) override { add_to_gate(pixel, gate, value, 0, 1); }

@@ -35,8 +35,9 @@ class Sink {
   virtual void note_technique(Technique) {}
   /// The complete path (last vertex on an emitter) that the next contributions belong to.
   virtual void note_path(const Path&) {}
-  /// The next contributions belong to a boundary segment at an edge of the triangle, on paths of so many bounces.
-  virtual void note_boundary(int /*bounces*/, int /*triangle*/) {}
+  /// The next contributions belong to a boundary segment at an edge of the triangle, on paths of so many bounces. `camera_part`: the
+  /// weight of searches from the camera where both they and searches from edges may find it.
+  virtual void note_boundary(int /*bounces*/, int /*triangle*/, double /*camera_part*/) {}
   /// Attributes the contributions since the last call to position x in (0, 1) of guide histogram `table`, see BoundaryGuide.
   virtual void note_guide(int /*table*/, double /*x*/) {}
 

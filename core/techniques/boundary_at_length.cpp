@@ -59,10 +59,10 @@ bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, co
   const LocalDifferential& differential = with_kept_length(g, c, Found::from_camera);
   if (differential.empty()) return false;
   worker_.sink.bind(differential);
-  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0]);
+  const BoundaryShares shares(c.camera_over_edge, rate);
+  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0], 1 - shares.from_edge);
   // Its share over its density is that of random edge points over theirs.
-  const double weight =
-      worker_.gates.shape().is_dirac() ? 1 / rate : BoundaryShares(c.camera_over_edge, rate).from_camera;
+  const double weight = worker_.gates.shape().is_dirac() ? 1 / rate : shares.from_camera;
   worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
   return true;
 }

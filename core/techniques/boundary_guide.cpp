@@ -53,6 +53,77 @@ std::vector<double> mix(const std::vector<double>& p, const std::vector<double>&
   return result;
 }
 
+constexpr int kFromEdge = BoundaryGuide::table(Technique::from_edge),
+              kFromCamera = BoundaryGuide::table(Technique::from_camera);
+
+/// Second moments of contributions, of which searches from edges and from the camera share some: a contribution v of weight p to
+/// one of them is v / (n_edge (1 - p) + n_camera p) under other rates, whichever finds it.
+class Moments {
+ public:
+  Moments(const BoundaryGuide::Each<bool>& possible, const BoundaryGuide::Each<double>& cost)
+      : possible_(possible), cost_(cost) {}
+
+  void add(int technique, double square, double camera_part) {
+    const int group = group_of(technique);
+    const int bin =
+        group == kFromCamera ? std::min(static_cast<int>(camera_part * kParts), kParts - 1) : kParts + technique;
+    squares_[bin] += square;
+    camera_squares_[bin] += square * camera_part;
+    sum_[group] += square;
+    sum_of_squares_[group] += square * square;
+  }
+
+  /// The rates, over those of the records, that make variance x cost least, at the cost of these. Each step multiplies by the root of
+  /// what is gained per cost, and so never raises the variance.
+  BoundaryGuide::Each<double> best_rates() const {
+    BoundaryGuide::Each<double> rate;
+    rate.fill(1);
+    double cost = 0;
+    for (const double c : cost_) cost += c;
+    for (int step = 0; step < kSteps; ++step) {
+      BoundaryGuide::Each<double> gain{};
+      for (int bin = 0; bin < kParts + BoundaryGuide::kTechniques; ++bin) {
+        if (!(squares_[bin] > 0)) continue;
+        if (bin >= kParts) {
+          const int t = bin - kParts;
+          gain[t] = squares_[bin] / (rate[t] * rate[t]);
+          continue;
+        }
+        const double p = camera_squares_[bin] / squares_[bin];
+        const double sum = (1 - p) * rate[kFromEdge] + p * rate[kFromCamera];
+        gain[kFromEdge] += squares_[bin] * (1 - p) / (sum * sum);
+        gain[kFromCamera] += squares_[bin] * p / (sum * sum);
+      }
+      BoundaryGuide::Each<double> wanted{};
+      double wanted_cost = 0;
+      for (int t = 0; t < BoundaryGuide::kTechniques; ++t) {
+        if (possible_[t] && cost_[t] > 0) wanted[t] = rate[t] * std::sqrt(gain[t] / cost_[t]);
+        wanted_cost += wanted[t] * cost_[t];
+      }
+      if (!(wanted_cost > 0)) break;
+      for (int t = 0; t < BoundaryGuide::kTechniques; ++t) rate[t] = wanted[t] * cost / wanted_cost;
+    }
+    return rate;
+  }
+
+  /// How far these are to be believed, 0 to 1.
+  double trust(int technique) const {
+    const int group = group_of(technique);
+    const double square = sum_[group] * sum_[group];
+    return square > 0 ? square / (square + kHalfTrustSampleSize * sum_of_squares_[group]) : 1;
+  }
+
+ private:
+  static constexpr int kParts = 32, kSteps = 64;
+  static int group_of(int technique) { return technique == kFromEdge ? kFromCamera : technique; }
+
+  const BoundaryGuide::Each<bool>& possible_;
+  const BoundaryGuide::Each<double>& cost_;
+  /// By part of the camera where it may have some, else by technique.
+  std::array<double, kParts + BoundaryGuide::kTechniques> squares_{}, camera_squares_{};
+  BoundaryGuide::Each<double> sum_{}, sum_of_squares_{};  ///< by group
+};
+
 }  // namespace
 
 Warp::Warp(const std::vector<double>& probability) {
@@ -93,31 +164,19 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
     warps_[table] = Warp(mix(uniform, learned, trust_all * (1 - kDefensiveShare)));
   }
 
-  // For a given total cost, the variance is least where each technique is used in proportion to the root of its
-  // second moment, which is that of guided samples, over its cost.
-  Each<double> wanted{}, trust;
-  trust.fill(1);
-  double unguided_cost = 0, wanted_cost = 0;
-  for (int t = 0; t < kTechniques; ++t) {
-    double square = 0, fourth = 0;
-    for (const GuideRecord& r : of_technique[t]) {
-      const double guided = r.square / warps_[r.table].density(r.x);
-      square += guided, fourth += guided * guided;
-    }
-    if (fourth > 0) trust[t] = square * square / (square * square + kHalfTrustSampleSize * fourth);
-    wanted[t] = cost[t] > 0 ? std::sqrt(square / cost[t]) : 0;
-    unguided_cost += cost[t];
-    wanted_cost += wanted[t] * cost[t];
-  }
-  if (!(wanted_cost > 0)) return;
+  // For a given total cost the variance is least where, per cost, a little more of any technique lowers it alike.
+  Moments moments(possible, cost);
+  for (const GuideRecord& r : records)
+    moments.add(std::min(r.table, kTechniques - 1), r.square / warps_[r.table].density(r.x), r.camera_part);
+  const Each<double> best = moments.best_rates();
   for (int t = 0; t < kTechniques; ++t)
-    rate_[t] *= std::pow(std::clamp(wanted[t] * unguided_cost / wanted_cost, kLeastRate, kMostRate), trust[t]);
+    rate_[t] *= std::pow(std::clamp(best[t], kLeastRate, kMostRate), moments.trust(t));
 }
 
 void GuideSink::note_guide(int table, double x) {
   square_sums();
-  if (square_ > 0) records.push_back({table, x, square_});
-  square_ = 0;
+  if (square_ > 0) records.push_back({table, x, square_, part_of_square_ / square_});
+  square_ = part_of_square_ = camera_part_ = 0;
   ++sample_;
 }
 
@@ -137,6 +196,7 @@ void GuideSink::bind(const LocalDifferential& differential) {
 void GuideSink::add(int pixel, const Rgb& value, double length, GateWeights) {
   if (pixel != pixel_) square_sums();
   pixel_ = pixel;
+  part_of_sums_ = camera_part_;
   gates_.for_each_value(length, [&](int gate, double w) {
     sums_[gate] += value * (w * rate_);
     touched_.push_back(gate);
@@ -151,11 +211,13 @@ double GuideSink::column_sign(int column) const {
 }
 
 void GuideSink::square_sums() {
+  const double before = square_;
   for (const int gate : touched_) {
     const Rgb& sum = sums_[gate];
     square_ += sum.r * sum.r + sum.g * sum.g + sum.b * sum.b;
     sums_[gate] = Rgb();
   }
+  part_of_square_ += part_of_sums_ * (square_ - before);
   touched_.clear();
 }
 

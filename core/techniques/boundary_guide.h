@@ -39,8 +39,9 @@ class Warp {
 /// What the learning pass notes about a technique: where contributions came from, and their squares.
 struct GuideRecord {
   int table;
-  double x;       ///< in (0, 1): the boundary point's place in the unguided distribution
-  double square;  ///< summed over pixels, gates, unknowns and colours
+  double x;                ///< in (0, 1): the boundary point's place in the unguided distribution
+  double square;           ///< summed over pixels, gates, unknowns and colours
+  double camera_part = 0;  ///< see Sink::note_boundary
 };
 
 class BoundaryGuide {
@@ -87,6 +88,7 @@ class GuideSink final : public Sink {
       : gates_(gates), layout_(layout), basis_(basis), sums_(gates.size()) {}
 
   bool differential() const override { return true; }
+  void note_boundary(int, int, double camera_part) override { camera_part_ = camera_part; }
   void note_guide(int table, double x) override;
   void bind(const LocalDifferential& differential) override;
   void add(int pixel, const Rgb& value, double length, GateWeights use) override;
@@ -104,6 +106,8 @@ class GuideSink final : public Sink {
   std::vector<int> touched_;  ///< gates that were added to; repeats do no harm
   int pixel_ = -1;
   double rate_ = 0, square_ = 0;
+  /// Of the next contributions, of the current sums, and, times their squares, of all sums of the search.
+  double camera_part_ = 0, part_of_sums_ = 0, part_of_square_ = 0;
   std::uint32_t sample_ = 0;
 };
 

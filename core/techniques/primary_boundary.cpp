@@ -95,7 +95,7 @@ void PrimaryBoundary::sample(double scale, Rng& rng) {
       const CameraSide before{pixel, length(x1->p - eye_.p) * scene_.index_between(eye_, *x1)};
       for (const GatheredLight& light :
            light_side_.gather(eye_, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng)) {
-        worker_.sink.note_boundary(light.bounces, edge->face[0]);
+        worker_.sink.note_boundary(light.bounces, edge->face[0], 0);
         worker_.sink.add(pixel, light.value * (-sign * factor), light.whole_length(before.length), kValueOnly);
       }
     }
@@ -153,7 +153,7 @@ void PrimaryBoundary::follow(const SurfacePoint& x1, int pixel, int triangle, co
   const CameraSide before{pixel, length(x1.p - eye_.p) * scene_.index_between(eye_, x1) +
                                      length(x2->p - x1.p) * scene_.index_between(x1, *x2)};
   for (const GatheredLight& light : light_side_.gather(x1, *x2, {&before, 1}, worker_.options.max_bounces - 1, rng)) {
-    worker_.sink.note_boundary(light.bounces + 1, triangle);
+    worker_.sink.note_boundary(light.bounces + 1, triangle, 0);
     add(throughput * light.value, light.whole_length(before.length));
   }
 }

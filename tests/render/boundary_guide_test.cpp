@@ -4,12 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <map>
 
 #include "core/base/random.h"
 #include "core/films/sinks.h"
 #include "core/techniques/boundary_edges.h"
-#include "support.h"
+#include "tests/render/support.h"
+#include "tests/seed.h"
 
 namespace isochron::testing {
 namespace {
@@ -96,7 +98,7 @@ TEST(BoundaryGuide, LearnsWhereContributionsAre) {
   for (int i = 0; i < 100; ++i) EXPECT_GT(warp.density((i + 0.5) / 100), 0.2);
   // Three techniques are possible: without guiding each has a rate of 1/3. Rates for the same total cost of 10/3: in
   // proportion to the roots of second moment over cost. Guided moments are those of the records over their densities. 10
-  // and 1000 records make 10 / 18 and about 1000 / 1008 of that, on a logarithmic scale. The last one, which found
+  // and 1000 records make 10 / 18 and about 1000 / 1008 of that, on a logarithmic scale. The last one, which finds
   // nothing, is rarely used.
   double moment = 0;
   for (const GuideRecord& r : records)
@@ -106,8 +108,37 @@ TEST(BoundaryGuide, LearnsWhereContributionsAre) {
                of_edge = std::sqrt(moment / 4), scale = 10 / (of_primary + 4 * of_edge);
   EXPECT_NEAR(guide.rate(Technique::primary_edge), std::pow(of_primary * scale, 10.0 / 18) / 3, 1e-12);
   EXPECT_NEAR(guide.rate(Technique::from_edge), std::pow(of_edge * scale, 1000.0 / 1008) / 3, 1e-3);
-  EXPECT_EQ(guide.rate(Technique::from_camera), 0.125 / 3);
+  EXPECT_NEAR(guide.rate(Technique::from_camera), std::pow(0.125, 1000.0 / 1008) / 3, 1e-3);
   EXPECT_EQ(guide.rate(Technique::pixel_border), 0);
+}
+
+/// Rates of searches that find the same segments, against a search over all rates of the same cost.
+TEST(BoundaryGuide, SharesSegmentsAtTheLeastVariance) {
+  constexpr BoundaryGuide::Each<double> kCost{0, 0, 2000, 0, 3000};
+  std::vector<GuideRecord> records;
+  Rng rng(Stream{test_seed(18), 0, 0}, 0, 0);
+  for (int i = 0; i < 4000; ++i) {
+    const double p = rng.uniform();
+    const Technique found_by = rng.uniform() < p ? Technique::from_camera : Technique::from_edge;
+    records.push_back({BoundaryGuide::table(found_by), rng.uniform(), 0.5 + rng.uniform() * p, p});
+  }
+  const BoundaryGuide guide({false, false, true, false, true}, records, kCost);
+  const auto variance = [&](double edge, double camera) {
+    double sum = 0;
+    for (const GuideRecord& r : records)
+      sum += r.square / guide.warp(r.table).density(r.x) / ((1 - r.camera_part) * edge + r.camera_part * camera);
+    return sum;
+  };
+  double best = 0, least = std::numeric_limits<double>::infinity();
+  for (int i = 1; i < 5000; ++i) {
+    const double edge = i * 0.0005, camera = (5000 - edge * 2000) / 3000;
+    if (const double v = variance(edge, camera); v < least) least = v, best = edge / camera;
+  }
+  EXPECT_NEAR(guide.rate(Technique::from_edge) / guide.rate(Technique::from_camera) / best, 1, 0.02);
+  // Where the camera finds nothing of its own, and at more cost, it is hardly asked.
+  for (GuideRecord& r : records) r.camera_part = 0.5;
+  const BoundaryGuide alike({false, false, true, false, true}, records, kCost);
+  EXPECT_NEAR(alike.rate(Technique::from_camera), 0.125 / 2, 0.001);
 }
 
 /// What one sample adds to one value of an image counts by the square of its sum, the rest by the sum of its squares; with

@@ -71,7 +71,7 @@ BoundaryGuide uneven_guide() {
   for (const Technique technique : {Technique::from_edge, Technique::from_camera})
     for (int i = 0; i < 500; ++i) {
       const double u = rng.uniform();
-      records.push_back({BoundaryGuide::table(technique), u * u, technique == Technique::from_edge ? 1.0 : 3.0});
+      records.push_back({BoundaryGuide::table(technique), u * u, technique == Technique::from_edge ? 1.0 : 3.0, u});
     }
   return {{true, false, true, false, true}, records, cost};
 }
