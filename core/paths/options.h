@@ -29,19 +29,10 @@ struct BoundaryTechniques {
   bool operator==(const BoundaryTechniques&) const = default;
 };
 
-/// How often each technique of ellipsoidal sampling is used per sample, on average; all positive.
-struct ConnectionRates {
-  double camera_lengths = 1;  ///< connections of the camera itself, lengths drawn from the gates
-  double camera_pairs = 1;    ///< the same, lengths in pairs from the gates' derivative
-  double walk = 1;            ///< camera paths with connections at their vertices
-  bool operator==(const ConnectionRates&) const = default;
-};
-
 /// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
-/// standard or have light subpaths. Strictly between, multiple importance sampling combines the two. Rates hold where connections take all.
+/// standard or have light subpaths. Strictly between, multiple importance sampling combines the two.
 struct SamplingMix {
   double image = 0, interior = 0;
-  ConnectionRates interior_rates = {}, path_length_rates = {};
   /// The part, 0 to below 1, of the samples not taken by connections that are with light subpaths (LightSubpaths); the others are
   /// standard. Where it is not zero, connections have them, too.
   double image_light = 0, interior_light = 0;

@@ -5,8 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/base/listed_sum.h"
-#include "core/image/stored_image.h"
 #include "core/render/light_share.h"
 #include "core/render/share_trial.h"
 
@@ -30,14 +28,6 @@ constexpr int kBlocks = 4;  ///< across the image
 constexpr double kTrialPart = 0.1, kLightTrialPart = 0.04;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
-/// How often to use the techniques of ellipsoidal connections: all equally, or mostly the camera's own pairs, which share
-/// low-discrepancy points over the whole image. No rate is zero, as a trial may miss what is rare. The second must look a tenth
-/// better than the first.
-constexpr ConnectionRates kUniformRates{1, 1, 1}, kCameraPairRates{0.3, 2, 0.1};
-constexpr double kClearlyFaster = 0.9;
-/// Per pixel and batch: a batch's points cover the whole image, so that its blocks vary together, and only more batches say
-/// more about the variance.
-constexpr int kRateSamples = 1, kRateBatches = 16;
 /// Samples of standard sampling that take about as long as one by ellipsoidal connections.
 constexpr double kConnectionsWork = 4;
 /// The same of one sample of a trial, of which half are connections.
@@ -70,81 +60,6 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
   Rng rng(stream, 0, 0);
   for (int column = 0; column < basis.columns; ++column) sign.push_back(rng.uniform() < 0.5 ? -1 : 1);
   return basis.combined(sign);
-}
-
-/// Sums over square blocks of pixels.
-GatedImage blocks_of(const StoredImage& image, int size) {
-  GatedImage sums((image.width + size - 1) / size, (image.height + size - 1) / size, image.gates, image.channels);
-  for (int pixel = 0; pixel < image.pixels(); ++pixel) {
-    const int block = pixel / image.width / size * sums.width + pixel % image.width / size;
-    double* const values = &sums.data[sums.index(block, 0)];
-    image.for_each(pixel, [&](std::uint32_t place, float value) { values[place] += value; });
-  }
-  return sums;
-}
-
-/// Width of the blocks of pixels whose sums are compared.
-int block_size(const Scene& small, Purpose purpose) {
-  return purpose == Purpose::images ? 1 : std::max(1, small.camera.width / kBlocks);
-}
-
-/// Variance between images in sums over square blocks of pixels.
-class BlockVariance {
- public:
-  explicit BlockVariance(int block) : block_(block) {}
-  void add(const StoredImage& image) {
-    if (count_++ == 0)
-      for (ListedSum* sum : {&sums_, &squares_}) *sum = ListedSum(image.values_of_pixel() * image.pixels());
-    const auto take = [&](std::size_t i, double value) {
-      *sums_.at(i, 1) += value;
-      *squares_.at(i, 1) += value * value;
-    };
-    if (block_ == 1) {  // most values may be zero
-      for (int pixel = 0; pixel < image.pixels(); ++pixel)
-        image.for_each(pixel,
-                       [&](std::uint32_t place, float value) { take(pixel * image.values_of_pixel() + place, value); });
-      return;
-    }
-    const GatedImage blocks = blocks_of(image, block_);
-    for (std::size_t i = 0; i < blocks.data.size(); ++i) take(i, blocks.data[i]);
-  }
-  /// Of one image, summed over blocks and gates. Ends the adding.
-  double sum() {
-    sums_.finish();
-    squares_.finish();
-    double sum = 0;
-    squares_.for_each(0, squares_.size(), [&](std::size_t, double value) { sum += value; });
-    sums_.for_each(0, sums_.size(), [&](std::size_t, double value) { sum -= value * value / count_; });
-    return sum / (count_ - 1);
-  }
-
- private:
-  const int block_;
-  int count_ = 0;
-  ListedSum sums_, squares_;  ///< of an image of blocks, or of pixels
-};
-
-/// The better rates of connections for a term's derivative along one column, in sums over a quarter of the width. `budget`:
-/// samples of standard sampling whose work it may take.
-ConnectionRates measure_rates(const Scene& scene, const GateSet& gates, EstimatorOptions options,
-                              const TangentBasis& column, Term term, const Stream& stream, Purpose purpose,
-                              double budget, double& work) {
-  const double samples = 2 * kRateBatches * kRateSamples * kConnectionsWork;
-  const double affordable = (budget - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size())) / samples;
-  if (affordable < std::min<double>(kFewestPixels, pixels_of(scene))) return kUniformRates;
-  const Scene small = reduced(scene, std::min<double>(kPixels, affordable));
-  const auto cost = [&](const ConnectionRates& rates) {
-    options.mix = SamplingMix{1, 1, rates, rates};
-    const Renderer renderer(small, gates, options, &column);
-    if (!renderer.has(term)) return 0.0;
-    BlockVariance variance(block_size(small, purpose));
-    for (int b = 0; b < kRateBatches; ++b)
-      variance.add(renderer.derive_replicates(term, stream, {{b * kRateSamples, (b + 1) * kRateSamples}})[0].mean);
-    work += renderer.work();
-    return variance.sum() * renderer.work();
-  };
-  const double uniform = cost(kUniformRates);
-  return uniform > 0 && cost(kCameraPairRates) < kClearlyFaster * uniform ? kCameraPairRates : kUniformRates;
 }
 
 /// What one trial has to say.
@@ -220,20 +135,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
   best.interior_light = choose_light(kInterior, job.interior, &one);
-  // Only walks find paths of more bounces, and a trial cannot judge rare ones.
-  const bool has_rates = options.max_bounces == 1;
-  best.interior = choose(kInterior, by_width.interior, has_rates ? job.interior / 2 : job.interior, &one);
-  if (!has_rates) return best;
-  // Without pairs there is nothing to choose between.
-  EstimatorOptions chosen = options;
-  chosen.mix = best;
-  if (sampling_mix(chosen, gates, scene).keep_length) return best;
-  const auto rates = [&](Term term, double samples) {
-    return measure_rates(scene, gates, options, one, term, stream, purpose, kTrialPart * pixels_of(scene) * samples,
-                         work);
-  };
-  if (best.interior == 1) best.interior_rates = rates(Term::interior, job.interior / 2);
-  best.path_length_rates = rates(Term::path_length, job.path_length);
+  best.interior = choose(kInterior, by_width.interior, job.interior, &one);
   return best;
 }
 

@@ -1,4 +1,4 @@
-// How `sampling: auto` decides: a trial of standard sampling, ellipsoidal connections and both combined.
+// How `sampling: auto` decides how often standard sampling, light subpaths and ellipsoidal connections are used.
 #pragma once
 #include <limits>
 
@@ -11,24 +11,20 @@ namespace isochron {
 /// pixel.
 enum class Purpose { images, gradients };
 
-/// Samples per pixel that will be spent with the chosen mix, on images and on two terms of their derivative. Zero: no trial,
+/// Samples per pixel that will be spent with the chosen mix, on images and on the interior term of their derivative. Zero: no trial,
 /// the width of the gates decides; infinite: no limit on the trial.
 struct Job {
   double image = std::numeric_limits<double>::infinity();
   double interior = std::numeric_limits<double>::infinity();
-  double path_length = std::numeric_limits<double>::infinity();
 };
 
-/// The mix of techniques with the least variance x work, found by rendering small images (at most 4096
-/// pixels, some hundred thousand paths each), and, where `basis` has columns, the interior term of the derivative
-/// along a random combination of them. Depends only on the arguments. For gradients, variance is that of
-/// sums over blocks of a quarter of the image's width. Gates much wider or narrower than where the techniques
-/// cross need no trial; other sampling than automatic none either. How often light subpaths are used has a trial of its own, before (see
-/// measure_light_share). Where connections find all of a term and paths
-/// bounce once, so that each technique could find them all, rates are chosen by a trial of that term's derivative.
-/// Together trials take about a tenth of the work of what they decide about at most; where that is too little to tell
-/// techniques apart there is none, and the width of the gates decides. `trial_work`, where given, gets the work of all
-/// trials (see Renderer::work).
+/// The mix of techniques with the least variance x work, found by trials on small images (at most 4096 pixels), and, where `basis` has
+/// columns, on the interior term of the derivative along a random combination of them. Depends only on the arguments. For
+/// gradients, variance is that of sums over blocks of a quarter of the image's width. How often light subpaths are used is
+/// decided first (measure_light_share), then the share of connections (measure_shares). Gates much wider or narrower than where
+/// techniques cross need no trial of the latter; other sampling than automatic none either. Together trials take about a
+/// tenth of the work of what they decide about at most; where that is too little to tell techniques apart there is none, and the
+/// width of the gates decides. `trial_work`, where given, gets the work of all trials (see Renderer::work).
 SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const EstimatorOptions& options,
                         const TangentBasis* basis, const Stream& stream, Purpose purpose, const Job& job = {},
                         double* trial_work = nullptr);

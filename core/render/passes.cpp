@@ -125,7 +125,7 @@ void Passes::run_images(const Pass& pass, Partition partition, Sink& sink) const
   Worker worker(scene, gates, options, every_gate, sink);
   GatePass lengths;
   lengths.value = true;
-  run_paths(worker, mix.image, {}, mix.image_light, lengths, pass, partition);
+  run_paths(worker, mix.image, mix.image_light, lengths, pass, partition);
   count(worker);
 }
 
@@ -136,12 +136,12 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
     lengths.value = true;
     lengths.pairs = interior_pairs();
     if (lengths.pairs) lengths.use = kValueOnly;
-    run_paths(worker, mix.interior, mix.interior_rates, mix.interior_light, lengths, pass, partition);
+    run_paths(worker, mix.interior, mix.interior_light, lengths, pass, partition);
   } else if (term == Term::path_length) {
     lengths.pairs = true;
     lengths.part = PairPart::dirac;
     lengths.coupled = options.antithetic;
-    run_paths(worker, 1, mix.path_length_rates, mix.interior_light, lengths, pass, partition);
+    run_paths(worker, 1, mix.interior_light, lengths, pass, partition);
   } else {
     run_visibility(worker, pass, partition);
   }
@@ -178,10 +178,9 @@ void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pas
   });
 }
 
-void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rates, double light,
-                       const GatePass& lengths, const Pass& pass, Partition partition) const {
-  const ConnectionRates used = share == 1 ? rates : ConnectionRates{};
-  worker.balance.rates = {share, used, light_rate(light), light > 0 && options.max_bounces > 1, pair_coupling_gain_};
+void Passes::run_paths(Worker& worker, double share, double light, const GatePass& lengths, const Pass& pass,
+                       Partition partition) const {
+  worker.balance.rates = {share, light_rate(light), light > 0 && options.max_bounces > 1, pair_coupling_gain_};
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -193,11 +192,11 @@ void Passes::run_paths(Worker& worker, double share, const ConnectionRates& rate
   const bool from_camera = !scene.captures();
   const double others = 1 - share;
   const TechniqueUse uses[] = {
-      {Technique::camera_lengths, from_camera && lengths.value ? share * used.camera_lengths : 0, false,
+      {Technique::camera_lengths, from_camera && lengths.value ? share : 0, false,
        [&](int, double scale, Rng& rng) { camera_lengths.sample_from_camera(scale, rng); }},
-      {Technique::camera_pairs, from_camera && lengths.pairs ? share * used.camera_pairs : 0, false,
+      {Technique::camera_pairs, from_camera && lengths.pairs ? share : 0, false,
        [&](int, double scale, Rng& rng) { camera_pairs.sample_from_camera(scale, rng); }},
-      {Technique::walk, of_walks.value || of_walks.pairs ? share * used.walk : 0, true,
+      {Technique::walk, of_walks.value || of_walks.pairs ? share : 0, true,
        [&](int pixel, double scale, Rng& rng) { connections.sample_walk(pixel, scale, rng); }},
       {Technique::standard, others * (1 - light), true,
        [&](int pixel, double scale, Rng& rng) { standard.start(pixel, scale, rng); }},

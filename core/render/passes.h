@@ -144,10 +144,9 @@ class Passes {
   /// Whether the interior term takes the continuous part of dW in pairs.
   bool interior_pairs() const;
 
-  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling and light subpaths. `rates` hold where
-  /// there are no others; `light`: see SamplingMix::interior_light.
-  void run_paths(Worker& worker, double share, const ConnectionRates& rates, double light, const GatePass& lengths,
-                 const Pass& pass, Partition partition) const;
+  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling and light subpaths. `light`: see SamplingMix::interior_light.
+  void run_paths(Worker& worker, double share, double light, const GatePass& lengths, const Pass& pass,
+                 Partition partition) const;
   struct Searches;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
   /// All samples of a partition by techniques; their work counts as theirs.

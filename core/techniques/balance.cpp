@@ -89,13 +89,11 @@ double Balance::connection(const Path& path, int pixel, const TargetLength& targ
   // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
   // densities of the length differ between the two techniques.
   const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !rates.light_connections);
-  const double camera_rate = target.pair ? rates.connections.camera_pairs : rates.connections.camera_lengths;
   const double part = part_of_arc(path, on_arc, pdf_on_arc, false, [&](int from) {
-    const double rate = from == 0 ? camera_rate : rates.connections.walk;
-    if (same_length_pdf) return rate;
+    if (same_length_pdf) return 1.0;
     const int served = from == 0 ? GatePick::kImage : pixel;
     // A pair serves one gate.
-    return rate * (from == 0 ? 1 : pick_.rate(pixel)) *
+    return (from == 0 ? 1 : pick_.rate(pixel)) *
            (target.pair ? pick_.probability(served, target.gate) : pick_.length_pdf(served, target.tau[side]));
   });
   if (!(part > 0)) return 0;
@@ -114,8 +112,7 @@ double Balance::border(const Path& path, int pixel, double tau, const Vec3& tang
   const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1], &y = path.vertex[last];
   // How often each is tried, times the density of the length there.
   const auto tries = [&](int from) {
-    return from == 0 ? rates.connections.camera_lengths * pick_.length_pdf(GatePick::kImage, tau)
-                     : rates.connections.walk * pick_.rate(pixel) * pick_.length_pdf(pixel, tau);
+    return from == 0 ? pick_.length_pdf(GatePick::kImage, tau) : pick_.rate(pixel) * pick_.length_pdf(pixel, tau);
   };
   const double from_q = step_pdf(path, last - 2, q) * std::abs(dot(normalize(y.p - q.p), tangent)) * tries(last - 1);
   const double by_arcs =

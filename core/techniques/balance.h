@@ -23,11 +23,10 @@ namespace isochron {
 
 /// How often each technique is used.
 struct TechniqueRates {
-  double ellipsoidal_share = 0;      ///< of the samples; the others are standard or have light subpaths
-  ConnectionRates connections = {};  ///< of ellipsoidal connections
-  double light = 0;                  ///< samples with light subpaths per standard one
-  bool light_connections = false;    ///< whether connections have light subpaths, too
-  double pair_coupling_gain = 1;     ///< factor on the density of coupled pairs
+  double ellipsoidal_share = 0;    ///< of the samples; the others are standard or have light subpaths
+  double light = 0;                ///< samples with light subpaths per standard one
+  bool light_connections = false;  ///< whether connections have light subpaths, too
+  double pair_coupling_gain = 1;   ///< factor on the density of coupled pairs
 };
 
 /// Of a part, below one, of the samples that are no connections.

@@ -183,11 +183,11 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
     const Scene scene = parameters_->apply(theta);
     const TangentBasis basis = parameters_->tangent(theta);
     const SampleSpec& samples = experiment_.samples;
-    Job job{0, double{1} * samples.interior, double{1} * samples.path_length};
+    Job job{0, double{1} * samples.interior};
     if (purpose == Purpose::gradients) {
       const double images =
           experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;
-      job = {evaluations_ * images * samples.primal, evaluations_ * job.interior, evaluations_ * job.path_length};
+      job = {evaluations_ * images * samples.primal, evaluations_ * job.interior};
       if (!experiment_.target.measured()) job.image += experiment_.target.samples;
     }
     options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose, job);
@@ -200,7 +200,7 @@ const EstimatorOptions& Problem::image_estimator() const {
   if (!settled_.image_estimator) {
     EstimatorOptions options = experiment_.estimator;
     options.mix = measure_mix(parameters_->apply(parameters_->initial()), gates_, options, nullptr, stream(Pass::mix),
-                              Purpose::images, {double{1} * experiment_.samples.primal, 0, 0});
+                              Purpose::images, {double{1} * experiment_.samples.primal, 0});
     settled_.image_estimator = options;
   }
   return *settled_.image_estimator;

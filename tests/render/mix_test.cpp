@@ -252,13 +252,13 @@ TEST(MeasureMix, TrialsTakeATenthOfTheWorkAtMost) {
     for (const int samples : {4, 64}) {
       double work = 0;
       options.mix = measure_mix(scene, gates, options, nullptr, {1, 0, 0}, Purpose::images,
-                                {static_cast<double>(samples), 0, 0}, &work);
+                                {static_cast<double>(samples), 0}, &work);
       const Renderer image(scene, gates, options);
       image.render({2, 0, 0}, {0, samples});
       EXPECT_LT(work, 0.11 * image.work()) << "image, width " << width << ", samples " << samples;
       EXPECT_EQ(work > 0, samples > 4);
       options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 0}, Purpose::images,
-                                {0, static_cast<double>(samples), 0}, &work);
+                                {0, static_cast<double>(samples)}, &work);
       const Renderer derivative(scene, gates, options, &basis);
       derivative.derive(Term::interior, {2, 0, 0}, {0, samples});
       EXPECT_LT(work, 0.11 * derivative.work()) << "interior, width " << width << ", samples " << samples;

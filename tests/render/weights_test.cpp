@@ -124,7 +124,6 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
   int shared = 0, shared_by_light = 0;
   for (const PathSink::Found& found : f.sink.found) {
     f.worker.balance.rates.pair_coupling_gain = 7;
-    f.worker.balance.rates.connections = {};
     for (const double share : {0.3, 0.9}) {
       f.worker.balance.rates.ellipsoidal_share = share;
       const GateWeights standard = f.worker.balance.standard(found.path, found.pixel, true);
@@ -158,7 +157,6 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
     // By themselves, and at jumps, which standard sampling does not find.
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
     f.worker.balance.rates.ellipsoidal_share = 1;
-    f.worker.balance.rates.connections = {0.3, 2, 0.1};
     for (const bool light : {false, true}) {
       f.worker.balance.rates.light_connections = light;
       for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
@@ -176,7 +174,6 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
   Finder f = finder();
   f.find_by_standard_sampling(4000);
   f.worker.balance.rates.ellipsoidal_share = 1;
-  f.worker.balance.rates.connections = {0.3, 2, 0.1};
   int compared = 0;
   for (const auto& [path, pixel, value, part] : f.sink.found) {
     if (path.size() != 3) continue;
@@ -187,20 +184,17 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
     const Vec3 w = normalize(q.p - path.vertex[0].p);
     const double walk = f.prepared.camera.image_area_per_solid_angle(w) * solid_angle_to_area(path.vertex[0].p, q) /
                         f.prepared.pixels() * f.pick.rate(pixel);
-    const auto expect_ratio = [&](TargetLength target, double camera_rate, double of_image, double of_pixel) {
+    const auto expect_ratio = [&](TargetLength target, double of_image, double of_pixel) {
       target.tau[0] = path.length.back();
       const double by_surface = f.worker.balance.connection(path, pixel, target, 0, 1, surface),
                    by_emitter = f.worker.balance.connection(path, pixel, target, 0, 2, emitter);
-      const double expected = f.prepared.emitter_pdf(y.triangle) * surface * camera_rate * of_image /
-                              (walk * emitter * f.worker.balance.rates.connections.walk * of_pixel);
+      const double expected = f.prepared.emitter_pdf(y.triangle) * surface * of_image / (walk * emitter * of_pixel);
       EXPECT_NEAR(by_surface / by_emitter, expected, 1e-9 * expected);
     };
     for (int gate = 0; gate < 3; ++gate)
-      expect_ratio(pair_target(gate), f.worker.balance.rates.connections.camera_pairs,
-                   f.pick.probability(GatePick::kImage, gate), f.pick.probability(pixel, gate));
+      expect_ratio(pair_target(gate), f.pick.probability(GatePick::kImage, gate), f.pick.probability(pixel, gate));
     const double length = path.length.back();
-    expect_ratio({}, f.worker.balance.rates.connections.camera_lengths, f.pick.length_pdf(GatePick::kImage, length),
-                 f.pick.length_pdf(pixel, length));
+    expect_ratio({}, f.pick.length_pdf(GatePick::kImage, length), f.pick.length_pdf(pixel, length));
     ++compared;
   }
   EXPECT_GT(compared, 300);

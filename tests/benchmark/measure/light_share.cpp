@@ -35,7 +35,7 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
   options.push_back({.max_bounces = c.max_bounces});
   for (EstimatorOptions& o : options)
     o.mix = measure_mix(c.scene, c.gates, o, &basis, {2, 0, 0}, Purpose::images,
-                        {double(seeds * c.samples), double(seeds * c.samples), double(seeds * c.samples)});
+                        {double(seeds * c.samples), double(seeds * c.samples)});
   const SamplingMix& chosen = *options.back().mix;
   const SampleRange range{0, c.samples};
   const std::vector<double> costs =
