@@ -240,6 +240,18 @@ def light_share(folder):
     return markdown(["", "connections", "light", *shares], lines)
 
 
+def share_trial(folder):
+    shares = ("0", "0.25", "0.5", "0.75", "1")
+    lines = []
+    for r in read_rows(folder / "share_trial.csv"):
+        chosen = ", ".join(f"{s} ({r[f'trials for {s}']})" for s in shares if int(r[f"trials for {s}"]))
+        costs = [float(r[s]) for s in shares]
+        noise = min(costs) <= 0
+        lines.append([f"{r['scene']}, {r['of']}", chosen, "noise" if noise else number(r["cost of trials"]),
+                      *("noise" if c <= 0 else number(c) for c in costs)])
+    return markdown(["", "chosen (trials)", "times the best", *shares], lines)
+
+
 def captures(folder):
     return capture_cost.table_of(read_rows(folder / "capture_cost.csv"))
 
@@ -261,7 +273,7 @@ def checks(folder):
 
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, cubes, hidden_share, light_share, captures, stated_errors, egg, checks)},
+                               growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, egg, checks)},
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "core/image/image.h"
 
@@ -272,8 +273,22 @@ TEST_F(Program, InspectAppliesItsAdvice) {
   EXPECT_EQ(fragment.rfind("max_bounces: ", 0), 0u) << fragment;
   EXPECT_NE(folder_.read("stdout").find(fragment), std::string::npos);
   EXPECT_EQ(
-      table.rfind("point,quantity,term,bounces,gate,shape,share,standard_error,gate_center\nstart,light,,0,0,,", 0),
+      table.rfind(
+          "point,quantity,term,bounces,gate,shape,technique,share,standard_error,gate_center\nstart,light,,0,0,,,", 0),
       0u);
+  // What techniques bring adds up to all light, and to all of their work.
+  double light = 0, work = 0;
+  std::istringstream lines(table);
+  for (std::string line; std::getline(lines, line);) {
+    const auto share = [&](const std::string& start) {
+      const bool matches = line.rfind(start, 0) == 0 && line[start.size()] != ',';
+      return matches ? std::stod(line.substr(line.find(',', start.size()) + 1)) : 0;
+    };
+    light += share("start,light,,,,,");
+    work += share("start,work,,,,,");
+  }
+  EXPECT_NEAR(light, 1, 1e-9);
+  EXPECT_NEAR(work, 1, 1e-9);
   const std::string after = folder_.read("tiny.yaml");
   EXPECT_NE(after.find("   # far too many\n"), std::string::npos) << after;
   const int bounces = after[after.find("max_bounces: ") + 13] - '0';
