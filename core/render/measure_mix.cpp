@@ -23,15 +23,14 @@ constexpr int kTrialSamples = 4;  ///< per pixel and batch: two of each kind
 constexpr int kMostBatches = 32, kFewestBatches = 4;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
 constexpr int kPixels = 4096, kFewestPixels = 576;
-constexpr int kBlocks = 4;  ///< across the image
+constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what connections take
+constexpr int kBlocks = 4;        ///< across the image
 /// The work of all trials is this part of that of the job at most; that of light subpaths takes its part of it.
 constexpr double kTrialPart = 0.1, kLightTrialPart = 0.04;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
-/// Samples of standard sampling that take about as long as one by ellipsoidal connections.
-constexpr double kConnectionsWork = 4;
-/// The same of one sample of a trial, of which half are connections.
-constexpr double kTrialSampleWork = (1 + kConnectionsWork) / 2;
+/// Samples of standard sampling whose work a first batch may take: where one by connections takes 25 times as much.
+constexpr double kFewestBudget = 8000;
 /// Paths of the trial of light subpaths at most and, where the job is small, at least, what each takes in paths by standard
 /// sampling (one without and one with light subpaths and all their joints).
 constexpr double kLightPaths = 16384, kFewestLightPaths = 400, kLightWork = 6;
@@ -75,21 +74,26 @@ struct Trial {
   double choose(double by_width, const TangentBasis* column, const Stream& stream, double& work) const {
     const double budget =
         part * pixels_of(scene) * job - kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
-    // Of the trial, per batch and pixel.
-    const double affordable = budget / (kTrialSampleWork * kTrialSamples);
+    const auto trial = [&](const Scene& small, int batches, double most_samples) {
+      const bool sums = column && purpose == Purpose::gradients;
+      return measure_shares({.scene = small,
+                             .gates = gates,
+                             .options = options,
+                             .column = column,
+                             .block = sums ? std::max(1, small.camera.width / kBlocks) : 1,
+                             .samples = kTrialSamples,
+                             .batches = batches,
+                             .most_samples = most_samples},
+                            stream, work);
+    };
+    if (!(budget >= kFewestBudget)) return by_width;
+    // What connections take differs between scenes: a tiny image tells.
+    const Scene tiny = reduced(scene, kTinyPixels);
+    const double affordable = (trial(tiny, 1, budget).affordable_batches - 1) * pixels_of(tiny);
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
-    if (!(affordable >= fewest * kFewestBatches)) return by_width;
+    if (!(affordable >= 2 * fewest)) return by_width;
     const Scene small = reduced(scene, std::clamp<double>(affordable / kFewestBatches, fewest, kPixels));
-    const bool sums = column && purpose == Purpose::gradients;
-    const auto cost = measure_shares({.scene = small,
-                                      .gates = gates,
-                                      .options = options,
-                                      .column = column,
-                                      .block = sums ? std::max(1, small.camera.width / kBlocks) : 1,
-                                      .samples = kTrialSamples,
-                                      .batches = kMostBatches,
-                                      .most_samples = part * pixels_of(scene) * job},
-                                     stream, work);
+    const auto cost = trial(small, kMostBatches, budget * (1 - pixels_of(tiny) / (affordable + pixels_of(tiny)))).cost;
     if (!cost) return by_width;
     const auto best = std::min_element(cost->begin(), cost->end());
     return std::isfinite(*best) ? kConnectionShares[best - cost->begin()] : by_width;

@@ -102,8 +102,7 @@ class ShareSink final : public Sink {
 
 }  // namespace
 
-std::optional<std::array<double, kShareCount>> measure_shares(const ShareTrial& trial, const Stream& stream,
-                                                              double& work) {
+ShareCosts measure_shares(const ShareTrial& trial, const Stream& stream, double& work) {
   EstimatorOptions options = trial.options;
   options.mix = SamplingMix{.image = kTrialShare, .interior = kTrialShare};
   // Where paths keep their lengths, a part of the variance is another term's.
@@ -112,11 +111,11 @@ std::optional<std::array<double, kShareCount>> measure_shares(const ShareTrial& 
   // points cover the whole image gain as much in a trial (isochron_share_trial: cube, 5 %, sums: all trials right, else a quarter).
   if (trial.block == 1) options.numbers = Numbers::independent;
   const Passes passes(trial.scene, trial.gates, options, trial.column, nullptr);
-  if (passes.scene.emitters.empty() || (trial.column && !passes.has(Term::interior))) return std::nullopt;
+  if (passes.scene.emitters.empty() || (trial.column && !passes.has(Term::interior))) return {{}, 0};
   const Layout layout(passes, trial.block);
   ListedSum sums(layout.total()), squares(layout.total());
   int batches = 0;
-  double all = 0, of_connections = 0, of_others = 0;  // work
+  double all = 0, of_connections = 0, of_others = 0, affordable = 0;  // work, and batches
   for (bool goes_on = true; goes_on;) {
     const SampleRange range{batches * trial.samples, (batches + 1) * trial.samples};
     const Pass pass{stream, range};
@@ -144,10 +143,11 @@ std::optional<std::array<double, kShareCount>> measure_shares(const ShareTrial& 
     // Half of the samples are of the cheaper kind.
     const double of_sample =
         2 * std::min(of_connections, of_others) / (double{1} * passes.scene.camera.pixels() * range.end);
-    goes_on = batches < trial.batches && all * (batches + 1) / batches <= trial.most_samples * of_sample;
+    affordable = trial.most_samples * of_sample * batches / all;
+    goes_on = batches < trial.batches && batches + 1 <= affordable;
   }
   work += all;
-  if (batches < 2) return std::nullopt;
+  if (batches < 2) return {{}, affordable};
   sums.finish();
   squares.finish();
   std::array<double, kShareCount> cost;
@@ -167,7 +167,7 @@ std::optional<std::array<double, kShareCount>> measure_shares(const ShareTrial& 
     // Nothing seen says nothing: a technique that never hit the gates is no good one.
     cost[k] = variance > 0 ? variance * of_share : std::numeric_limits<double>::infinity();
   }
-  return cost;
+  return {cost, affordable};
 }
 
 }  // namespace isochron

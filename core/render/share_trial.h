@@ -16,15 +16,19 @@ struct ShareTrial {
   EstimatorOptions options;    ///< those of the estimates that are decided about; light subpaths are given
   const TangentBasis* column;  ///< the interior term of the derivative along it; null: images
   int block;                   ///< variances are those of sums over so many pixels by as many
-  int samples, batches;        ///< per pixel and batch; at least two
+  int samples, batches;        ///< per pixel and batch
   double most_samples;  ///< whose work it may take at most, of the kind that takes less: else there are fewer batches
 };
 
-/// Variance x work of one batch, by kConnectionShares. Half of the samples are connections. Another share gives a contribution another weight
-/// and each kind of samples another number, so that the images that it would give are known from the same samples: what
-/// shares have in common does not blur by how much they differ. Infinite where nothing is seen; empty where two batches are too much.
-/// `work` grows by what that took (see Renderer::work).
-std::optional<std::array<double, kConnectionShares.size()>> measure_shares(const ShareTrial& trial,
-                                                                           const Stream& stream, double& work);
+struct ShareCosts {
+  /// Variance x work of one batch, by kConnectionShares; infinite where nothing is seen. Empty: of one batch.
+  std::optional<std::array<double, kConnectionShares.size()>> cost;
+  double affordable_batches;  ///< that take the work of most_samples
+};
+
+/// Half of the samples are connections. Another share gives a contribution another weight and each kind of samples another number. So the
+/// images that it would give are known from the same samples, and what shares have in common does not blur by how much
+/// they differ. `work` grows by what that took (see Renderer::work).
+ShareCosts measure_shares(const ShareTrial& trial, const Stream& stream, double& work);
 
 }  // namespace isochron

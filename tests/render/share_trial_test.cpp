@@ -41,7 +41,8 @@ TEST_P(ShareTrials, TellWhatEveryShareCosts) {
                                      .samples = kTrialSamples,
                                      .batches = kBatches,
                                      .most_samples = 1e9},
-                                    {1, 2, 3}, work);
+                                    {1, 2, 3}, work)
+                         .cost;
   ASSERT_TRUE(costs);
   EXPECT_GT(work, 0);
   for (std::size_t k = 0; k < kConnectionShares.size(); ++k) {
