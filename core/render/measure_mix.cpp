@@ -20,9 +20,12 @@ struct TrialWidths {
 constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr int kTrialSamples = 4;  ///< per pixel and batch: two of each kind
-constexpr int kMostBatches = 32, kFewestBatches = 4;
+/// Before images are larger. Sums over blocks vary together, so that only batches say more about them.
+constexpr int kMostBatches = 32, kFewestBatches = 4, kFewestBatchesOfSums = 16;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
 constexpr int kPixels = 4096, kFewestPixels = 576;
+/// Of an image: trials keep ten.
+constexpr double kMostValues = 1 << 21;
 constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what connections take
 constexpr int kBlocks = 4;        ///< across the image
 /// The work of all trials is this part of that of the job at most; that of light subpaths takes its part of it.
@@ -73,9 +76,9 @@ struct Trial {
   /// The best of kConnectionShares, or `by_width` where it cannot tell. `column`: of the interior term; null: of images.
   double choose(double by_width, const TangentBasis* column, const Stream& stream, double& work) const {
     const double budget =
-        part * pixels_of(scene) * job - kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+        part * pixels_of(scene) * job - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+    const bool sums = column && purpose == Purpose::gradients;
     const auto trial = [&](const Scene& small, int batches, double most_samples) {
-      const bool sums = column && purpose == Purpose::gradients;
       return measure_shares({.scene = small,
                              .gates = gates,
                              .options = options,
@@ -92,7 +95,9 @@ struct Trial {
     const double affordable = (trial(tiny, 1, budget).affordable_batches - 1) * pixels_of(tiny);
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
     if (!(affordable >= 2 * fewest)) return by_width;
-    const Scene small = reduced(scene, std::clamp<double>(affordable / kFewestBatches, fewest, kPixels));
+    const double most = std::min<double>(kPixels, kMostValues / (gates.size() * (scene.grey ? 1.0 : 3.0)));
+    const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
+    const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
     const auto cost = trial(small, kMostBatches, budget * (1 - pixels_of(tiny) / (affordable + pixels_of(tiny)))).cost;
     if (!cost) return by_width;
     const auto best = std::min_element(cost->begin(), cost->end());
@@ -121,7 +126,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   const double part = kTrialPart - (light_is_open ? kLightTrialPart : 0);
   const auto choose_light = [&](const TrialWidths& widths, double samples, const TangentBasis* column) {
     const double budget = kLightTrialPart * pixels_of(scene) * samples -
-                          2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+                          kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
     const double paths = std::min(kLightPaths, budget / kLightWork);
     if (!light_is_open || coverage < widths.below_is_ellipsoidal || !(paths >= kFewestLightPaths)) return 0.0;
     return measure_light_share(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,

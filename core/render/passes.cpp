@@ -25,6 +25,24 @@ namespace {
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
 constexpr long long kFewestLearningRounds = 64;
 
+/// Counts what a worker does during its life as work of a technique.
+class CountedWork {
+ public:
+  CountedWork(Worker& worker, Technique technique)
+      : worker_(worker), own_(worker.work_of[static_cast<std::size_t>(technique)]), before_{worker.rays, worker.arcs} {}
+  CountedWork(const CountedWork&) = delete;
+  CountedWork& operator=(const CountedWork&) = delete;
+  ~CountedWork() {
+    own_.rays += worker_.rays - before_.rays;
+    own_.arcs += worker_.arcs - before_.arcs;
+  }
+
+ private:
+  const Worker& worker_;
+  RayCounts& own_;
+  const RayCounts before_;
+};
+
 /// Of p from the points of a triangle, the least and the largest.
 std::pair<double, double> distances(const Vec3& p, const std::array<Vec3, 3>& corners) {
   double nearest = std::numeric_limits<double>::infinity(), farthest = 0;
@@ -165,15 +183,12 @@ void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pas
       if (!(rate > 0)) continue;
       const double own_scale = use.in_pixel ? scale / rate : scale / pixels / rate;
       worker.sink.note_technique(use.technique);
-      const RayCounts before{worker.rays, worker.arcs};
+      const CountedWork counted(worker, use.technique);
       const auto sample = [&](Rng& rng) { use.sample(pixel, own_scale, rng); };
       if (use.in_pixel)
         points.in_pixel(use.technique, pixel, rate, sample);
       else
         points.in_image(of_image[i], pixel, rate, sample);
-      RayCounts& own = worker.work_of[static_cast<std::size_t>(use.technique)];
-      own.rays += worker.rays - before.rays;
-      own.arcs += worker.arcs - before.arcs;
     }
   });
 }
@@ -205,6 +220,7 @@ void Passes::run_paths(Worker& worker, double share, double light, const GatePas
   };
   visit(uses, worker, pass, partition);
   worker.sink.note_technique(Technique::standard);
+  const CountedWork counted(worker, Technique::standard);
   standard.finish();
 }
 

@@ -60,9 +60,11 @@ bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, co
   if (differential.empty()) return false;
   worker_.sink.bind(differential);
   const BoundaryShares shares(c.camera_over_edge, rate);
-  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0], 1 - shares.from_edge);
+  // Nothing else finds what a Dirac gate lets through.
+  const bool alone = worker_.gates.shape().is_dirac();
+  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0], alone ? 1 : 1 - shares.from_edge);
   // Its share over its density is that of random edge points over theirs.
-  const double weight = worker_.gates.shape().is_dirac() ? 1 / rate : shares.from_camera;
+  const double weight = alone ? 1 / rate : shares.from_camera;
   worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
   return true;
 }

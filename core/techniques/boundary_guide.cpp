@@ -166,8 +166,17 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
 
   // For a given total cost the variance is least where, per cost, a little more of any technique lowers it alike.
   Moments moments(possible, cost);
-  for (const GuideRecord& r : records)
-    moments.add(std::min(r.table, kTechniques - 1), r.square / warps_[r.table].density(r.x), r.camera_part);
+  for (const GuideRecord& r : records) {
+    const int technique = std::min(r.table, kTechniques - 1);
+    if (technique != kFromEdge && technique != kFromCamera) {
+      moments.add(technique, r.square / warps_[r.table].density(r.x), 0);
+      continue;
+    }
+    // Both draw x, from histograms of their own.
+    const double edge = (1 - r.camera_part) * warps_[kFromEdge].density(r.x),
+                 camera = r.camera_part * warps_[std::max(r.table, kFromCamera)].density(r.x);
+    moments.add(technique, r.square / (edge + camera), camera / (edge + camera));
+  }
   const Each<double> best = moments.best_rates();
   for (int t = 0; t < kTechniques; ++t)
     rate_[t] *= std::pow(std::clamp(best[t], kLeastRate, kMostRate), moments.trust(t));
@@ -175,7 +184,7 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
 
 void GuideSink::note_guide(int table, double x) {
   square_sums();
-  if (square_ > 0) records.push_back({table, x, square_, part_of_square_ / square_});
+  if (square_ > 0) records.push_back({table, x, square_, std::clamp(part_of_square_ / square_, 0.0, 1.0)});
   square_ = part_of_square_ = camera_part_ = 0;
   ++sample_;
 }
@@ -196,7 +205,7 @@ void GuideSink::bind(const LocalDifferential& differential) {
 void GuideSink::add(int pixel, const Rgb& value, double length, GateWeights) {
   if (pixel != pixel_) square_sums();
   pixel_ = pixel;
-  part_of_sums_ = camera_part_;
+  part_of_sums_ = std::isfinite(camera_part_) ? camera_part_ : 0;
   gates_.for_each_value(length, [&](int gate, double w) {
     sums_[gate] += value * (w * rate_);
     touched_.push_back(gate);

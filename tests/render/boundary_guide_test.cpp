@@ -120,13 +120,17 @@ TEST(BoundaryGuide, SharesSegmentsAtTheLeastVariance) {
   for (int i = 0; i < 4000; ++i) {
     const double p = rng.uniform();
     const Technique found_by = rng.uniform() < p ? Technique::from_camera : Technique::from_edge;
-    records.push_back({BoundaryGuide::table(found_by), rng.uniform(), 0.5 + rng.uniform() * p, p});
+    const double u = rng.uniform();
+    records.push_back({BoundaryGuide::table(found_by), found_by == Technique::from_edge ? u * u : std::sqrt(u),
+                       0.5 + rng.uniform() * p, p});
   }
   const BoundaryGuide guide({false, false, true, false, true}, records, kCost);
   const auto variance = [&](double edge, double camera) {
     double sum = 0;
     for (const GuideRecord& r : records)
-      sum += r.square / guide.warp(r.table).density(r.x) / ((1 - r.camera_part) * edge + r.camera_part * camera);
+      sum +=
+          r.square / ((1 - r.camera_part) * edge * guide.warp(BoundaryGuide::table(Technique::from_edge)).density(r.x) +
+                      r.camera_part * camera * guide.warp(BoundaryGuide::table(Technique::from_camera)).density(r.x));
     return sum;
   };
   double best = 0, least = std::numeric_limits<double>::infinity();
@@ -136,8 +140,8 @@ TEST(BoundaryGuide, SharesSegmentsAtTheLeastVariance) {
   }
   EXPECT_NEAR(guide.rate(Technique::from_edge) / guide.rate(Technique::from_camera) / best, 1, 0.02);
   // Where the camera finds nothing of its own, and at more cost, it is hardly asked.
-  for (GuideRecord& r : records) r.camera_part = 0.5;
-  const BoundaryGuide alike({false, false, true, false, true}, records, kCost);
+  for (GuideRecord& r : records) r.camera_part = 0.5, r.x = rng.uniform();
+  const BoundaryGuide alike({false, false, true, false, true}, records, {0, 0, 2000, 0, 12000});
   EXPECT_NEAR(alike.rate(Technique::from_camera), 0.125 / 2, 0.001);
 }
 
