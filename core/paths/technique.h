@@ -19,7 +19,7 @@ enum class Technique : std::uint32_t {
   from_light,      ///< one between an edge and a light without an extent
   from_camera      ///< an edge seen from a vertex of a camera path
 };
-inline constexpr int kTechniques = 10;
+inline constexpr int kTechniques = static_cast<int>(Technique::from_camera) + 1;
 
 inline const char* name(Technique technique) {
   constexpr std::array<const char*, kTechniques> kNames = {

@@ -87,11 +87,7 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
     moments = passes.sum_of<Moments>(kind, partitions, [&](int partition) {
       Moments own;
       MomentSink sink(passes, column, own);
-      const Pass pass{stream, range};
-      if (column)
-        passes.run_term(Term::interior, pass, {partition, partitions}, passes.every_gate, sink);
-      else
-        passes.run_images(pass, {partition, partitions}, sink);
+      passes.run_images_or_interior({stream, range}, {partition, partitions}, sink);
       return own;
     });
     work_of[i] = passes.work();

@@ -235,7 +235,7 @@ struct Passes::Searches {
 
   /// Segments between surfaces or to a light: a capture's serve the pixel that they are drawn for, a camera's whichever sees
   /// them.
-  std::array<TechniqueUse, BoundaryGuide::kTechniques> uses(const BoundaryGuide& guide, bool captures) {
+  std::array<TechniqueUse, BoundaryGuide::kSearches> uses(const BoundaryGuide& guide, bool captures) {
     const auto use = [&](Technique t, bool in_pixel, auto&& sample) {
       return TechniqueUse{t, guide.rate(t), in_pixel, sample};
     };
@@ -313,7 +313,7 @@ void Passes::learn() const {
   Guide::Each<double> cost{};
   for (int partition = 0; partition < kPartitions; ++partition) {
     all.insert(all.end(), records[partition].begin(), records[partition].end());
-    for (int t = 0; t < Guide::kTechniques; ++t) cost[t] += costs[partition][t];
+    for (int t = 0; t < Guide::kSearches; ++t) cost[t] += costs[partition][t];
   }
   guide_.emplace(possible, all, cost);
 }

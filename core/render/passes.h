@@ -87,6 +87,14 @@ class Passes {
   /// One partition of a term of the derivative, which was prepared; gates and pixels by `pick`. `sink` is differential.
   void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
 
+  /// One partition of the interior term for a differential sink, of the images for any other; all gates and pixels alike.
+  void run_images_or_interior(const Pass& pass, Partition partition, Sink& sink) const {
+    if (sink.differential())
+      run_term(Term::interior, pass, partition, every_gate, sink);
+    else
+      run_images(pass, partition, sink);
+  }
+
   /// What the density of connections is multiplied by in the weights of the slope of the gate, in the interior term.
   double slope_gain() const { return interior_pairs() ? pair_coupling_gain_ : 1; }
 

@@ -128,10 +128,7 @@ ShareCosts measure_shares(const ShareTrial& trial, const Stream& stream, double&
     const auto sum = passes.sum_of<ListedSum>(kind, partitions, [&](int partition) {
       ListedSum own(layout.total());
       ShareSink sink(passes, trial.column, layout, own);
-      if (trial.column)
-        passes.run_term(Term::interior, pass, {partition, partitions}, passes.every_gate, sink);
-      else
-        passes.run_images(pass, {partition, partitions}, sink);
+      passes.run_images_or_interior(pass, {partition, partitions}, sink);
       own.finish();
       return own;
     });

@@ -29,7 +29,7 @@ struct TechniqueRates {
   double pair_coupling_gain = 1;   ///< factor on the density of coupled pairs
 };
 
-/// Of a part, below one, of the samples that are no connections.
+/// Samples with light subpaths per standard one, where they are this part, below one, of both.
 inline double light_rate(double part) {
   return part / (1 - part);
 }

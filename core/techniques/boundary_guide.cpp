@@ -82,7 +82,7 @@ class Moments {
     for (const double c : cost_) cost += c;
     for (int step = 0; step < kSteps; ++step) {
       BoundaryGuide::Each<double> gain{};
-      for (int bin = 0; bin < kParts + BoundaryGuide::kTechniques; ++bin) {
+      for (int bin = 0; bin < kParts + BoundaryGuide::kSearches; ++bin) {
         if (!(squares_[bin] > 0)) continue;
         if (bin >= kParts) {
           const int t = bin - kParts;
@@ -96,12 +96,12 @@ class Moments {
       }
       BoundaryGuide::Each<double> wanted{};
       double wanted_cost = 0;
-      for (int t = 0; t < BoundaryGuide::kTechniques; ++t) {
+      for (int t = 0; t < BoundaryGuide::kSearches; ++t) {
         if (possible_[t] && cost_[t] > 0) wanted[t] = rate[t] * std::sqrt(gain[t] / cost_[t]);
         wanted_cost += wanted[t] * cost_[t];
       }
       if (!(wanted_cost > 0)) break;
-      for (int t = 0; t < BoundaryGuide::kTechniques; ++t) rate[t] = wanted[t] * cost / wanted_cost;
+      for (int t = 0; t < BoundaryGuide::kSearches; ++t) rate[t] = wanted[t] * cost / wanted_cost;
     }
     return rate;
   }
@@ -120,7 +120,7 @@ class Moments {
   const BoundaryGuide::Each<bool>& possible_;
   const BoundaryGuide::Each<double>& cost_;
   /// By part of the camera where it may have some, else by technique.
-  std::array<double, kParts + BoundaryGuide::kTechniques> squares_{}, camera_squares_{};
+  std::array<double, kParts + BoundaryGuide::kSearches> squares_{}, camera_squares_{};
   BoundaryGuide::Each<double> sum_{}, sum_of_squares_{};  ///< by group
 };
 
@@ -142,20 +142,20 @@ double Warp::sample(double u) const {
 
 BoundaryGuide::BoundaryGuide(const Each<bool>& possible) : warps_(kTables) {
   const auto count = std::count(possible.begin(), possible.end(), true);
-  for (int t = 0; t < kTechniques; ++t) rate_[t] = possible[t] ? 1.0 / static_cast<double>(count) : 0;
+  for (int t = 0; t < kSearches; ++t) rate_[t] = possible[t] ? 1.0 / static_cast<double>(count) : 0;
 }
 
 BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<GuideRecord>& records,
                              const Each<double>& cost)
     : BoundaryGuide(possible) {
-  std::vector<std::vector<GuideRecord>> of_table(kTables), of_technique(kTechniques);
+  std::vector<std::vector<GuideRecord>> of_table(kTables), of_technique(kSearches);
   for (const GuideRecord& r : records) {
     of_table[r.table].push_back(r);
-    of_technique[std::min(r.table, kTechniques - 1)].push_back(r);
+    of_technique[std::min(r.table, kSearches - 1)].push_back(r);
   }
   const std::vector<double> uniform(1, 1.0);
   for (int table = 0; table < kTables; ++table) {
-    const auto& all = of_technique[std::min(table, kTechniques - 1)];
+    const auto& all = of_technique[std::min(table, kSearches - 1)];
     const auto& own = of_table[table];
     const double trust = own.size() / (own.size() + static_cast<double>(kFewRecords));
     const double trust_all = all.size() / (all.size() + static_cast<double>(kFewRecords));
@@ -167,7 +167,7 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
   // For a given total cost the variance is least where, per cost, a little more of any technique lowers it alike.
   Moments moments(possible, cost);
   for (const GuideRecord& r : records) {
-    const int technique = std::min(r.table, kTechniques - 1);
+    const int technique = std::min(r.table, kSearches - 1);
     if (technique != kFromEdge && technique != kFromCamera) {
       moments.add(technique, r.square / warps_[r.table].density(r.x), 0);
       continue;
@@ -178,7 +178,7 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
     moments.add(technique, r.square / (edge + camera), camera / (edge + camera));
   }
   const Each<double> best = moments.best_rates();
-  for (int t = 0; t < kTechniques; ++t)
+  for (int t = 0; t < kSearches; ++t)
     rate_[t] *= std::pow(std::clamp(best[t], kLeastRate, kMostRate), moments.trust(t));
 }
 

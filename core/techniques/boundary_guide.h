@@ -46,11 +46,11 @@ struct GuideRecord {
 
 class BoundaryGuide {
  public:
-  static constexpr int kTechniques = 5;
+  static constexpr int kSearches = 5;
 
   /// One value for each technique that searches for boundaries, by table().
   template <class T>
-  using Each = std::array<T, kTechniques>;
+  using Each = std::array<T, kSearches>;
 
   /// Unguided: a sample of the visibility term is one search by one of the techniques that can find anything, all equally
   /// often.
@@ -65,17 +65,16 @@ class BoundaryGuide {
   /// all others.
   const Warp& warp(int table) const { return warps_[table]; }
   static constexpr int table(Technique t) { return static_cast<int>(t) - static_cast<int>(Technique::primary_edge); }
-  static_assert(static_cast<int>(Technique::from_camera) - static_cast<int>(Technique::primary_edge) ==
-                kTechniques - 1);
+  static_assert(static_cast<int>(Technique::from_camera) - static_cast<int>(Technique::primary_edge) == kSearches - 1);
   static int table_from_camera(const CameraModel& camera, int pixel, int bounces) {
     if (bounces > 1) return table(Technique::from_camera);
     const int x = pixel % camera.width * kTiles / camera.width, y = pixel / camera.width * kTiles / camera.height;
-    return kTechniques + y * kTiles + x;
+    return kSearches + y * kTiles + x;
   }
 
  private:
   static constexpr int kTiles = 4;  ///< across the image, either way
-  static constexpr int kTables = kTechniques + kTiles * kTiles;
+  static constexpr int kTables = kSearches + kTiles * kTiles;
   std::vector<Warp> warps_;
   Each<double> rate_;
 };

@@ -146,6 +146,30 @@ TEST_F(Program, AnOptimiserThatLeavesTheWorldIsSentBack) {
   }
 }
 
+TEST_F(Program, LightSubpathsInCapturesAreRefusedBeforeAnythingIsMade) {
+  folder_.write("plane.obj", "v -0.2 -0.2 0\nv 0.2 -0.2 0\nv 0.2 0.2 0\nv -0.2 0.2 0\nf 1 2 3 4\n");
+  folder_.write("wall.yaml",
+                "capture:\n"
+                "  sensor: {corner: [-0.3, 0.3, 0], across: [0.6, 0, 0], down: [0, -0.6, 0], size: [2, 2]}\n"
+                "  normal: [0, 0, 1]\n  laser: confocal\n"
+                "materials: {paint: {type: diffuse, albedo: 0.5, two_sided: true}}\n"
+                "shapes: [{name: plane, file: plane.obj, material: paint, transform: {translate: [0, 0, 0.5]}}]\n");
+  const std::string file =
+      folder_.write("counts.yaml",
+                    "name: counts\nscene: wall.yaml\nmax_bounces: 2\nestimator: {light: 0.5}\n"
+                    "gates: {kind: bins, unit: ps, scene_unit_m: 1, start: 1600, width: 32, count: 120}\n"
+                    "parameters:\n"
+                    "  - {name: z, type: translation, shape: plane, direction: [0, 0, 1], initial: 0.2, target: 0}\n"
+                    "target: {samples: 16}\nsamples: {primal: 4, interior: 4, visibility: 0, path_length: 0}\n");
+  const Result result = run({"run", file, "-o", folder_.file("out")});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.errors.find(
+                "counts.yaml:4:20: estimator.light: paths of captures have no light subpaths (allowed here: 0)"),
+            std::string::npos)
+      << result.errors;
+  EXPECT_FALSE(folder_.has("out"));
+}
+
 // A plate before a wall, 20 cm too far away: no bin that it could reach has light at first.
 TEST_F(Program, ARunThatLosesTheLightOfItsCountsDiverges) {
   folder_.write("plane.obj", "v -0.2 -0.2 0\nv 0.2 -0.2 0\nv 0.2 0.2 0\nv -0.2 0.2 0\nf 1 2 3 4\n");

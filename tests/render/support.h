@@ -148,7 +148,7 @@ inline std::vector<Estimate> image_means(const Renderer& renderer, int gates, in
 /// Samples of a term for the effort of so many camera paths: one of the visibility term is one search by one of five
 /// techniques.
 inline int samples_of(Term term, int paths) {
-  return term == Term::visibility ? BoundaryGuide::kTechniques * paths : paths;
+  return term == Term::visibility ? BoundaryGuide::kSearches * paths : paths;
 }
 
 /// [column][gate] of one term.
