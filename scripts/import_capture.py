@@ -218,9 +218,9 @@ def parse(arguments):
     return options
 
 
-def main():
+def main(arguments):
     try:
-        print("\n".join(import_capture(parse(sys.argv[1:]))))
+        print("\n".join(import_capture(parse(arguments))))
         return 0
     except CaptureError as error:
         print(f"import_capture.py: {error}", file=sys.stderr)
@@ -228,4 +228,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -33,6 +33,21 @@ int create_beside(const std::string& path, std::string& name) {
   return descriptor;
 }
 
+/// Whether create_beside made the name.
+bool is_temporary(std::string_view name) {
+  const auto ends_with = [&](std::string_view end) {
+    const bool does = name.ends_with(end);
+    if (does) name.remove_suffix(end.size());
+    return does;
+  };
+  const auto ends_with_number = [&] {
+    const std::size_t digits = name.size() - (name.find_last_not_of("0123456789") + 1);
+    name.remove_suffix(digits);
+    return digits > 0;
+  };
+  return ends_with(".tmp") && ends_with_number() && ends_with("-") && ends_with_number() && ends_with(".");
+}
+
 /// 0, or the errno of what failed.
 int write_all(int descriptor, std::string_view contents) {
   for (std::size_t done = 0; done < contents.size();) {
@@ -165,6 +180,13 @@ void write_file_atomically(const std::string& path, const std::string& contents)
     file.write(contents);
     file.finish();
   });
+}
+
+void remove_temporaries(const std::string& folder) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator file(folder, error), end; !error && file != end; file.increment(error))
+    if (std::error_code ignored; is_temporary(file->path().filename().string()))
+      std::filesystem::remove(*file, ignored);
 }
 
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {

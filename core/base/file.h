@@ -39,6 +39,9 @@ class NewFile {
   std::uint64_t written_ = 0;  ///< where the buffer begins in the file
 };
 
+/// Removes what NewFile left in a folder where its process was killed. For a folder that nobody else writes to.
+void remove_temporaries(const std::string& folder);
+
 /// Contents of a file. Empty where it cannot be read, with the reason in `problem`, to be put behind its name. Never
 /// waits: a named pipe or a device is refused.
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem);

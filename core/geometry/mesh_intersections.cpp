@@ -6,7 +6,7 @@
 #include <tuple>
 
 #include "core/base/parallel.h"
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 
 namespace isochron {
 namespace {

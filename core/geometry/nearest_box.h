@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 
 namespace isochron {
 

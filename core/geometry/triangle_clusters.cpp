@@ -1,7 +1,7 @@
 #include "core/geometry/triangle_clusters.h"
 
 #include "core/base/parallel.h"
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 
 namespace isochron {
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 #include "core/scene/scene.h"
 
 namespace isochron {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <numeric>
 
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 
 namespace isochron {
 namespace {

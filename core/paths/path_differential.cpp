@@ -58,10 +58,6 @@ struct InheritedGradient {
   double area = 0;  ///< counts d ln (area of its triangle)
 };
 
-Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
-  return g - x.n * dot(g, x.n);
-}
-
 /// Lets x_k follow its neighbours (theory section 8): passes its part of the gradients there on to what it follows.
 /// `density` is d ln (sampling measure) / dx in the plane of x_k. Returns what is removed from its base flow.
 InheritedGradient redirect_to_neighbours(const VertexFlow& flow, const SurfacePoint& x, const Accumulated& g,

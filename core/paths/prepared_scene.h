@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/base/large_array.h"
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
 #include "core/geometry/ray_caster.h"

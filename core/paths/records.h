@@ -17,6 +17,11 @@ struct SurfacePoint {
   int triangle = -1;
 };
 
+/// The part of a gradient, with respect to the point, along its face.
+inline Vec3 in_plane(const SurfacePoint& x, const Vec3& gradient) {
+  return gradient - x.n * dot(gradient, x.n);
+}
+
 /// Encodes point light i as a negative triangle index of a SurfacePoint; light_number decodes it.
 inline int index_of_light(int i) {
   return -2 - i;

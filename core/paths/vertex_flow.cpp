@@ -86,10 +86,6 @@ bool sees_nothing_of_itself(const PreparedScene& prepared, const std::vector<int
   return flat || !open;
 }
 
-Vec3 in_plane(const SurfacePoint& x, const Vec3& g) {
-  return g - x.n * dot(g, x.n);
-}
-
 }  // namespace
 
 VertexFlows::VertexFlows(const Scene& scene) {

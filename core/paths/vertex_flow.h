@@ -9,7 +9,7 @@
 #pragma once
 #include <vector>
 
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 #include "core/scene/scene.h"
 #include "core/scene/sensors/pinhole.h"
 

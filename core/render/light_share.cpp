@@ -10,7 +10,7 @@ namespace {
 /// Shares that are compared (isochron_light_share measures what each brings), and the one that the trial has: with it both kinds of
 /// samples find what the other does not.
 constexpr std::array kShares = {0.0, 0.2, 0.35, 0.5, 0.65, 0.8};
-constexpr double kTrialShare = 0.5;
+constexpr double kLightTrialShare = 0.5;
 /// By how much another share than none must look better, for images and for derivatives: what rays leave out, the differential of
 /// every joint, takes as long again (corridor). Of those that do the least that comes so close to the best is taken, as other terms
 /// of a derivative take their part of the time, too.
@@ -56,7 +56,7 @@ class MomentSink final : public Sink {
       });
     }
     for (std::size_t i = 0; i < kShares.size(); ++i)
-      moments_.of[i] += squares * (1 + light_rate(kTrialShare) * ratio_) / (1 + light_rate(kShares[i]) * ratio_);
+      moments_.of[i] += squares * (1 + light_rate(kLightTrialShare) * ratio_) / (1 + light_rate(kShares[i]) * ratio_);
   }
 
  private:
@@ -79,7 +79,7 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
   double work_of[2];
   SceneCache cache(scene, CasterUpdate::rebuild);
   for (const int i : {0, 1}) {
-    options.light = i * kTrialShare;
+    options.light = i * kLightTrialShare;
     const Passes passes(scene, gates, options, column, &cache);
     if (passes.scene.emitters.empty() || (column && !passes.has(Term::interior))) return 0;
     const PassKind kind = column ? PassKind::interior : PassKind::primal;
@@ -94,7 +94,7 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
     work += work_of[i];
   }
   // Of as many samples.
-  const double of_standard = work_of[0], of_light = (work_of[1] - (1 - kTrialShare) * work_of[0]) / kTrialShare;
+  const double of_standard = work_of[0], of_light = (work_of[1] - (1 - kLightTrialShare) * work_of[0]) / kLightTrialShare;
   const auto cost = [&](std::size_t i) {
     return moments.of[i] / (1 - kShares[i]) * ((1 - kShares[i]) * of_standard + kShares[i] * of_light);
   };

@@ -9,7 +9,7 @@
 namespace isochron {
 namespace {
 
-constexpr double kTrialShare = 0.5;
+constexpr double kConnectionTrialShare = 0.5;
 constexpr std::size_t kShareCount = kConnectionShares.size();
 /// By what low-discrepancy numbers lower the variance of pixels under standard sampling, where trials do without: about 2 on the
 /// cube, 0.8 in the Cornell box (isochron_share_trial: costs of trials against those of 64 samples).
@@ -77,7 +77,7 @@ class ShareSink final : public Sink {
     explicit Factors(double ratio) {
       // Density of the path under all samples, over that under others, or, where only connections find it, under those.
       const auto density = [&](double share) { return std::isinf(ratio) ? share : 1 - share + share * ratio; };
-      const double here = density(kTrialShare);
+      const double here = density(kConnectionTrialShare);
       for (std::size_t k = 0; k < kShareCount; ++k) {
         const double there = density(kConnectionShares[k]);
         (*this)[k] = there > 0 ? here / there : ratio > 0 ? 0 : 1;
@@ -108,7 +108,7 @@ class ShareSink final : public Sink {
 
 ShareCosts measure_shares(const ShareTrial& trial, const Stream& stream, double& work) {
   EstimatorOptions options = trial.options;
-  options.mix = SamplingMix{.image = kTrialShare, .interior = kTrialShare};
+  options.mix = SamplingMix{.image = kConnectionTrialShare, .interior = kConnectionTrialShare};
   // Where paths keep their lengths, a part of the variance is another term's.
   options.keep_length = false;
   // What low-discrepancy numbers gain in a pixel grows with its samples, of which trials have few. In sums, techniques whose
@@ -157,7 +157,7 @@ ShareCosts measure_shares(const ShareTrial& trial, const Stream& stream, double&
     for (const bool connections : {false, true}) {
       // As many samples as in the trial, times this.
       const double number =
-          connections ? kConnectionShares[k] / kTrialShare : (1 - kConnectionShares[k]) / (1 - kTrialShare);
+          connections ? kConnectionShares[k] / kConnectionTrialShare : (1 - kConnectionShares[k]) / (1 - kConnectionTrialShare);
       const std::size_t begin = Layout::image(k, connections) * layout.size, end = begin + layout.size;
       double own = 0;
       squares.for_each(begin, end, [&](std::size_t, double value) { own += value; });

@@ -4,50 +4,32 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <utility>
 
 namespace isochron {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Faces whose planes differ by more are not compared: such close faces share an area only at the smallest scales.
 constexpr double kMostTilt = 1e-3;
 
 using Corners = std::array<Vec3, 3>;
 
-struct Box {
-  Vec3 low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-
-  void add(const Vec3& p) {
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], p[axis]);
-      high[axis] = std::max(high[axis], p[axis]);
-    }
-  }
-  bool overlaps(const Box& b, double margin) const {
-    for (int axis = 0; axis < 3; ++axis)
-      if (low[axis] > b.high[axis] + margin || b.low[axis] > high[axis] + margin) return false;
-    return true;
-  }
-};
-
 struct Item {
-  Box box;
+  Bounds box;
   Corners corners;
   Vec3 normal;  ///< unit; zero without an area
   int triangle;
   int group;  ///< pairs are of different groups
 };
 
-Box box_of(const Corners& corners) {
-  Box box;
+Bounds box_of(const Corners& corners) {
+  Bounds box;
   for (const Vec3& p : corners) box.add(p);
   return box;
 }
 
-Item make_item(const Box& box, const Corners& corners, int triangle, int group) {
+Item make_item(const Bounds& box, const Corners& corners, int triangle, int group) {
   const Vec3 n = cross(corners[1] - corners[0], corners[2] - corners[0]);
   const double norm = length(n);
   return {box, corners, norm > 0 ? n / norm : Vec3(), triangle, group};
@@ -93,14 +75,14 @@ bool lies_on(const Item& a, const Item& b, double touching) {
 }
 
 void compare(const Item& a, const Item& b, double touching, std::vector<std::array<int, 2>>& pairs) {
-  if (a.group == b.group || !a.box.overlaps(b.box, touching)) return;
+  if (a.group == b.group || !a.box.grown(touching).overlaps(b.box)) return;
   if (lies_on(a, b, touching)) pairs.push_back({std::min(a.triangle, b.triangle), std::max(a.triangle, b.triangle)});
 }
 
 /// Halves the space until few items are left that meet a part. A pair may be found in several parts.
 void find_pairs(std::vector<const Item*> items, double touching, std::vector<std::array<int, 2>>& pairs) {
   constexpr std::size_t kFew = 64;  // the quickest of 8 to 64 on a ball of 70 000 faces
-  Box middles;
+  Bounds middles;
   for (const Item* item : items) middles.add(0.5 * (item->box.low + item->box.high));
   const Vec3 size = middles.high - middles.low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -152,11 +134,6 @@ double touching_distance(const std::vector<Vec3>& positions) {
 
 }  // namespace
 
-struct StackedFaces::ShapeBox : Box {};
-
-StackedFaces::StackedFaces() = default;
-StackedFaces::~StackedFaces() = default;
-
 std::vector<std::array<int, 2>> stacked_faces(const std::vector<Vec3>& positions,
                                               const std::vector<std::array<int, 3>>& faces) {
   std::vector<Item> items;
@@ -185,7 +162,7 @@ void StackedFaces::update(const Scene& scene, std::vector<char> moved, double to
   });
   for (int a = 0; a < shapes; ++a)
     for (int b = 0; b < a; ++b)
-      if ((moved[a] || moved[b]) && boxes_[a].overlaps(boxes_[b], touching)) find_between(scene, a, b);
+      if ((moved[a] || moved[b]) && boxes_[a].grown(touching).overlaps(boxes_[b])) find_between(scene, a, b);
   std::sort(between_.begin(), between_.end());
   pairs_.clear();
   for (const auto* each : {&std::as_const(between_), &scene.stacked})
@@ -205,10 +182,11 @@ void StackedFaces::find_between(const Scene& scene, int a, int b) {
   const auto add_items = [&](int s, int other) {
     const std::size_t before = items.size();
     const int first = scene.shapes[s].first_triangle;
+    const Bounds near_other = boxes_[other].grown(touching_);
     for (int t = first; t < first + scene.shapes[s].triangle_count; ++t) {
       const Corners corners = corners_of(scene.positions, scene.triangles[t].vertex);
-      const Box box = box_of(corners);
-      if (box.overlaps(boxes_[other], touching_)) items.push_back(make_item(box, corners, t, s));
+      const Bounds box = box_of(corners);
+      if (near_other.overlaps(box)) items.push_back(make_item(box, corners, t, s));
     }
     return items.size() > before;
   };

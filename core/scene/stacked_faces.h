@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/base/bounds.h"
 #include "core/base/vec.h"
 #include "core/scene/scene.h"
 
@@ -20,8 +21,6 @@ std::vector<std::array<int, 2>> stacked_faces(const std::vector<Vec3>& positions
 /// Scene::stacked has them.
 class StackedFaces {
  public:
-  StackedFaces();
-  ~StackedFaces();
   /// `moved`: shapes to search again. `touching`: as far as this from each other faces lie on each other.
   void update(const Scene& scene, std::vector<char> moved, double touching);
   bool empty() const { return pairs_.empty(); }
@@ -36,12 +35,11 @@ class StackedFaces {
   const std::vector<std::array<int, 2>>& between_shapes() const { return between_; }
 
  private:
-  struct ShapeBox;
   /// Of a triangle: on no other, on such as face the other way, on one that faces the same way.
   enum class Kind : std::uint8_t { free, opposite, alike };
   void find_between(const Scene& scene, int a, int b);
 
-  std::vector<ShapeBox> boxes_;              ///< of each shape
+  std::vector<Bounds> boxes_;                ///< of each shape
   std::vector<std::array<int, 2>> between_;  ///< of different shapes
   std::vector<std::array<int, 2>> pairs_;    ///< all, both ways, in order
   std::vector<Kind> kind_;                   ///< of each triangle

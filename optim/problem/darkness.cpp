@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/geometry/bounds.h"
+#include "core/base/bounds.h"
 #include "optim/problem/loss.h"
 
 namespace isochron {

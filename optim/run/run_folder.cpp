@@ -11,10 +11,14 @@
 #include <utility>
 
 #include "core/base/error.h"
+#include "core/base/file.h"
 #include "optim/experiment/files.h"
 
 namespace isochron {
 namespace {
+
+/// Folders within that of a run.
+constexpr const char* kParts[] = {"inputs", "geometry", "frames", "report", "levels"};
 
 /// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run.
 void clear_run(const std::string& folder) {
@@ -22,8 +26,7 @@ void clear_run(const std::string& folder) {
                            "own_loss.yaml", "target.exr", "initial.exr", "final.exr", "final.h5", "target.png",
                            "initial.png", "final.png", "residual.png", "rmse.png", "capture.png", "report.html"})
     std::filesystem::remove(std::filesystem::path(folder) / file);
-  for (const char* part : {"inputs", "geometry", "frames", "report", "levels"})
-    std::filesystem::remove_all(std::filesystem::path(folder) / part);
+  for (const char* part : kParts) std::filesystem::remove_all(std::filesystem::path(folder) / part);
 }
 
 /// Renames a folder to the first free of FOLDER.1, FOLDER.2, ...; returns the new name.
@@ -60,7 +63,11 @@ FolderLock::FolderLock(const std::string& folder, const std::function<void(const
   int result = 0;
   do result = ::flock(descriptor_, LOCK_EX | LOCK_NB);
   while (result != 0 && errno == EINTR);
-  if (result == 0) return;
+  if (result == 0) {
+    remove_temporaries(folder);
+    for (const char* part : kParts) remove_temporaries(folder + "/" + part);
+    return;
+  }
   if (errno == EWOULDBLOCK) {
     ::close(descriptor_);
     throw InputError(

@@ -7,7 +7,8 @@ namespace isochron {
 
 /// While it lives, no other process works in the folder: an exclusive flock on FOLDER/.lock, which the system releases
 /// when the process ends in any way. Network file systems know it where their server does locks (NFS from Linux 2.6.12
-/// on); where it cannot be had, `warning` receives one line and the run goes on.
+/// on); where it cannot be had, `warning` receives one line and the run goes on. Whoever gets it removes the parts of files that a
+/// killed process left.
 class FolderLock {
  public:
   /// Throws InputError where another process holds it.

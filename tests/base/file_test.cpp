@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <csignal>
 
@@ -42,6 +44,23 @@ TEST(WriteFileAtomically, WritesAndReplaces) {
   write_file_atomically(folder.path("f"), large);
   EXPECT_EQ(folder.read("f"), large);
   EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(RemoveTemporaries, WhatAKilledProcessLeft) {
+  TemporaryFolder folder;
+  for (const char* name : {"f.tmp", "f.1-.tmp", "f-1.tmp", "f1-2.tmp", "f.1-2.tmp.txt"})
+    folder.write(name, "somebody else's");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    NewFile file(folder.path("f"));
+    file.write(std::string(3'000'000, 'x'));
+    ::_exit(0);
+  }
+  ::waitpid(child, nullptr, 0);
+  EXPECT_EQ(folder.entries(), 6);
+  remove_temporaries(folder.path("."));
+  EXPECT_EQ(folder.entries(), 5);
+  remove_temporaries(folder.path("none"));
 }
 
 TEST(WriteFileAtomically, FailureLeavesTheOldFileAndNothingElse) {

@@ -13,7 +13,7 @@
 namespace isochron {
 namespace {
 
-constexpr int kPixels = 30, kGates = 40;
+constexpr int kFitPixels = 30, kGates = 40;
 
 ReadingLoss loss_of_counts() {
   return {LossKind::poisson, 0.01};
@@ -27,10 +27,10 @@ class Fit {
   double wrong = 0;  ///< what the truth has besides: a second bump of this height
   double scatter = 0.02;
 
-  Fit() : counts_(kPixels, 1, kGates, 1) {}
+  Fit() : counts_(kFitPixels, 1, kGates, 1) {}
 
   void draw(std::uint32_t number) {
-    for (int p = 0; p < kPixels; ++p)
+    for (int p = 0; p < kFitPixels; ++p)
       for (int g = 0; g < kGates; ++g)
         counts_.at(p, g, 0) = background + gain * bump(p, g - late) + wrong * bump(p, g - 15);
     draw_counts(counts_, {test_seed(90), number, 0});
@@ -41,7 +41,7 @@ class Fit {
     late = 0;
     for (int i = 0; i < 30; ++i) {
       double slope[2] = {}, hessian[3] = {};
-      for (int p = 0; p < kPixels; ++p)
+      for (int p = 0; p < kFitPixels; ++p)
         for (int g = 0; g < kGates; ++g) {
           const double b = bump(p, g), m = background + gain * b, n = counts_.at(p, g, 0);
           slope[0] += (1 - n / m) * b;
@@ -59,14 +59,14 @@ class Fit {
   GoodnessOfFit judge(std::uint32_t number) const {
     GatedImage halves[] = {counts_, counts_};
     for (int h : {0, 1})
-      for (int p = 0; p < kPixels; ++p)
+      for (int p = 0; p < kFitPixels; ++p)
         for (int g = 0; g < kGates; ++g) {
           Rng rng({test_seed(91), number, 0}, p * kGates + g, h);
           halves[h].at(p, g, 0) =
               background + gain * bump(p, g) * (1 + scatter * std::sqrt(24) * (rng.uniform() - 0.5));
         }
     const SplitImage image = join_halves(halves[0], 1, halves[1], 1);
-    const CountModel model{&image, std::vector<double>(kPixels, background), std::vector<int>(kPixels, 0), {1}, 1};
+    const CountModel model{&image, std::vector<double>(kFitPixels, background), std::vector<int>(kFitPixels, 0), {1}, 1};
     return judge_fit(model, counts_, loss_of_counts());
   }
 
@@ -128,7 +128,7 @@ TEST(GoodnessOfFit, ProbabilitiesOfRightModelsAreUniform) {
       const GoodnessOfFit found = fit.judge(i);
       p.push_back(found.fit.p_value);
       EXPECT_TRUE(found.has_light());
-      EXPECT_EQ(found.fit.degrees_of_freedom, kPixels * kGates - 2);
+      EXPECT_EQ(found.fit.degrees_of_freedom, kFitPixels * kGates - 2);
     }
     std::sort(p.begin(), p.end());
     double distance = 0;
@@ -142,7 +142,7 @@ TEST(GoodnessOfFit, ProbabilitiesOfRightModelsAreUniform) {
 // into each, which varies by d^2; what is linear in the image the background takes.
 TEST(GoodnessOfFit, SaysHowMuchOfTheSpreadIsTheImages) {
   constexpr double kMean = 1e5;
-  GatedImage counts(kPixels, 1, kGates, 1), halves[] = {counts, counts};
+  GatedImage counts(kFitPixels, 1, kGates, 1), halves[] = {counts, counts};
   counts.data.assign(counts.data.size(), kMean);
   const auto share = [&](double d) {
     for (std::size_t i = 0; i < counts.data.size(); ++i) {
@@ -151,7 +151,7 @@ TEST(GoodnessOfFit, SaysHowMuchOfTheSpreadIsTheImages) {
       halves[1].data[i] = kMean - apart / 2;
     }
     const SplitImage image = join_halves(halves[0], 1, halves[1], 1);
-    const CountModel model{&image, std::vector<double>(kPixels, kMean), std::vector<int>(kPixels, 0), {1}, 0};
+    const CountModel model{&image, std::vector<double>(kFitPixels, kMean), std::vector<int>(kFitPixels, 0), {1}, 0};
     return test_deviance(model, counts, loss_of_counts()).image_share;
   };
   EXPECT_EQ(share(0), 0);

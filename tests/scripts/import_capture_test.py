@@ -13,7 +13,9 @@ sys.path.insert(0, str(SCRIPTS))
 import h5py
 import numpy as np
 import scipy.io
+import import_capture
 from captures import response
+from in_process import run_main
 from seeds import generator
 
 C = 299792458e-12  # metres in a picosecond
@@ -40,8 +42,8 @@ class ImportTest(unittest.TestCase):
         self.out = self.folder / "out.h5"
 
     def run_script(self, name, *options):
-        command = [sys.executable, SCRIPTS / "import_capture.py", self.folder / name, self.out, *map(str, options)]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
+        """In this process; test_output_that_cannot_be_written starts one."""
+        return run_main(import_capture.main, self.folder / name, self.out, *options)
 
     def imported(self, name, *options):
         result = self.run_script(name, *options)
@@ -258,7 +260,8 @@ class ImportTest(unittest.TestCase):
     def test_output_that_cannot_be_written(self):
         self.save("in.mat", rect_data=numbered(2, 2, 3), width=1.0)
         self.out = self.folder / "none" / "out.h5"
-        result = self.run_script("in.mat")
+        command = [sys.executable, SCRIPTS / "import_capture.py", self.folder / "in.mat", self.out]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
         self.assertEqual(result.returncode, 2)
         self.assertRegex(result.stderr,
                          r"\Aimport_capture\.py: .*out.h5: cannot be written: No such file or directory\n\Z")

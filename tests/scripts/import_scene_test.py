@@ -4,8 +4,6 @@
 usage: import_scene_test.py PROGRAM
 """
 
-import contextlib
-import io
 import pathlib
 import subprocess
 import sys
@@ -17,6 +15,7 @@ sys.path[:0] = [str(SOURCE / "scripts"), str(SOURCE / "app/python")]
 import import_scene
 import numpy as np
 import yaml
+from in_process import run_main
 from isochron import exr
 from matplotlib import image
 
@@ -57,15 +56,9 @@ class ImportSceneTest(unittest.TestCase):
         self.out = self.folder / "out"
 
     def run_script(self, text, *options):
-        """In this process, which takes milliseconds; test_as_a_user_runs_it starts one."""
+        """In this process; test_as_a_user_runs_it starts one."""
         (self.folder / "in.xml").write_text(text)
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            try:
-                code = import_scene.main(list(map(str, (self.folder / "in.xml", "-o", self.out, "--force", *options))))
-            except SystemExit as exit_code:
-                code = exit_code.code
-        return subprocess.CompletedProcess([], code, out.getvalue(), err.getvalue())
+        return run_main(import_scene.main, self.folder / "in.xml", "-o", self.out, "--force", *options)
 
     def imported(self, text, *options):
         result = self.run_script(text, *options)

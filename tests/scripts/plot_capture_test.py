@@ -1,8 +1,6 @@
 #!/usr/bin/python3
 """scripts/plot_capture.py on small runs of captures, and its parts against scenes whose answer is known."""
 
-import contextlib
-import io
 import pathlib
 import shutil
 import subprocess
@@ -22,6 +20,7 @@ from isochron.pictures.back_projection import BackProjection
 from isochron.pictures.capture_run import METRES_PER_PS, CaptureRun
 from isochron.pictures.deviance import Fit
 from isochron.pictures.wall import Plane, Wall
+from in_process import run_main
 from report_folders import write_ply
 from seeds import generator
 
@@ -98,13 +97,9 @@ class PlotCaptureTest(unittest.TestCase):
         path.write_text(text.replace(before, after))
 
     def run_script(self, *options):
-        """Exit status and messages; within this process, as Matplotlib takes longer to load than most tests."""
-        with contextlib.redirect_stderr(io.StringIO()) as messages:
-            try:
-                status = plot_capture.main([str(self.folder), *map(str, options)])
-            except SystemExit as end:
-                status = end.code
-        return status, messages.getvalue()
+        """Exit status and messages."""
+        result = run_main(plot_capture.main, self.folder, *options)
+        return result.returncode, result.stderr
 
     def assert_drawn(self, *options, png=None):
         self.assertEqual(self.run_script(*options), (0, ""))

@@ -9,9 +9,10 @@ import unittest
 
 SCRIPTS = pathlib.Path(__file__).resolve().parents[2] / "scripts"
 sys.path[:0] = [str(SCRIPTS), str(SCRIPTS.parent / "app/python")]
-from isochron import exr
+from isochron import exr, plot
 import matplotlib.image
 import numpy as np
+from in_process import run_main
 from isochron.pictures import curves, reading, scales, sheets
 
 HEADER = "iteration,seconds,loss,image_rmse,param_rmse,gradient_norm,height\n"
@@ -31,8 +32,8 @@ class PlotTest(unittest.TestCase):
         self.folder = pathlib.Path(folder.name)
 
     def plot(self, *options):
-        command = [sys.executable, str(SCRIPTS / "plot.py"), str(self.folder), *options]
-        return subprocess.run(command, capture_output=True, text=True, check=False)
+        """In this process; test_failures_are_one_line starts one."""
+        return run_main(plot.main, self.folder, *options)
 
     def assert_drawn(self, *names, options=()):
         result = self.plot(*options)
@@ -169,7 +170,10 @@ class PlotTest(unittest.TestCase):
         self.assert_drawn()
 
     def test_failures_are_one_line(self):
-        self.assert_fails("neither")
+        command = [sys.executable, SCRIPTS / "plot.py", self.folder]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        self.assertEqual(result.returncode, 1)
+        self.assertRegex(result.stderr, r"\Aplot\.py: .*neither.*\n\Z")
         (self.folder / "bad.exr").write_bytes(b"nothing")
         exr.write(self.folder / "good.exr", images(1))
         self.assert_fails("bad.exr: not an OpenEXR file")
