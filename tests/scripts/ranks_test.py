@@ -40,7 +40,7 @@ RUNS = {
 }
 # Ranks and threads of each.
 EVERY_SHARING = [(ranks, threads) for ranks in (1, 2, 3, 4) for threads in (1, 2)]
-SHARINGS = {"cube": EVERY_SHARING, "height_field": EVERY_SHARING, "letter": EVERY_SHARING, "cube_lm": [(2, 1), (3, 2)],
+SHARINGS = {"cube": EVERY_SHARING, "height_field": [(1, 2), (2, 1), (3, 2)], "letter": [(2, 2), (4, 1)], "cube_lm": [(2, 1), (3, 2)],
             "standard": [(2, 2), (4, 1)], "levels": [(2, 1), (3, 2)]}
 # Ranks before and after one of them dies, by which signal; 0: without mpirun. Iterations of the whole run.
 DEATHS = [("cube", 3, 2, signal.SIGKILL, "1", 10), ("cube", 2, 0, signal.SIGTERM, "0", 10),
