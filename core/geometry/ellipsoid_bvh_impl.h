@@ -1,7 +1,7 @@
 // What building and querying an EllipsoidBvh share.
 #pragma once
-#include "core/base/large_array.h"
 #include "core/base/bounds.h"
+#include "core/base/large_array.h"
 #include "core/geometry/ellipsoid_bvh.h"
 
 namespace isochron {

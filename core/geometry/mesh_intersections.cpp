@@ -5,8 +5,8 @@
 #include <cmath>
 #include <tuple>
 
-#include "core/base/parallel.h"
 #include "core/base/bounds.h"
+#include "core/base/parallel.h"
 
 namespace isochron {
 namespace {

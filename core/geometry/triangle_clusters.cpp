@@ -1,7 +1,7 @@
 #include "core/geometry/triangle_clusters.h"
 
-#include "core/base/parallel.h"
 #include "core/base/bounds.h"
+#include "core/base/parallel.h"
 
 namespace isochron {
 

@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/base/large_array.h"
 #include "core/base/bounds.h"
+#include "core/base/large_array.h"
 #include "core/geometry/ellipsoid.h"
 #include "core/geometry/ellipsoid_bvh.h"
 #include "core/geometry/ray_caster.h"

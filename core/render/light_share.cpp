@@ -94,7 +94,8 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
     work += work_of[i];
   }
   // Of as many samples.
-  const double of_standard = work_of[0], of_light = (work_of[1] - (1 - kLightTrialShare) * work_of[0]) / kLightTrialShare;
+  const double of_standard = work_of[0],
+               of_light = (work_of[1] - (1 - kLightTrialShare) * work_of[0]) / kLightTrialShare;
   const auto cost = [&](std::size_t i) {
     return moments.of[i] / (1 - kShares[i]) * ((1 - kShares[i]) * of_standard + kShares[i] * of_light);
   };

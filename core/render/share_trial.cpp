@@ -156,8 +156,8 @@ ShareCosts measure_shares(const ShareTrial& trial, const Stream& stream, double&
     double variance = 0, of_share = 0;
     for (const bool connections : {false, true}) {
       // As many samples as in the trial, times this.
-      const double number =
-          connections ? kConnectionShares[k] / kConnectionTrialShare : (1 - kConnectionShares[k]) / (1 - kConnectionTrialShare);
+      const double number = connections ? kConnectionShares[k] / kConnectionTrialShare
+                                        : (1 - kConnectionShares[k]) / (1 - kConnectionTrialShare);
       const std::size_t begin = Layout::image(k, connections) * layout.size, end = begin + layout.size;
       double own = 0;
       squares.for_each(begin, end, [&](std::size_t, double value) { own += value; });

@@ -66,7 +66,8 @@ class Fit {
               background + gain * bump(p, g) * (1 + scatter * std::sqrt(24) * (rng.uniform() - 0.5));
         }
     const SplitImage image = join_halves(halves[0], 1, halves[1], 1);
-    const CountModel model{&image, std::vector<double>(kFitPixels, background), std::vector<int>(kFitPixels, 0), {1}, 1};
+    const CountModel model{
+        &image, std::vector<double>(kFitPixels, background), std::vector<int>(kFitPixels, 0), {1}, 1};
     return judge_fit(model, counts_, loss_of_counts());
   }
 
