@@ -8,11 +8,14 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <iterator>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -33,19 +36,24 @@ int create_beside(const std::string& path, std::string& name) {
   return descriptor;
 }
 
-/// Whether create_beside made the name.
-bool is_temporary(std::string_view name) {
-  const auto ends_with = [&](std::string_view end) {
-    const bool does = name.ends_with(end);
-    if (does) name.remove_suffix(end.size());
-    return does;
+/// The process that create_beside made the name in; empty: another made it.
+std::optional<pid_t> writer_of(std::string_view name) {
+  constexpr std::string_view kEnd = ".tmp";
+  const std::size_t dash = name.rfind('-'), dot = dash == 0 ? name.npos : name.rfind('.', dash - 1);
+  if (!name.ends_with(kEnd) || dash == name.npos || dot == name.npos) return std::nullopt;
+  name.remove_suffix(kEnd.size());
+  pid_t process = 0;
+  unsigned counter = 0;
+  const auto is_number = [&](std::size_t begin, std::size_t end, auto& number) {
+    const auto [rest, error] = std::from_chars(name.data() + begin, name.data() + end, number);
+    return error == std::errc() && rest == name.data() + end;
   };
-  const auto ends_with_number = [&] {
-    const std::size_t digits = name.size() - (name.find_last_not_of("0123456789") + 1);
-    name.remove_suffix(digits);
-    return digits > 0;
-  };
-  return ends_with(".tmp") && ends_with_number() && ends_with("-") && ends_with_number() && ends_with(".");
+  if (!is_number(dot + 1, dash, process) || !is_number(dash + 1, name.size(), counter)) return std::nullopt;
+  return process;
+}
+
+bool is_running(pid_t process) {
+  return ::kill(process, 0) == 0 || errno == EPERM;
 }
 
 /// 0, or the errno of what failed.
@@ -185,8 +193,10 @@ void write_file_atomically(const std::string& path, const std::string& contents)
 void remove_temporaries(const std::string& folder) {
   std::error_code error;
   for (std::filesystem::directory_iterator file(folder, error), end; !error && file != end; file.increment(error))
-    if (std::error_code ignored; is_temporary(file->path().filename().string()))
+    if (const auto writer = writer_of(file->path().filename().string()); writer && !is_running(*writer)) {
+      std::error_code ignored;
       std::filesystem::remove(*file, ignored);
+    }
 }
 
 std::optional<std::string> read_regular_file(const std::string& path, std::string& problem) {

@@ -56,8 +56,8 @@ class Cost : public Program {
 
 constexpr double kImage = 4.0 * 128 * 128 * 1000;  ///< in single precision
 
-// Paths of this scene take so little that what they add to an image beyond the caches shows: 1.3 to 1.7 times, by processor. On the
-// cube and with 256 x 256 pixels it is less (scripts/cube_cost.py).
+// Paths of this scene take so little that what they add to an image beyond the caches shows: 1.3 times where it was measured, and
+// more where memory is slower. scripts/cube_cost.py measures a larger cube.
 TEST_F(Cost, RenderOfAThousandBins) {
   const Usage few = measure("render", 10), many = measure("render", 1000);
   EXPECT_LT(many.seconds, 2 * few.seconds);

@@ -48,8 +48,10 @@ TEST(WriteFileAtomically, WritesAndReplaces) {
 
 TEST(RemoveTemporaries, WhatAKilledProcessLeft) {
   TemporaryFolder folder;
-  for (const char* name : {"f.tmp", "f.1-.tmp", "f-1.tmp", "f1-2.tmp", "f.1-2.tmp.txt"})
+  for (const char* name : {"f.tmp", "f.1-.tmp", "f-1.tmp", "f1-2.tmp", "f.1-2.tmp.txt", "-.tmp", ".tmp"})
     folder.write(name, "somebody else's");
+  NewFile under_way(folder.path("g"));
+  under_way.seek(0);  // opens it
   const pid_t child = ::fork();
   if (child == 0) {
     NewFile file(folder.path("f"));
@@ -57,9 +59,11 @@ TEST(RemoveTemporaries, WhatAKilledProcessLeft) {
     ::_exit(0);
   }
   ::waitpid(child, nullptr, 0);
-  EXPECT_EQ(folder.entries(), 6);
+  EXPECT_EQ(folder.entries(), 9);
   remove_temporaries(folder.path("."));
-  EXPECT_EQ(folder.entries(), 5);
+  EXPECT_EQ(folder.entries(), 8);
+  under_way.finish();
+  EXPECT_EQ(folder.entries(), 8);
   remove_temporaries(folder.path("none"));
 }
 
