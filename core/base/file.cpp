@@ -2,20 +2,18 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
-#include <charconv>
-#include <csignal>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <iterator>
-#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -25,7 +23,7 @@
 namespace isochron {
 namespace {
 
-/// Opens a file that did not exist before, in the folder of `path`.
+/// Opens a file that did not exist before, in the folder of `path`, and locks it.
 int create_beside(const std::string& path, std::string& name) {
   static std::atomic<unsigned> counter{0};
   int descriptor = -1;
@@ -33,27 +31,32 @@ int create_beside(const std::string& path, std::string& name) {
     name = fmt::format("{}.{}-{}.tmp", path, ::getpid(), counter++);
     descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   } while (descriptor < 0 && errno == EEXIST);
+  if (descriptor >= 0) ::flock(descriptor, LOCK_EX | LOCK_NB);  // held until it is closed, see is_abandoned
   return descriptor;
 }
 
-/// The process that create_beside made the name in; empty: another made it.
-std::optional<pid_t> writer_of(std::string_view name) {
-  constexpr std::string_view kEnd = ".tmp";
-  const std::size_t dash = name.rfind('-'), dot = dash == 0 ? name.npos : name.rfind('.', dash - 1);
-  if (!name.ends_with(kEnd) || dash == name.npos || dot == name.npos) return std::nullopt;
-  name.remove_suffix(kEnd.size());
-  pid_t process = 0;
-  unsigned counter = 0;
-  const auto is_number = [&](std::size_t begin, std::size_t end, auto& number) {
-    const auto [rest, error] = std::from_chars(name.data() + begin, name.data() + end, number);
-    return error == std::errc() && rest == name.data() + end;
+/// Whether create_beside made the name.
+bool is_temporary(std::string_view name) {
+  const auto ends_with = [&](std::string_view end) {
+    const bool does = name.ends_with(end);
+    if (does) name.remove_suffix(end.size());
+    return does;
   };
-  if (!is_number(dot + 1, dash, process) || !is_number(dash + 1, name.size(), counter)) return std::nullopt;
-  return process;
+  const auto ends_with_number = [&] {
+    const std::size_t digits = name.size() - (name.find_last_not_of("0123456789") + 1);
+    name.remove_suffix(digits);
+    return digits > 0;
+  };
+  return ends_with(".tmp") && ends_with_number() && ends_with("-") && ends_with_number() && ends_with(".");
 }
 
-bool is_running(pid_t process) {
-  return ::kill(process, 0) == 0 || errno == EPERM;
+/// Whether the process that wrote a file of create_beside has ended, which released its lock.
+bool is_abandoned(const std::string& file) {
+  const int descriptor = ::open(file.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool abandoned = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  ::close(descriptor);
+  return abandoned;
 }
 
 /// 0, or the errno of what failed.
@@ -193,7 +196,7 @@ void write_file_atomically(const std::string& path, const std::string& contents)
 void remove_temporaries(const std::string& folder) {
   std::error_code error;
   for (std::filesystem::directory_iterator file(folder, error), end; !error && file != end; file.increment(error))
-    if (const auto writer = writer_of(file->path().filename().string()); writer && !is_running(*writer)) {
+    if (is_temporary(file->path().filename().string()) && is_abandoned(file->path().string())) {
       std::error_code ignored;
       std::filesystem::remove(*file, ignored);
     }

@@ -39,7 +39,7 @@ class NewFile {
   std::uint64_t written_ = 0;  ///< where the buffer begins in the file
 };
 
-/// Removes what NewFile left in a folder where its process, of this machine, was killed.
+/// Removes what NewFile left in a folder where its process was killed.
 void remove_temporaries(const std::string& folder);
 
 /// Contents of a file. Empty where it cannot be read, with the reason in `problem`, to be put behind its name. Never

@@ -83,7 +83,7 @@ TEST_F(Program, InterruptedLeavesACheckpointAndSaysHowToGoOn) {
     EXPECT_NE(result.errors.find("isochron resume " + folder_.file(out)), std::string::npos) << result.errors;
     EXPECT_NE(folder_.read(out + "/summary.yaml").find("status: interrupted"), std::string::npos);
     EXPECT_TRUE(folder_.has(out + "/checkpoint.yaml"));
-    folder_.write(out + "/frames/000001.exr.2147483647-0.tmp", "as a process leaves it that is killed");
+    folder_.write(out + "/frames/000001.exr.4711-0.tmp", "as a process leaves it that is killed");
     EXPECT_EQ(run({"resume", folder_.file(out), "--no-plots", "--quiet"}).status, 0);
     expect_same_run("whole", out);
   }
