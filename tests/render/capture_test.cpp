@@ -218,8 +218,8 @@ TEST(CaptureReadings, AnyHiddenGeometry) {
     for (const std::vector<int>& hidden : {std::vector<int>{0}, {1}, {0, 1}, {}}) {
       SCOPED_TRACE("shapes " + ::testing::PrintToString(hidden) + (time_offset ? ", time offset" : ""));
       const CaptureSetup setup{.confocal = time_offset, .hidden = hidden, .time_offset = time_offset};
-      expect_readings_and_derivatives(setup, kWide, {}, 2048, 0.02);
-      expect_readings_and_derivatives(setup, kWide, {.hidden = 0.3}, 2048, 0.02);
+      expect_readings_and_derivatives(setup, kWide, {}, 1024, 0.02);
+      expect_readings_and_derivatives(setup, kWide, {.hidden = 0.3}, 1024, 0.02);
     }
 }
 
@@ -241,9 +241,9 @@ TEST(CaptureReadings, BinsWithoutResponseHaveDiracParts) {
   const GateSet bins(GateShape::boxcar(0.08), {0.91, 0.99, 1.07});
   // The light of a length jumps where an ellipse leaves a corner of the board; differences smooth that.
   CaptureSetup setup{.confocal = true, .occluded = false, .quadrature = {.cells = 160, .step = 1e-3, .error = 0.05}};
-  expect_readings_and_derivatives(setup, bins, {}, 2048, 0.02);
+  expect_readings_and_derivatives(setup, bins, {}, 256, 0.02);
   setup.confocal = false;
-  expect_readings_and_derivatives(setup, bins, {}, 2048, 0.02);
+  expect_readings_and_derivatives(setup, bins, {}, 256, 0.02);
 }
 
 TEST(CaptureReadings, EllipsoidalSampling) {

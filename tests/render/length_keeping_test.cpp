@@ -99,13 +99,13 @@ constexpr EstimatorOptions kDirect{.max_bounces = 1, .sampling = Sampling::ellip
 TEST(LengthKeeping, DirectLightWithShadowsAndBorders) {
   const Scene scene = floor_in_shadow();
   compare_with_pairs(scene, motions_of_floor_lamp_and_screen(scene),
-                     GateSet(GateShape::gaussian(0.05), {5.4, 5.7, 6.0}), kDirect, 128, 64);
+                     GateSet(GateShape::gaussian(0.05), {5.4, 5.7, 6.0}), kDirect, 64, 64);
 }
 
 TEST(LengthKeeping, GlossyInColourUnderGatesThatJump) {
   const Scene scene = floor_in_shadow(conductor(Rgb(0.9, 0.6, 0.3), 0.4));
   compare_with_pairs(scene, motions_of_floor_lamp_and_screen(scene), GateSet(GateShape::boxcar(0.2), {5.4, 5.7, 6.0}),
-                     kDirect, 256, 64);
+                     kDirect, 128, 64);
 }
 
 /// The nearest point of the lamp is the foot of the floor's: circles begin there.
@@ -136,7 +136,7 @@ TEST(LengthKeeping, ThreeBounces) {
   const Scene scene = box_with_panel();
   compare_with_pairs(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
                      GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}),
-                     {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 64, 64);
+                     {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 32, 64);
 }
 
 TEST(LengthKeeping, SharesSamplesWithStandardSampling) {
@@ -144,7 +144,7 @@ TEST(LengthKeeping, SharesSamplesWithStandardSampling) {
   EstimatorOptions options{.max_bounces = 3, .guiding_samples = 64};
   options.mix = SamplingMix{0.3, 0.3};
   compare_with_pairs(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
-                     GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}), options, 64, 64);
+                     GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}), options, 32, 64);
 }
 
 void compare_dirac(const Scene& scene, const std::vector<Motion>& motions, const std::vector<double>& lengths,
@@ -158,7 +158,7 @@ void compare_dirac(const Scene& scene, const std::vector<Motion>& motions, const
 
 TEST(LengthKeeping, DiracGatesOfDirectLight) {
   const Scene scene = floor_in_shadow();
-  compare_dirac(scene, motions_of_floor_lamp_and_screen(scene), {5.4, 5.7, 6.0}, kDirect, 0.01, 256, 64);
+  compare_dirac(scene, motions_of_floor_lamp_and_screen(scene), {5.4, 5.7, 6.0}, kDirect, 0.01, 128, 64);
 }
 
 TEST(LengthKeeping, DiracGatesWhereLightComesFirst) {
@@ -170,7 +170,7 @@ TEST(LengthKeeping, DiracGatesWhereLightComesFirst) {
 TEST(LengthKeeping, DiracGatesOfThreeBounces) {
   const Scene scene = box_with_panel();
   compare_dirac(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
-                {5.0, 5.5, 6.0}, {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 0.01, 64,
+                {5.0, 5.5, 6.0}, {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 0.01, 32,
                 64);
 }
 

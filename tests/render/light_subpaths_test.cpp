@@ -18,6 +18,7 @@ struct LightCase {
   const char* name;
   double share;  ///< of ellipsoidal connections
   GateShape gate;
+  int samples;  ///< of derivatives, per batch; twice as many without light subpaths
 };
 void PrintTo(const LightCase& c, std::ostream* out) {
   *out << c.name;
@@ -49,7 +50,7 @@ void expect_equal_images(const Scene& scene, const GateSet& gates, const Estimat
 class LightSubpathsIn : public ::testing::TestWithParam<LightCase> {};
 
 TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
-  const auto& [name, share, shape] = GetParam();
+  const auto& [name, share, shape, samples] = GetParam();
   const Scene scene = glossy_validation_scene(16, 0.5, diffuse(Rgb(0.6)));
   const GateSet gates(shape, {5.0, 6.5});
   const EstimatorOptions ours = with_light(3, share, 0.6);
@@ -64,8 +65,8 @@ TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
   const Renderer reference(scene, gates, plain, &basis), with_light_subpaths(scene, gates, ours, &basis);
   for (const Term term : {Term::interior, Term::path_length}) {
     if (!reference.has(term)) continue;
-    const auto expected = term_means(reference, term, 3, 2, 160, kBatches, {53, 0, 0});
-    const auto found = term_means(with_light_subpaths, term, 3, 2, 80, kBatches, {54, 0, 0});
+    const auto expected = term_means(reference, term, 3, 2, 2 * samples, kBatches, {53, 0, 0});
+    const auto found = term_means(with_light_subpaths, term, 3, 2, samples, kBatches, {54, 0, 0});
     for (int m = 0; m < 3; ++m) {
       const double scale = std::hypot(expected[m][0].mean, expected[m][1].mean);
       for (int g = 0; g < 2; ++g) {
@@ -81,11 +82,11 @@ TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Mixes, LightSubpathsIn,
-                         ::testing::Values(LightCase{"standard", 0, GateShape::gaussian(1.2)},
-                                           LightCase{"combined", 0.3, GateShape::gaussian(1.2)},
-                                           LightCase{"connections", 1, GateShape::gaussian(0.4)},
-                                           LightCase{"jumps", 1, GateShape::boxcar(0.5)},
-                                           LightCase{"boxcar", 0, GateShape::boxcar(1.5)}),
+                         ::testing::Values(LightCase{"standard", 0, GateShape::gaussian(1.2), 24},
+                                           LightCase{"combined", 0.3, GateShape::gaussian(1.2), 32},
+                                           LightCase{"connections", 1, GateShape::gaussian(0.4), 24},
+                                           LightCase{"jumps", 1, GateShape::boxcar(0.5), 60},
+                                           LightCase{"boxcar", 0, GateShape::boxcar(1.5), 30}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(LightSubpaths, LeaveGlassInTheDirectionsOfImportance) {

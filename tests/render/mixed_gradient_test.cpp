@@ -42,11 +42,11 @@ TEST(GatePick, LeavesMixedGradientsUnbiased) {
       }
       return batches.estimate();
     };
-    const Estimate exact = gradient({.max_bounces = 3, .sampling = Sampling::standard}, 256, 53);
+    const Estimate exact = gradient({.max_bounces = 3, .sampling = Sampling::standard}, 96, 53);
     for (const auto& [share, light] : {std::pair{0.3, 0.0}, {0.7, 0.0}, {0.0, 0.5}, {0.5, 0.5}}) {
       EstimatorOptions options{.max_bounces = 3, .light = light};
       options.mix = SamplingMix{share, share};
-      const Estimate ours = gradient(options, 128, 54);
+      const Estimate ours = gradient(options, 48, 54);
       EXPECT_LT(std::abs(z_score(ours, exact)), 4.5)
           << share << ", light " << light << ": " << ours.mean << " +- " << ours.standard_error << ", standard "
           << exact.mean << " +- " << exact.standard_error;

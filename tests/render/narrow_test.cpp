@@ -143,7 +143,7 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
   const Renderer renderer(scene, gates, options, &basis);
 
   // Standard sampling hits such a gate with few paths, and W' with fewer.
-  const int samples = sampling == Sampling::standard ? 12000 : 3000;
+  const int samples = sampling == Sampling::standard ? 4000 : 1000;
   const int batches = 32, size = static_cast<int>(motions.size());
   const auto image = image_means(renderer, 2, samples, batches, {11, 0, 0});
   for (int g = 0; g < 2; ++g) {

@@ -2,12 +2,13 @@
 """scripts/plot_chart.py on tables such as `isochron chart` and `isochron stability` write, with every odd entry."""
 
 import pathlib
-import subprocess
 import sys
 import tempfile
 import unittest
 
-SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "plot_chart.py"
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "app/python"))
+from in_process import run_main
+from isochron import plot_chart
 
 CHART = """method,factor,repeats,core_seconds,error,variance,variance_error,bias2,bias2_error,components,unknowns
 reference,,32,10,0.02,0.0004,,,,1,1
@@ -43,7 +44,7 @@ class PlotChartTest(unittest.TestCase):
     def plot(self, **tables):
         for name, text in tables.items():
             (self.folder / f"{name}.csv").write_text(text)
-        return subprocess.run([sys.executable, SCRIPT, self.folder], capture_output=True, text=True, check=False)
+        return run_main(plot_chart.main, self.folder)
 
     def test_all_pictures(self):
         result = self.plot(chart=CHART, chart_table=TABLE, chart_solvers=SOLVERS, stability=STABILITY)

@@ -24,6 +24,7 @@ PROGRAM, PACKAGES = sys.argv[1:3]
 del sys.argv[1:3]
 sys.path.insert(0, PACKAGES)
 import isochron
+import lengths
 import numpy as np
 from isochron import _core
 from scipy.stats import t as student
@@ -189,6 +190,7 @@ class CommandsTest(PythonTest):
 
 
 class DualityTest(PythonTest):
+    @lengths.long
     def test_products_agree(self):
         """<vjp(a), t> and <a, jvp(t)> have samples of their own."""
         for (file, overrides), samples in zip(((CUBE, {**SMALL, "gates.sigma": 0.1}), *self.cases[1:]), (512, 64, 64)):
@@ -421,11 +423,12 @@ print("went on")
         self.assertEqual((process.returncode, out[1]), (0, "went on"))
         return float(out[0]) - sent
 
+    @lengths.long
     def test_control_c(self):
         folder = self.folder / "interrupted"
         for code in ("experiment.render()", "experiment.vjp(None, 1)", f"experiment.run({str(folder)!r}, force=True)"):
             with self.subTest(code):
-                self.assertLess(min(self.interrupted_after(code) for _ in range(2)), 0.2)
+                self.assertTrue(any(self.interrupted_after(code) < 0.2 for _ in range(2)))
         self.assertEqual(isochron.read_run(folder).status, "interrupted")
 
 
@@ -474,6 +477,7 @@ class TorchTest(PythonTest):
 
 
 class PackageTest(PythonTest):
+    @lengths.long
     def test_examples(self):
         done = subprocess.run(["/usr/bin/python3", ROOT / "app/python/examples/fit_cube.py"], capture_output=True, text=True,
                               env={**os.environ, "PYTHONPATH": PACKAGES})
@@ -520,4 +524,4 @@ except ImportError as error:
 
 
 if __name__ == "__main__":
-    unittest.main()
+    lengths.main()

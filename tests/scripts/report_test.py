@@ -14,6 +14,7 @@ import time
 import unittest
 
 from report_folders import EXPERIMENT, Page, images, write_capture_run, write_log, write_reconstruction, write_run
+import lengths
 import numpy as np
 from isochron import exr
 from isochron.report import __main__ as program
@@ -281,6 +282,7 @@ class ReportTest(unittest.TestCase):
             self.assertLess(colours[:3].min(axis=1).max(), 0.6 * 255)
         self.assertEqual(len(view["lines"]), 1)  # the wall; the scene's surface is not drawn twice
 
+    @lengths.long
     def test_reconstruction_that_lacks_something(self):
         write_reconstruction(self.folder)
         self.edit("levels/1/summary.yaml", "status: iterations_reached", "status: interrupted")  # where time was over
@@ -364,4 +366,4 @@ class ReportTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    lengths.main()

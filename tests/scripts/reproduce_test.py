@@ -12,6 +12,7 @@ import sys
 import tempfile
 import unittest
 
+import lengths
 import yaml
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -52,6 +53,7 @@ class ReproduceTest(unittest.TestCase):
         self.assertIn("| `tree` | 17 | 1 | 200, 200 | 0.2, 15.5 | 0.25, 744 | 1/3000 | 0.25 | 40 | 180 | 50 | 60 |", page)
         self.assertIn("](figures/branches.png)", page)
 
+    @lengths.long
     def test_stages_are_one_run(self):
         done = self.reproduce("cube", "--seeds", "1", "--iterations", "3", "--samples", "2")
         self.assertEqual((done.returncode, done.stderr), (0, ""))
@@ -77,4 +79,4 @@ class ReproduceTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    lengths.main()

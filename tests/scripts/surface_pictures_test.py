@@ -146,7 +146,9 @@ class SurfacePictureTest(unittest.TestCase):
         self.assertAlmostEqual(FoundSurface(self.folder).resolution, 50 * METRES_PER_PS)
 
     def test_plot_draws_it(self):
-        with contextlib.redirect_stderr(io.StringIO()) as messages:
+        drawn = dict.fromkeys(("plot_images", "plot_signed", "plot_log"), unittest.mock.DEFAULT)  # have tests of their own
+        sheet = unittest.mock.patch.object(plot.Pictures, "draw_capture")
+        with sheet, unittest.mock.patch.multiple(plot, **drawn), contextlib.redirect_stderr(io.StringIO()) as messages:
             self.assertEqual((plot.main([str(self.folder)]), messages.getvalue()), (0, ""))
         picture = matplotlib.image.imread(self.folder / "surface.png")
         self.assertGreater(min(picture.shape[:2]), 700)
