@@ -18,15 +18,15 @@
 namespace isochron {
 namespace {
 
-/// The gradient of the first unknowns of each parameter, with standard errors.
+/// The gradient of the first unknowns of each parameter, with 95 % intervals.
 std::string on_screen(const Parameters& parameters, const Statistics& gradient) {
   constexpr int kMostRows = 4;
   std::string text;
   for (const Parameters::Block& block : parameters.blocks()) {
     const int shown = block.count > kMostRows ? kMostRows - 1 : block.count;
     for (int i = block.begin; i < block.begin + shown; ++i)
-      text += fmt::format("  {}: {:.5g} +- {:.2g}\n", parameters.component_names()[i], gradient.mean[i],
-                          gradient.standard_error[i]);
+      text += fmt::format("  {}: {:.5g} +- {:.2g} (95 %)\n", parameters.component_names()[i], gradient.mean[i],
+                          gradient.half_width_95(i));
     if (shown < block.count) text += fmt::format("  {}: {} more\n", block.name, block.count - shown);
   }
   return text;
@@ -54,15 +54,15 @@ int gradient(const CommonOptions& options) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   display.end();
-  std::string table = "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count\n";
+  std::string table = "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count,half_width_95\n";
   HeavyTails tails;
   for (int i = 0; i < parameters.size(); ++i) {
     const std::string& name = parameters.component_names()[i];
     if (!std::isfinite(estimate.gradient.mean[i]) || !std::isfinite(estimate.gradient.standard_error[i]))
       throw std::runtime_error(fmt::format("the gradient of {} is not finite: values overflow", name));
     const Statistics& s = estimate.gradient;
-    table += fmt::format("{},{},{},{},{},{}\n", name, theta[i], s.mean[i], s.standard_error[i], s.degrees[i],
-                         s.effective_count[i]);
+    table += fmt::format("{},{},{},{},{},{},{}\n", name, theta[i], s.mean[i], s.standard_error[i], s.degrees[i],
+                         s.effective_count[i], s.half_width_95(i));
     tails.add(name, -1, s.effective_count[i]);
   }
   write_file_atomically(folder + "/gradient.csv", table);

@@ -32,13 +32,13 @@ int render(const CommonOptions& options) {
   if (const std::string dark = darkness_warning(problem, theta, estimate.gates.mean, "the image"); !dark.empty())
     warn(dark);
   write_exr(folder + "/render.exr", estimate.image, exr_notes(problem.experiment().gates));
-  std::string table = "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count" +
+  std::string table = "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95" +
                       gate_column_names(problem.experiment().gates) + "\n";
   const Statistics& s = estimate.gates;
   HeavyTails tails;
   for (int g = 0; g < problem.gates().size(); ++g) {
-    table += fmt::format("{},{},{},{},{},{}{}\n", g, s.mean[g], s.standard_error[g], s.replicates, s.degrees[g],
-                         s.effective_count[g], gate_column_values(problem, g));
+    table += fmt::format("{},{},{},{},{},{},{}{}\n", g, s.mean[g], s.standard_error[g], s.replicates, s.degrees[g],
+                         s.effective_count[g], s.half_width_95(g), gate_column_values(problem, g));
     tails.add("the image", g, s.effective_count[g]);
   }
   write_file_atomically(folder + "/render.csv", table);

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "core/base/error.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/gate_columns.h"
+#include "optim/problem/student.h"
 
 namespace isochron {
 namespace {
@@ -61,21 +61,6 @@ double top_speed(const Problem& problem, const std::vector<double>& theta, int c
   for (int v = 0; v < layout.vertices; ++v) fastest = std::max(fastest, speed(layout.vertex(v, 0), 3));
   for (int i = 0; i < layout.lights; ++i) fastest = std::max(fastest, speed(layout.light_position(i, 0), 3));
   return fastest;
-}
-
-/// Probability that |t| exceeds x under Student's law.
-double two_sided_tail(double x, int degrees) {
-  const double angle = std::atan(x / std::sqrt(static_cast<double>(degrees)));
-  const double cosine2 = std::cos(angle) * std::cos(angle);
-  const bool odd = degrees % 2 == 1;
-  // Terms cos^k (even degrees: k = 0, 2, ...; odd: k = 1, 3, ...) up to k = degrees - 2.
-  double term = odd ? std::cos(angle) : 1, sum = 0;
-  for (int k = odd ? 1 : 0; k <= degrees - 2; k += 2) {
-    sum += term;
-    term *= cosine2 * (k + 1) / (k + 2);
-  }
-  const double inside = odd ? 2 / std::numbers::pi * (angle + std::sin(angle) * sum) : std::sin(angle) * sum;
-  return 1 - inside;
 }
 
 /// Extrapolated derivative of the gates' means, and what rounding of the images can add to its error.
@@ -144,16 +129,7 @@ double z_score(double a, double error_a, double b, double error_b) {
 }
 
 double false_alarm_limit(int comparisons, double degrees, double rate) {
-  constexpr double kNormal = 1000;  // the limit is then within a hundredth of that of the normal law
-  const int whole = static_cast<int>(std::clamp(degrees, 1.0, kNormal));
-  const double tail = rate / std::max(comparisons, 1);
-  double low = 0, high = 1;
-  while (two_sided_tail(high, whole) > tail) low = high, high *= 2;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (two_sided_tail(middle, whole) > tail ? low : high) = middle;
-  }
-  return high;
+  return student_quantile(rate / std::max(comparisons, 1), degrees);
 }
 
 bool disagrees(const Comparison& row, int comparisons) {

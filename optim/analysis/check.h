@@ -26,9 +26,8 @@ struct Comparison {
 /// (a - b) / hypot(error_a, error_b); 0 where both are equal, infinite where they differ without error.
 double z_score(double a, double error_a, double b, double error_b);
 
-/// The |z| that one or more of `comparisons` true derivatives exceed with probability `rate` at most
-/// (Bonferroni), for errors of so many degrees of freedom (rounded down; infinite or not, 1000 at most): the two-sided
-/// quantile of Student's t. Its distribution function is the finite series of Abramowitz and Stegun 26.7.3 and 26.7.4.
+/// The |z| that one or more of `comparisons` true derivatives exceed with probability `rate` at most (Bonferroni), for errors of
+/// so many degrees of freedom (see student_quantile).
 double false_alarm_limit(int comparisons, double degrees, double rate = 0.01);
 
 /// Whether one of so many comparisons disagrees: |z| above the limit for its degrees of freedom, or no number.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "optim/problem/student.h"
+
 namespace isochron {
 namespace {
 
@@ -39,6 +41,10 @@ void append(Statistics& result, double mean, double squares_of_mean, std::size_t
 }
 
 }  // namespace
+
+double Statistics::half_width_95(std::size_t i) const {
+  return standard_error[i] * student_quantile(0.05, degrees[i]);
+}
 
 void ReplicateStatistics::add(const std::vector<double>& replicate, int samples) {
   replicates_.push_back(replicate);

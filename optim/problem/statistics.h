@@ -18,6 +18,9 @@ struct Statistics {
   /// near 1 where a single rare one makes all of it (heavy_tail.h). Infinite where the standard error is zero.
   std::vector<double> effective_count;
   int replicates = 0;
+
+  /// Of the interval about the mean of quantity i that covers the truth in 95 % of all estimates.
+  double half_width_95(std::size_t i) const;
 };
 
 /// Replicates of some numbers, weighted by their samples.

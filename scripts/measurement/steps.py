@@ -58,6 +58,7 @@ STEPS = {
     "share_trial": Step((_built("share_trial", _csv("share_trial"), "4"),)),
     "capture_cost": Step((_script("capture_cost.py", "measure", _csv("capture_cost")),)),
     "stated_errors": Step((_script("error_coverage.py", "measure", _csv("error_coverage")),)),
+    "intervals": Step((_script("interval_coverage.py", "measure", _csv("interval_coverage")),)),
     "checks": Step((_script("check_experiments.py", _csv("checks")),)),
     "contact": Step((_built("contact", _csv("contact"), "1"),)),
 }

@@ -8,6 +8,7 @@ import numpy as np
 import capture_cost
 import cube_cost
 import error_coverage
+import interval_coverage
 import public_scene
 from reproduction.tables import markdown, read_rows
 
@@ -260,6 +261,10 @@ def stated_errors(folder):
     return error_coverage.tables_of(read_rows(folder / "error_coverage.csv"))
 
 
+def intervals(folder):
+    return interval_coverage.table_of(read_rows(folder / "interval_coverage.csv"))
+
+
 def egg(folder):
     return public_scene.table_of(read_rows(folder / "egg.csv"))
 
@@ -273,7 +278,7 @@ def checks(folder):
 
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, egg, checks)},
+                               growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, intervals, egg, checks)},
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),

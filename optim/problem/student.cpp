@@ -1,0 +1,39 @@
+#include "optim/problem/student.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace isochron {
+namespace {
+
+/// Probability that |t| exceeds x.
+double two_sided_tail(double x, int degrees) {
+  const double angle = std::atan(x / std::sqrt(static_cast<double>(degrees)));
+  const double cosine2 = std::cos(angle) * std::cos(angle);
+  const bool odd = degrees % 2 == 1;
+  // Terms cos^k (even degrees: k = 0, 2, ...; odd: k = 1, 3, ...) up to k = degrees - 2.
+  double term = odd ? std::cos(angle) : 1, sum = 0;
+  for (int k = odd ? 1 : 0; k <= degrees - 2; k += 2) {
+    sum += term;
+    term *= cosine2 * (k + 1) / (k + 2);
+  }
+  const double inside = odd ? 2 / std::numbers::pi * (angle + std::sin(angle) * sum) : std::sin(angle) * sum;
+  return 1 - inside;
+}
+
+}  // namespace
+
+double student_quantile(double tail, double degrees) {
+  constexpr double kNormal = 1000;  // within a hundredth of the quantile of the normal law
+  const int whole = static_cast<int>(std::clamp(degrees, 1.0, kNormal));
+  double low = 0, high = 1;
+  while (two_sided_tail(high, whole) > tail) low = high, high *= 2;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (two_sided_tail(middle, whole) > tail ? low : high) = middle;
+  }
+  return high;
+}
+
+}  // namespace isochron
