@@ -191,9 +191,11 @@ TEST_F(Program, HelpShowsExamples) {
 TEST_F(Program, CommandsWriteTheirFiles) {
   const std::string file = folder_.file("tiny.yaml"), out = folder_.file("out");
   ASSERT_EQ(run({"render", file, "-o", out, "--no-plots"}).status, 0);
-  EXPECT_EQ(folder_.read("out/render.csv")
-                .rfind("gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95,gate_center\n0,", 0),
-            0u);
+  EXPECT_EQ(
+      folder_.read("out/render.csv")
+          .rfind("gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95,gate_center\n0,",
+                 0),
+      0u);
   const GatedImage image = read_exr(out + "/render.exr");
   EXPECT_EQ(image.gates, 2);
   EXPECT_EQ(image.channels, 1);
@@ -212,8 +214,10 @@ TEST_F(Program, CommandsWriteTheirFiles) {
   ASSERT_EQ(run({"gradient", file, "-o", out, "--at", "target"}).status, 0);
   EXPECT_NE(folder_.read("stdout").find("  height: "), std::string::npos);
   const std::string gradient = folder_.read("out/gradient.csv");
-  EXPECT_EQ(gradient.rfind("parameter,value,gradient,standard_error,degrees_of_freedom,effective_count,half_width_95\nheight,0,", 0),
-            0u);
+  EXPECT_EQ(
+      gradient.rfind(
+          "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count,half_width_95\nheight,0,", 0),
+      0u);
   EXPECT_NE(gradient.find("\npower,10,"), std::string::npos);
   const std::string cost = folder_.read("out/gradient.yaml");
   for (const char* key : {"seconds: ", "threads: ", "repeats: 8\n"}) EXPECT_NE(cost.find(key), std::string::npos);
@@ -370,9 +374,10 @@ TEST_F(Program, GatesThatNoPathReaches) {
     EXPECT_EQ(render.status, 0);
     expect_dark(render);
     const std::string replicates = sampling == std::string("standard") ? "2" : "8";
-    EXPECT_EQ(folder_.read(sampling + std::string("/render.csv")),
-              "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95,gate_center\n0,0,0," +
-                  replicates + ",inf,inf,0,90\n1,0,0," + replicates + ",inf,inf,0,0.1\n");
+    EXPECT_EQ(
+        folder_.read(sampling + std::string("/render.csv")),
+        "gate,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95,gate_center\n0,0,0," +
+            replicates + ",inf,inf,0,90\n1,0,0," + replicates + ",inf,inf,0,0.1\n");
     const Result derive = run(with({"derive", file, "-o", out, "--no-plots", "--quiet"}));
     EXPECT_EQ(derive.status, 0);
     expect_dark(derive);
@@ -387,9 +392,10 @@ TEST_F(Program, GatesThatNoPathReaches) {
     EXPECT_EQ(check.status, 1);
     EXPECT_NE(check.errors.find("no light reaches the gates of the image"), std::string::npos) << check.errors;
     EXPECT_NE(check.errors.find("nothing was checked"), std::string::npos) << check.errors;
-    EXPECT_EQ(folder_.read(sampling + std::string("/gradient.csv")),
-              "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count,half_width_95\nheight,0.2,0,0,inf,"
-              "inf,0\npower,8,0,0,inf,inf,0\n");
+    EXPECT_EQ(
+        folder_.read(sampling + std::string("/gradient.csv")),
+        "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count,half_width_95\nheight,0.2,0,0,inf,"
+        "inf,0\npower,8,0,0,inf,inf,0\n");
     const Result inspection = run(with({"inspect", file, "-o", out, "--seconds", "0.5"}));
     EXPECT_EQ(inspection.status, 1);
     EXPECT_NE(inspection.errors.find("nothing to advise"), std::string::npos) << inspection.errors;

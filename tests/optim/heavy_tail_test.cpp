@@ -52,6 +52,30 @@ TEST(HeavyTail, PartsTellWhatSumsOfFewReplicatesCannot) {
   }
 }
 
+/// Of sums of 32 normal parts. Shares of 4000 estimates have a deviation of 0.34 %: false alarms 7e-6 each at 4.5 of these. Those of
+/// 1.96 standard errors are 70 and 91 %.
+TEST(Statistics, IntervalsCoverTheTruthAsOftenAsTheySay) {
+  std::mt19937_64 rng(test_seed(8));
+  std::normal_distribution<double> normal;
+  constexpr int kEstimates = 4000;
+  for (const int replicates : {2, 8}) {
+    int covered = 0;
+    for (int k = 0; k < kEstimates; ++k) {
+      ReplicateStatistics statistics;
+      for (int r = 0; r < replicates; ++r) {
+        std::vector<std::vector<double>> parts;
+        double sum = 0;
+        for (int p = 0; p < 32; ++p) sum += parts.emplace_back(1, 3 + normal(rng))[0];
+        statistics.add({sum}, parts, 1);
+      }
+      const Statistics result = statistics.result();
+      covered += std::abs(result.mean[0] - 32 * 3) <= result.half_width_95(0);
+    }
+    EXPECT_NEAR(covered, 0.95 * kEstimates, 4.5 * std::sqrt(0.95 * 0.05 * kEstimates)) << replicates << " replicates";
+  }
+  EXPECT_EQ(of_numbers({7, 7, 7, 7}).half_width_95(0), 0);
+}
+
 /// What 2 replicates of an image say about its mean: of independent pixels each from U(0, 1) times its own size.
 TEST(ImageStatistics, PixelsGiveTheErrorOfTheMean) {
   std::mt19937_64 rng(test_seed(7));

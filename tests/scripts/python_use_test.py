@@ -24,6 +24,7 @@ if __name__ == "__main__":  # processes that this one starts have its path
     del sys.argv[1:3]
     sys.path.insert(0, PACKAGES)
 import isochron
+import lengths
 import numpy as np
 from isochron import progress
 
@@ -245,6 +246,7 @@ class ProgressTest(UseTest):
         self.long(progress=lambda *all: told.append(all))  # nothing is left of it
         self.assertGreater(len(told), 2)
 
+    @lengths.long
     def test_notebooks_have_it_below_the_cell(self):
         shown = []
 
@@ -270,4 +272,4 @@ class ProgressTest(UseTest):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    lengths.main()

@@ -10,6 +10,7 @@ import unittest.mock
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
+import lengths
 import light_cone
 import matplotlib.image
 import numpy as np
@@ -146,6 +147,7 @@ class ShapesTest(unittest.TestCase):
             self.assertLess(normal[2], 0)  # towards the wall
             self.assertAlmostEqual(0.5 * np.linalg.norm(normal), 0.01)
 
+    @lengths.long
     def test_all_are_seen_from_the_wall(self):
         for name, shape in shape_study.shapes().items():
             with self.subTest(name):
@@ -209,4 +211,4 @@ class BoundTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    lengths.main()

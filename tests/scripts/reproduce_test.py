@@ -35,6 +35,7 @@ class ReproduceTest(unittest.TestCase):
         environment = {**os.environ, "ISOCHRON_PROGRAM": PROGRAM}
         return subprocess.run([str(c) for c in command], env=environment, capture_output=True, text=True, check=False)
 
+    @lengths.long
     def test_writes_rows_pictures_and_page_and_keeps_other_rows(self):
         table = self.folder / "measured/reconstructions/tree.csv"
         other = measure.Run(1, "iterations_reached", 1, 200, 0.25, 1, 0.1, 40, 50, 0.2, 0.25, 60)

@@ -14,6 +14,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.image
 import matplotlib.pyplot as plt
+import lengths
 import numpy as np
 from isochron import plot
 from isochron.errors import InputError
@@ -123,6 +124,7 @@ class SurfacePictureTest(unittest.TestCase):
         missing = shades(np.array([[np.nan, 1.0]]), "inferno", 0, 1)
         np.testing.assert_array_equal(missing[..., 3], [[0, 1]])
 
+    @lengths.long
     def test_pictures_are_about_what_is_not_dark(self):
         before = self.figure()["Fit: depth"]
         square = np.array([[-0.2, 0.2, 0.5], [0.2, 0.2, 0.5], [0.2, -0.2, 0.6], [-0.2, -0.2, 0.6]])
@@ -145,6 +147,7 @@ class SurfacePictureTest(unittest.TestCase):
         (self.folder / "experiment.yaml").write_text(text)
         self.assertAlmostEqual(FoundSurface(self.folder).resolution, 50 * METRES_PER_PS)
 
+    @lengths.long
     def test_plot_draws_it(self):
         drawn = dict.fromkeys(("plot_images", "plot_signed", "plot_log"), unittest.mock.DEFAULT)  # have tests of their own
         sheet = unittest.mock.patch.object(plot.Pictures, "draw_capture")
@@ -154,6 +157,7 @@ class SurfacePictureTest(unittest.TestCase):
         self.assertGreater(min(picture.shape[:2]), 700)
         self.assertGreater(np.ptp(picture[..., :3]), 0.9)
 
+    @lengths.long
     def test_less_than_all(self):
         square = np.array([[-0.2, 0.2, 0.5], [0.2, 0.2, 0.5], [0.2, -0.2, 0.6], [-0.2, -0.2, 0.6]])
         write_ply(self.folder / "geometry/final_surface.ply", square, TRIANGLES)  # of a run that was begun without numbers
@@ -173,4 +177,4 @@ class SurfacePictureTest(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    lengths.main()
