@@ -10,6 +10,7 @@ one; of coupled pairs under gates that are too narrow for them, of the estimates
 
 import csv
 import pathlib
+import shutil
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
@@ -69,6 +70,7 @@ def estimate(name, draw, folder):
     program(quantity.command, file, "-o", out, "--threads", 1, "--seed", 1000 + draw, *settings)
     with open(out / f"{quantity.command}.csv", newline="") as lines:
         row = next(r for r in csv.DictReader(lines) if all(r[k] == v for k, v in quantity.where.items()))
+    shutil.rmtree(out)
     value = "mean" if quantity.command == "derive" else "gradient"
     return [name, draw, *(f"{float(row[c]):.6g}" for c in (value, *COLUMNS[3:]))]
 
@@ -77,8 +79,10 @@ def measure(file, draws=DRAWS, names=tuple(QUANTITIES)):
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
         folder = pathlib.Path(folder)
         (folder / "contact.yaml").write_text(yaml.safe_dump(CONTACT))
-        jobs = [pool.submit(estimate, name, draw, folder) for name in names for draw in range(int(draws))]
-        write_rows(pathlib.Path(file), COLUMNS, [job.result() for job in jobs])
+        rows = []
+        for name in names:
+            rows += pool.map(lambda draw: estimate(name, draw, folder), range(int(draws)))
+            write_rows(pathlib.Path(file), COLUMNS, rows)
 
 
 def truth_of(rows, name):

@@ -43,7 +43,7 @@ void append(Statistics& result, double mean, double squares_of_mean, std::size_t
 }  // namespace
 
 double Statistics::half_width_95(std::size_t i) const {
-  return standard_error[i] * student_quantile(0.05, degrees[i]);
+  return standard_error[i] > 0 ? standard_error[i] * student_quantile_95(degrees[i]) : 0;
 }
 
 void ReplicateStatistics::add(const std::vector<double>& replicate, int samples) {

@@ -19,7 +19,8 @@ struct Statistics {
   std::vector<double> effective_count;
   int replicates = 0;
 
-  /// Of the interval about the mean of quantity i that covers the truth in 95 % of all estimates.
+  /// Of the interval about the mean of quantity i that covers the truth in 95 % of all estimates, by Student's law; in fewer where
+  /// the deviations are very skewed.
   double half_width_95(std::size_t i) const;
 };
 

@@ -1,6 +1,7 @@
 #include "optim/problem/student.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -22,11 +23,16 @@ double two_sided_tail(double x, int degrees) {
   return 1 - inside;
 }
 
+constexpr int kNormal = 1000;  ///< within a hundredth of the quantile of the normal law
+
+int whole_degrees(double degrees) {
+  return static_cast<int>(std::clamp(degrees, 1.0, static_cast<double>(kNormal)));
+}
+
 }  // namespace
 
 double student_quantile(double tail, double degrees) {
-  constexpr double kNormal = 1000;  // within a hundredth of the quantile of the normal law
-  const int whole = static_cast<int>(std::clamp(degrees, 1.0, kNormal));
+  const int whole = whole_degrees(degrees);
   double low = 0, high = 1;
   while (two_sided_tail(high, whole) > tail) low = high, high *= 2;
   for (int i = 0; i < 60; ++i) {
@@ -34,6 +40,13 @@ double student_quantile(double tail, double degrees) {
     (two_sided_tail(middle, whole) > tail ? low : high) = middle;
   }
   return high;
+}
+
+double student_quantile_95(double degrees) {
+  thread_local std::array<double, kNormal + 1> known{};
+  double& quantile = known[whole_degrees(degrees)];
+  if (quantile == 0) quantile = student_quantile(0.05, degrees);
+  return quantile;
 }
 
 }  // namespace isochron

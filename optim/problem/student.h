@@ -8,4 +8,7 @@ namespace isochron {
 /// 26.7.4.
 double student_quantile(double tail, double degrees);
 
+/// Of a tail of 0.05; a table of those asked for before, as long tables of estimates ask for few.
+double student_quantile_95(double degrees);
+
 }  // namespace isochron

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "optim/problem/heavy_tail.h"
+#include "optim/problem/student.h"
 #include "tests/optim/tiny_scene.h"
 
 namespace isochron {
@@ -21,6 +22,9 @@ TEST(Check, LimitIsStudentsQuantile) {
   EXPECT_NEAR(false_alarm_limit(5, 31, 0.25), 2.040, 5e-4);
   EXPECT_NEAR(false_alarm_limit(1, 30.9), 2.750, 5e-4);  // degrees are rounded down
   EXPECT_NEAR(false_alarm_limit(1, INFINITY), 2.576, 6e-3);
+  EXPECT_NEAR(student_quantile_95(7.5), 2.365, 5e-4);
+  EXPECT_NEAR(student_quantile_95(7.5), 2.365, 5e-4) << "from the table";
+  EXPECT_NEAR(student_quantile_95(1), 12.706, 5e-4);
 }
 
 TEST(Check, ExtrapolationIsExactForSixthDegree) {

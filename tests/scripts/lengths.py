@@ -1,4 +1,4 @@
-"""Which tests of a script run: with `--long` those marked so, which take five seconds of a processor and more, otherwise the others."""
+"""Which tests of a script run: with `--long` those marked so, which take some seconds of a processor, otherwise the others."""
 
 import sys
 import unittest

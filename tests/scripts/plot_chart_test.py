@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""scripts/plot_chart.py on tables such as `isochron chart` and `isochron stability` write, with every odd entry."""
+"""isochron.plot_chart on tables such as `isochron chart` and `isochron stability` write, with every odd entry."""
 
 import pathlib
 import sys
