@@ -154,7 +154,7 @@ INSTANTIATE_TEST_SUITE_P(
         DifferenceCase{"diffuse_truncated_ellipsoidal", Look::diffuse, GateShape::truncated_gaussian(0.3, 0.3),
                        Sampling::ellipsoidal, 32, 322},
         DifferenceCase{"diffuse_bins_standard", Look::diffuse, kBin, Sampling::standard, 57, 60},
-        DifferenceCase{"diffuse_bins_ellipsoidal", Look::diffuse, kBin, Sampling::ellipsoidal, 44, 92},
+        DifferenceCase{"diffuse_bins_ellipsoidal", Look::diffuse, kBin, Sampling::ellipsoidal, 80, 166},
         DifferenceCase{"diffuse_modulated_standard", Look::diffuse, GateShape::modulated(1.5), Sampling::standard, 120,
                        125},
         DifferenceCase{"glossy_gaussian_ellipsoidal", Look::glossy, GateShape::gaussian(0.3), Sampling::ellipsoidal, 30,
