@@ -206,6 +206,7 @@ void differentiate_path(const PreparedScene& scene, int pixel, const SurfacePoin
   g.assign(count, {});
   for (int k = 0; k + 1 < count; ++k) {
     const Vec3 d = x[k + 1].p - x[k].p;
+    if (k == 0 && !scene.captures() && dot(x[1].n, d) == 0) return;  // edge-on: no light of x1 reaches the pixel
     const double squared = length_squared(d);
     const double inverse = 1 / std::sqrt(squared);
     const Vec3 w = d * inverse;
