@@ -52,8 +52,9 @@ int derive(const DeriveCommand& command) {
   catch_interrupts();
   ProgressDisplay display(command.common.quiet);
   ProgressStage stage("rendering the derivatives", (block.count + group - 1) / group);
-  std::string table = "parameter,gate,component,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95" +
-                      gate_column_names(problem.experiment().gates) + "\n";
+  std::string table =
+      "parameter,gate,component,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95" +
+      gate_column_names(problem.experiment().gates) + "\n";
   HeavyTails tails;
   bool dark = true;  // every derivative is exactly zero
   for (int first = block.begin; first < block.begin + block.count; first += group) {
@@ -74,9 +75,9 @@ int derive(const DeriveCommand& command) {
       for (int g = 0; g < problem.gates().size(); ++g)
         for (const DerivativeEstimate& component : components) {
           const Statistics& s = component.gates[i];
-          table +=
-              fmt::format("{},{},{},{},{},{},{},{},{}{}\n", name, g, component.component, s.mean[g], s.standard_error[g],
-                          s.replicates, s.degrees[g], s.effective_count[g], s.half_width_95(g), gate_column_values(problem, g));
+          table += fmt::format("{},{},{},{},{},{},{},{},{}{}\n", name, g, component.component, s.mean[g],
+                               s.standard_error[g], s.replicates, s.degrees[g], s.effective_count[g],
+                               s.half_width_95(g), gate_column_values(problem, g));
           tails.add(name, g, s.effective_count[g]);
         }
     }

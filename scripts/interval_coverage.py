@@ -18,11 +18,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import yaml
 
+from error_coverage import NORMAL
 from reproduction.measure import ROOT, program
 from reproduction.tables import markdown, read_rows, run_action, write_rows
 
 DRAWS = 500
-NORMAL = 1.959964  # of the middle 95 % of a standard normal
 FEWEST_DEVIATIONS = 4  # below which the program warns (optim/problem/heavy_tail.h)
 COLUMNS = ("quantity", "draw", "mean", "standard_error", "effective_count", "half_width_95")
 CONTACT = {"name": "contact", "scene": str(ROOT / "tests/data/cornell/scene.yaml"), "max_bounces": 2,

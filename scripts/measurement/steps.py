@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from reproduction.catalogue import RECONSTRUCTIONS
 
 # What the numbers depend on: the version of a measurement is that of the last commit that changed any of these.
-SOURCES = ("CMakeLists.txt", "app/*.cpp", "app/*.h", "core", "optim", "scenes", "experiments/*.yaml", "tests/benchmark", "tests/data/cornell", ":!*.md")
+SOURCES = ("CMakeLists.txt", "app/*.cpp", "app/*.h", "core", "optim", "scenes", "experiments/*.yaml", "tests/benchmark",
+           "tests/data/cornell", ":!*.md")
 CHARTED = ("cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa")
 CHART_SECONDS = {"cube": 240, "bunny": 120}  # where the gradient has to stand out of much noise; 60 for the others
 BY_CHANCE = ("cube", "cube_standard")  # runs that noise alone can lead away, so that there are many of them

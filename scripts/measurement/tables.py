@@ -278,7 +278,8 @@ def checks(folder):
 
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, intervals, egg, checks)},
+                               growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, intervals, egg,
+                               checks)},
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),

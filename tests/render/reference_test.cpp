@@ -5,8 +5,8 @@
 // Statistics: 9 gates x 2 parameters x 5 rows per sampling, each a z-test at 4 standard errors of the difference
 // (ours and the reference's): false alarms 90 x 6e-5 = 0.6 % per sampling if all were independent; seeds are fixed.
 // The standard error must be below 4 % of the derivative's scale (the terms' root mean square over the gates; 6 % for
-// the ellipsoidal runs, which have fewer samples, 8 % without coupling; it is 0.5 to 0.7 of that), so that a flipped sign, a dropped term or a
-// factor of two in any term that matters fails.
+// the ellipsoidal runs, which have fewer samples, 8 % without coupling), so that a flipped sign, a dropped term or a
+// factor of two in any term that matters fails. It is 0.5 to 0.7 of that.
 #include <gtest/gtest.h>
 
 #include <fstream>

@@ -2,7 +2,10 @@
 
 import contextlib
 import io
+import runpy
 import subprocess
+import sys
+import unittest.mock
 
 
 def run_main(main, *arguments):
@@ -14,3 +17,12 @@ def run_main(main, *arguments):
         except SystemExit as end:
             status = end.code
     return subprocess.CompletedProcess([], status, out.getvalue(), messages.getvalue())
+
+
+def run_script(script, *arguments):
+    """The same of a script. Its folder has to be in sys.path."""
+    def main(words):
+        with unittest.mock.patch.object(sys, "argv", [str(script), *words]):
+            runpy.run_path(str(script), run_name="__main__")
+
+    return run_main(main, *arguments)

@@ -1,14 +1,14 @@
 #!/usr/bin/python3
-"""isochron.plot_chart on tables such as `isochron chart` and `isochron stability` write, with every odd entry."""
+"""scripts/plot_chart.py on tables such as `isochron chart` and `isochron stability` write, with every odd entry."""
 
 import pathlib
 import sys
 import tempfile
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "app/python"))
-from in_process import run_main
-from isochron import plot_chart
+SCRIPT = pathlib.Path(__file__).resolve().parents[2] / "scripts" / "plot_chart.py"
+sys.path.insert(0, str(SCRIPT.parent))
+from in_process import run_script
 
 CHART = """method,factor,repeats,core_seconds,error,variance,variance_error,bias2,bias2_error,components,unknowns
 reference,,32,10,0.02,0.0004,,,,1,1
@@ -44,7 +44,7 @@ class PlotChartTest(unittest.TestCase):
     def plot(self, **tables):
         for name, text in tables.items():
             (self.folder / f"{name}.csv").write_text(text)
-        return run_main(plot_chart.main, self.folder)
+        return run_script(SCRIPT, self.folder)
 
     def test_all_pictures(self):
         result = self.plot(chart=CHART, chart_table=TABLE, chart_solvers=SOLVERS, stability=STABILITY)

@@ -12,8 +12,7 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
 import scaling
-from in_process import run_main
-from reproduction.tables import run_action
+from in_process import run_script
 
 
 def rows(serial, shared):
@@ -70,7 +69,7 @@ class CommandTest(unittest.TestCase):
 
     def test_wrong_arguments_get_the_usage(self):
         for words in ([], ["draw", "a"], ["plot", "a"], ["measure"]):
-            done = run_main(lambda arguments: run_action(scaling.__doc__, arguments, scaling.measure, scaling.plot, scaling.page), *words)
+            done = run_script(ROOT / "scripts/scaling.py", *words)
             self.assertEqual((done.returncode, done.stderr), (2, scaling.__doc__.strip() + "\n"))
 
 
