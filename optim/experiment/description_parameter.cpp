@@ -232,6 +232,11 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
         "even size",
         {.unset = spec.remesh.coarse_levels == 1});
+    inner.value(
+        "skirt", field::non_negative(spec.remesh.skirt),
+        "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, for "
+        "bodies that turn out of sight there; 0: not",
+        {.unit = "scene units", .unset = spec.remesh.skirt == 0});
   };
   keys.map("remesh", remesh,
            "a run in levels: the surface that a level has found gets finer triangles for the next. One parameter may "

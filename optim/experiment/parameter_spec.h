@@ -41,6 +41,10 @@ struct RemeshSpec {
   int levels = 0;          ///< 0: the mesh stays as it is
   int coarse_levels = 1;   ///< so many have the first one's edge length, at most all
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
+  double skirt = 0;        ///< length of the strips behind borders, scene units, see with_skirt; 0: none
+
+  /// After which level borders get their strips: half of the coarse ones.
+  int skirt_after() const { return (coarse_levels + 1) / 2; }
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene

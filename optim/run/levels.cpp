@@ -76,10 +76,7 @@ class Levels {
       const Mesh loaded = mesh_of(load_scene(experiment_.scene), remeshed_.shape);
       for (int level = 1;; ++level) {
         const bool ready = file_exists(folder(level) + "/experiment.yaml");
-        if (!ready && !prepare(level, edge_length_of(level, remeshed_.remesh, loaded))) {
-          on_first_rank([&] { write_summary(false); });
-          break;
-        }
+        if (!ready) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
         status_ = run(level);
         const bool more =
             status_ != RunStatus::interrupted && status_ != RunStatus::diverged && level < remeshed_.remesh.levels;
@@ -108,8 +105,8 @@ class Levels {
     write_exr(file("target.exr"), problem.make_target(poll), exr_notes(experiment_.gates));
   }
 
-  /// Makes the level's folder. False where there is to be no such level.
-  bool prepare(int level, double edge_length) {
+  /// Makes the level's folder.
+  void prepare(int level, double edge_length) {
     Experiment next = experiment_;
     if (!next.target.measured()) next.target.images = file("target.exr");
     next.seed = seed_of(level, experiment_.seed);
@@ -122,8 +119,8 @@ class Levels {
       const std::vector<double> theta = first ? former.parameters().initial()
                                               : final_values(folder(level - 1) + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      if (!first && options_.next_level && !options_.next_level({level - 1, former, theta, edge_length}, *surface))
-        return false;
+      if (remeshed_.remesh.skirt > 0 && level - 1 == remeshed_.remesh.skirt_after())
+        surface = with_skirt(*surface, remeshed_.remesh.skirt, edge_length, former.scene().camera.position);
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
@@ -131,7 +128,6 @@ class Levels {
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
-    return true;
   }
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, int level,

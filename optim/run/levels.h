@@ -23,14 +23,6 @@
 
 namespace isochron {
 
-/// What a level found, for RunOptions::next_level.
-struct LevelResult {
-  int level;  ///< from 1
-  const Problem& problem;
-  const std::vector<double>& theta;
-  double next_edge_length;
-};
-
 /// Where the experiment asks for levels, throws InputError unless all of them can be made.
 void require_levels(const Problem& problem);
 

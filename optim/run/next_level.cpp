@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "optim/remesh/remesh.h"
+#include "optim/remesh/skirt.h"
 
 namespace isochron {
 namespace {
@@ -99,6 +100,15 @@ LevelSurface found_surface(const Problem& problem, const std::vector<double>& th
     }
   }
   return surface;
+}
+
+LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_length, const Vec3& eye) {
+  const Skirted skirted = with_skirt(surface.mesh, length, edge_length, eye);
+  LevelSurface result{skirted.mesh, surface.fields};
+  for (SurfaceField& field : result.fields)
+    for (const int v : skirted.origins)
+      for (int k = 0; k < field.columns; ++k) field.values.push_back(field.values[v * field.columns + k]);
+  return result;
 }
 
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {

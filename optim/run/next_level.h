@@ -34,6 +34,9 @@ struct LevelSurface {
 /// The surface of `remeshed` at theta, and all that the next level takes from its vertices.
 LevelSurface found_surface(const Problem& problem, const std::vector<double>& theta, const ParameterSpec& remeshed);
 
+/// The same with strips of that length behind its borders (with_skirt), which have the borders' values.
+LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_length, const Vec3& eye);
+
 /// The same in triangles of that size. Throws InputError where it is no manifold.
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length);
 

@@ -27,9 +27,6 @@ struct Progress {
   int level = 0, levels = 0;         ///< 0: the run is not one in levels
 };
 
-struct LevelResult;
-struct LevelSurface;
-
 struct RunOptions {
   std::string folder;
   bool force = false;  ///< overwrite a run that the folder holds (else it is moved aside)
@@ -45,9 +42,6 @@ struct RunOptions {
   /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends
   /// the run; Interrupted as `stop` does.
   std::function<void(const LogRow&, const std::vector<double>& theta, const Evaluation& now, bool closing)> row;
-  /// Of a run in levels (see levels.h), after each but the last, on all ranks: whether there is to be another. May change the
-  /// surface that it begins with. Depends on nothing but its arguments, as a resumed run asks again.
-  std::function<bool(const LevelResult&, LevelSurface&)> next_level;
   /// Whether standard errors of what was found are stated, and expected counts rendered until their noise does not decide the verdict; of
   /// a level that others follow they are not.
   bool errors = true;
