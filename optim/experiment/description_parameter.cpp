@@ -234,8 +234,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         {.unset = spec.remesh.coarse_levels == 1});
     inner.value(
         "skirt", field::non_negative(spec.remesh.skirt),
-        "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, for "
-        "bodies that turn out of sight there; 0: not",
+        "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, as "
+        "bodies "
+        "do that turn out of sight there. Dropped after a level if the data were explained as well without; 0: not",
         {.unit = "scene units", .unset = spec.remesh.skirt == 0});
   };
   keys.map("remesh", remesh,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <queue>
 #include <utility>
 
@@ -45,6 +46,47 @@ bool may_follow(const Corners& next, const Corners& before) {
   const Vec3 a = double_area(before), b = double_area(next);
   return dot(a, b) > kTurnCosine * length(a) * length(b) && shape(next) > std::min(kLeastShape, shape(before));
 }
+
+/// Where vertices are. On a surface that passes through itself, vertices of two parts can be drawn to one corner of a border, and
+/// readers take vertices at one position for one.
+class Places {
+ public:
+  explicit Places(double edge_length) : apart_(edge_length * kApart) {}
+
+  void add(const Vec3& p) { cells_.emplace(cell(p, 0), p); }
+  void remove(const Vec3& p) {
+    const auto [first, last] = cells_.equal_range(cell(p, 0));
+    const auto found =
+        std::find_if(first, last, [&](const auto& entry) { return length_squared(entry.second - p) == 0; });
+    cells_.erase(found);
+  }
+  bool taken(const Vec3& p) const {
+    const Cell low = cell(p, -apart_), high = cell(p, apart_);
+    for (Cell c = low; c[0] <= high[0]; ++c[0])
+      for (c[1] = low[1]; c[1] <= high[1]; ++c[1])
+        for (c[2] = low[2]; c[2] <= high[2]; ++c[2]) {
+          const auto [first, last] = cells_.equal_range(c);
+          if (std::any_of(first, last, [&](const auto& entry) { return length(entry.second - p) <= apart_; }))
+            return true;
+        }
+    return false;
+  }
+
+ private:
+  static constexpr double kApart = 0x1p-20;  // of an edge, far above rounding
+  using Cell = std::array<long long, 3>;
+
+  /// Large enough that a place mostly has all that is close to it in one.
+  Cell cell(const Vec3& p, double beside) const {
+    Cell result{};
+    for (int axis = 0; axis < 3; ++axis)
+      result[axis] = static_cast<long long>(std::floor((p[axis] + beside) / (64 * apart_)));
+    return result;
+  }
+
+  double apart_;
+  std::multimap<Cell, Vec3> cells_;
+};
 
 }  // namespace
 
@@ -141,15 +183,20 @@ void Operations::flip_towards_even_valences() {
 }
 
 void Operations::relax() {
+  Places places(length_);
+  for (const Vertex v : kernel_.vertices()) places.add(position(v));
   for (const Vertex v : kernel_.vertices()) {
     if (kernel_.status(v).feature()) continue;
     const auto try_at = [&](const Vec3& p) {
       const Vec3 there = origin(v, p).position;
-      const bool may = may_move(v, there, Vertex());
+      const bool may = may_move(v, there, Vertex()) && !places.taken(there);
       if (may) kernel_.set_point(v, to(there));
       return may;
     };
-    if (!try_at(middle_of_neighbours(v))) try_at(position(v));
+    const Vec3 before = position(v);
+    places.remove(before);
+    if (!try_at(middle_of_neighbours(v))) try_at(before);
+    places.add(position(v));
   }
 }
 

@@ -1,7 +1,8 @@
 // Strips behind the borders of a surface.
 //
 // Most borders that a sensor sees of a body are where it turns out of sight, and its surface goes on behind them. A sheet that ends
-// there moves its border only by what light its rim sends; with a strip behind it the outline is a bend within the surface.
+// there moves its border only by what light its rim sends; with a strip behind it the outline is a bend within the surface. Plates and
+// letters end where their borders are: there the data are explained better without.
 #pragma once
 #include <vector>
 

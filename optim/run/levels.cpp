@@ -78,8 +78,8 @@ class Levels {
         const bool ready = file_exists(folder(level) + "/experiment.yaml");
         if (!ready) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
         status_ = run(level);
-        const bool more =
-            status_ != RunStatus::interrupted && status_ != RunStatus::diverged && level < remeshed_.remesh.levels;
+        const bool can_go_on = status_ != RunStatus::diverged || former_of(level + 1) != level;
+        const bool more = status_ != RunStatus::interrupted && can_go_on && level < remeshed_.remesh.levels;
         on_first_rank([&] { publish(level, more); });
         if (!more) break;
       }
@@ -105,6 +105,20 @@ class Levels {
     write_exr(file("target.exr"), problem.make_target(poll), exr_notes(experiment_.gates));
   }
 
+  bool begins_with_skirt(int level) const {
+    const RemeshSpec& remesh = remeshed_.remesh;
+    return remesh.skirt > 0 && level - 1 == remesh.skirt_after() && level < remesh.levels;
+  }
+
+  /// The level that a further one begins with: the one before, but for strips behind borders without which the data were explained
+  /// as well.
+  int former_of(int level) const {
+    const auto loss = [this](int of) {
+      return number_or_nan(open_yaml(folder(of) + "/summary.yaml").map().require("loss_final"));
+    };
+    return begins_with_skirt(level - 1) && !(loss(level - 1) < loss(level - 2)) ? level - 2 : level - 1;
+  }
+
   /// Makes the level's folder.
   void prepare(int level, double edge_length) {
     Experiment next = experiment_;
@@ -115,27 +129,27 @@ class Levels {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
     } else {
       const bool first = level == 1;
-      const Problem former(first ? experiment_ : load_experiment(folder(level - 1) + "/experiment.yaml"));
-      const std::vector<double> theta = first ? former.parameters().initial()
-                                              : final_values(folder(level - 1) + "/summary.yaml", former.parameters());
+      const std::string before = first ? "" : folder(former_of(level));
+      const Problem former(first ? experiment_ : load_experiment(before + "/experiment.yaml"));
+      const std::vector<double> theta =
+          first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      if (remeshed_.remesh.skirt > 0 && level - 1 == remeshed_.remesh.skirt_after())
+      if (begins_with_skirt(level))
         surface = with_skirt(*surface, remeshed_.remesh.skirt, edge_length, former.scene().camera.position);
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
-      if (level > remeshed_.remesh.coarse_levels) follow_evidence(former, theta, level - 1, next.parameters);
+      if (level > remeshed_.remesh.coarse_levels) follow_evidence(former, theta, before, next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
   }
 
-  void follow_evidence(const Problem& former, const std::vector<double>& theta, int level,
+  void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
                        std::vector<ParameterSpec>& next) const {
     if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
     const ProgressStage stage("weighing the smoothing", 1);
-    const std::vector<double> factors =
-        evidence_factors(former, former.read_target(folder(level) + "/target.exr"), theta);
+    const std::vector<double> factors = evidence_factors(former, former.read_target(folder + "/target.exr"), theta);
     for (std::size_t i = 0; i < next.size(); ++i)
       (next[i].bending > 0 ? next[i].bending : next[i].slopes) *= factors[i];
   }

@@ -214,23 +214,26 @@ TEST_F(LevelsTest, EverythingIsCarriedOver) {
   EXPECT_EQ(next[3].scale, 2);
 }
 
-/// After one of two coarse levels; the second begins on the surface with its strips, which the third keeps. Nothing moves.
-TEST_F(LevelsTest, SkirtsComeAfterHalfOfTheCoarseLevels) {
-  write_target();
-  Experiment experiment = load_experiment(this->experiment(
-      "flat", "remesh: {levels: 3, coarse_levels: 2, edge_length: 0.4, skirt: 0.6}", "{images: hill.exr}"));
-  experiment.optimizer.iterations = 0;
-  EXPECT_EQ(start_run(experiment, options()), RunStatus::iterations_reached);
-  const auto depth = [&](const std::string& folder) {
-    double least = 0;
-    for (const Vec3& p : found(folder).positions) least = std::min(least, p.z);
-    return -least;
-  };
-  EXPECT_EQ(depth("out/levels/1"), 0);
-  const double corner = 0.6 * 3 / std::sqrt(9 + 2);  // where the way from the camera is the least steep
-  for (const char* folder : {"out/levels/2", "out/levels/3"}) {
-    EXPECT_GE(depth(folder), corner - 1e-6);
-    EXPECT_LT(depth(folder), 0.6);
+/// After one of two coarse levels: the second begins with strips behind the borders, and the third goes on with them or with the
+/// first. Nothing moves but by remeshing, which rounds the bend at a border: that makes a flat sheet more like a hill, and less like itself.
+TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
+  for (const std::string target : {"hill", "flat"}) {
+    const Problem problem(load_experiment(this->experiment(target, "target: 0", "{samples: 256}")));
+    write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+    Experiment experiment = load_experiment(this->experiment(
+        "flat", "remesh: {levels: 3, coarse_levels: 2, edge_length: 0.4, skirt: 0.6}", "{images: target.exr}"));
+    experiment.optimizer.iterations = 0;
+    EXPECT_EQ(start_run(experiment, options()), RunStatus::iterations_reached);
+    const auto depth = [&](int level) {
+      double least = 0;
+      for (const Vec3& p : found("out/levels/" + std::to_string(level)).positions) least = std::min(least, p.z);
+      return -least;
+    };
+    const double corner = 0.6 * 3 / std::sqrt(9 + 2);  // where the way from the camera is the least steep
+    EXPECT_EQ(depth(1), 0);
+    EXPECT_GE(depth(2), corner - 1e-6);
+    EXPECT_LT(depth(2), 0.6);
+    EXPECT_EQ(depth(3) > 0, target == "hill");
   }
 }
 

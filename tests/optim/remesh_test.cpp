@@ -237,6 +237,24 @@ TEST(Remesh, WhatPassesThroughItselfStaysThere) {
   EXPECT_GT(share_within(edge_lengths(result.mesh), 0.06, 0.15), 0.8);
 }
 
+/// Borders that cross, some of whose vertices are closest to corners of the other one's: readers would take two there for one.
+TEST(Remesh, NoTwoVerticesComeToOnePlace) {
+  for (const double shift : {0.01, 0.02, 0.03}) {
+    const auto sheet = [](double u, double v) {
+      const double x = 2 * u - 1, y = 2 * v - 1;
+      return Vec3{x * (1 + 0.2 * std::sin(9 * y)), y * (1 + 0.2 * std::sin(8 * x)), 0.001 * x};
+    };
+    Mesh old = grid(14, 14, false, sheet);
+    add(old, grid(12, 12, false, sheet), {shift, 0.7 * shift, 0.0003});
+    const Remeshed result = remesh(old, 0.17);
+    double least = 1;
+    for (std::size_t i = 0; i < result.mesh.positions.size(); ++i)
+      for (std::size_t k = 0; k < i; ++k)
+        least = std::min(least, length(result.mesh.positions[i] - result.mesh.positions[k]));
+    EXPECT_GT(least, 1e-9);
+  }
+}
+
 /// Of a sheet's border, and only there; away from a point in front of it.
 TEST(Skirt, GoesOnBehindTheBorder) {
   const Mesh old = grid(6, 4, false, [](double u, double v) { return Vec3{u, v, 1 + 0.1 * u * v}; });
