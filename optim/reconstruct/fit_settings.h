@@ -21,8 +21,7 @@ struct FitSettings {
   int levels = 1, coarse_levels = 1;
   double edge_length = 1;  ///< of the first level
   double skirt = 0;        ///< behind borders: most are where a body turns out of sight
-  double bending =
-      3;  ///< first weight: three nats per unit of curvature (a sphere has 50, the border of a disc 11)
+  double bending = 3;  ///< first weight: three nats per unit of curvature (a sphere has 50, the border of a disc 11)
   double motion = 0, albedo = 0;  ///< weights of slopes
   double gain = 1;
   bool background_per_point = false;
