@@ -8,8 +8,6 @@ import sys
 import tempfile
 import unittest
 
-import yaml
-
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
 os.environ["ISOCHRON_PROGRAM"] = sys.argv.pop(1)
