@@ -17,7 +17,8 @@ constexpr double kSamplesPerSecond = 7000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// Borders move by a part of their way in each level, as slopes hold offsets to its start. Silhouettes after one, two, four and six coarse
 /// levels: of two plates 0.85, 0.88 and 0.91 (not six), of the rabbit 0.84, 0.86, 0.87 and 0.875, where p rises from 3e-9 to 3e-7. The
-/// seventh is for the level in which skirts are tried: where they are dropped, it is lost. A second finer one changes the rabbit's errors by a hundredth. Metrics of more vertices take longer than rendering.
+/// seventh is for the level in which skirts are tried: where they are dropped, it is lost. A second finer one changes the rabbit's
+/// errors by a hundredth. Metrics of more vertices take longer than rendering.
 constexpr int kCoarseLevels = 7;
 constexpr double kMostVertices = 20000;
 /// In lateral resolutions. The rabbit's median, 80 % and silhouette with it 0.85 / 2.8 mm and 0.90, without 1.05 / 3.3 mm and 0.87.
