@@ -3,7 +3,9 @@
 import csv
 import os
 import pathlib
+import resource
 import subprocess
+import time
 from dataclasses import asdict, dataclass, fields
 
 import yaml
@@ -46,18 +48,25 @@ class Usage:
         return Usage(self.seconds + other.seconds, self.cpu_seconds + other.cpu_seconds, max(self.peak_mib, other.peak_mib))
 
 
+def children_cpu_seconds():
+    """User and system, of all children that have ended, to microseconds: `time` has hundredths, which small runs round to zero."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
 def program(*arguments, pictures=False):
     """Runs PROGRAM, with the pictures that it draws by other processes or without, and returns its Usage. A run that diverges fails,
-    but leaves its summary: that is a result. By way of `time`: a child of this process would begin with this one's memory as its
-    peak."""
+    but leaves its summary: that is a result. The peak of memory is told by `time`: a child of this process would begin with this
+    one's memory as its peak."""
     words = [*map(str, arguments), "--quiet", *([] if pictures else ["--no-plots"])]
-    result = subprocess.run(["/usr/bin/time", "--quiet", "--format", "%e %U %S %M", str(PROGRAM), *words], stderr=subprocess.PIPE,
-                            text=True, check=False)
-    complaint, _, used = result.stderr.rstrip().rpartition("\n")
+    start, cpu_before = time.perf_counter(), children_cpu_seconds()
+    result = subprocess.run(["/usr/bin/time", "--quiet", "--format", "%M", str(PROGRAM), *words], stderr=subprocess.PIPE, text=True,
+                            check=False)
+    wall, cpu = time.perf_counter() - start, children_cpu_seconds() - cpu_before
+    complaint, _, kibibytes = result.stderr.rstrip().rpartition("\n")
     if result.returncode != 0 and "the run diverged" not in complaint:
         raise Failure(f"isochron {' '.join(words)}: {complaint.strip() or f'status {result.returncode}'}")
-    wall, user, system, kibibytes = map(float, used.split())
-    return Usage(wall, user + system, kibibytes / 1024)
+    return Usage(wall, cpu, float(kibibytes) / 1024)
 
 
 def summary(folder):
