@@ -25,7 +25,7 @@ from isochron.captures import read_capture
 
 DRAWS = 50
 FIRST_SEED = 1000
-TRUE_SAMPLES = 16384
+TRUE_SAMPLES = 65536  # their noise is an error of the model: of hidden_s, 0.15 of the deviance's spread at a quarter of them
 LEVEL = 0.01  # below which a verdict is `unexplained`
 FIT = ("deviance", "degrees_of_freedom", "p_value", "verdict")
 COLUMNS = ("experiment", "draw", *FIT)

@@ -6,20 +6,13 @@
 #include "optim/problem/rendered_curvature.h"
 
 namespace isochron {
-namespace {
-
-/// Each knows the trace to a standard error of sqrt(2 rank).
-constexpr int kSamples = 2;
-
-}  // namespace
-
 std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
                                      const std::vector<double>& theta) {
   const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
   std::vector<double> factors(specs.size(), 1.0);
   const Poll poll = [] {};
   const RenderedCurvature curvature(problem, target, theta, poll);
-  const std::vector<std::vector<double>> samples = curvature.samples(kSamples);
+  const std::vector<std::vector<double>> samples = curvature.samples(kTraceSamples);
   const QuadraticPenalty& penalty = problem.penalty();
   for (std::size_t i = 0; i < specs.size(); ++i) {
     PenaltyScale scale = problem.penalty_scale(target);
@@ -28,9 +21,9 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
     const auto [value, rank] = penalty.share(block, theta, scale);
     if (!specs[i].evidence || rank < 1) continue;
     double trace = 0;
-    for (const std::vector<double>& sample : samples) trace += penalty.curved(block, sample, scale) / kSamples;
+    for (const std::vector<double>& sample : samples) trace += penalty.curved(block, sample, scale) / kTraceSamples;
     // What the samples' noise may hide counts as determined, so that the weight stays finite.
-    const double determined = std::max(rank - trace, std::sqrt(2 * rank / kSamples));
+    const double determined = std::max(rank - trace, std::sqrt(2 * rank / kTraceSamples));
     // A penalty below that of a single unknown's scatter, half of a logarithm's unit, is not distinguishable from none.
     factors[i] = determined * scale.priors / std::max(2 * value, scale.priors);
   }

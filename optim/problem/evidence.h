@@ -11,6 +11,9 @@
 
 namespace isochron {
 
+/// Samples of the posterior, each of which knows a trace to a standard error of sqrt(2 rank).
+inline constexpr int kTraceSamples = 2;
+
 /// By what the weight of each parameter's smoothing is to be multiplied, in the order of the blocks; 1 where the parameter has
 /// none or asks for no `evidence`. Of bending, or where there is none of slopes: slopes of a surface that bends are about its motion within a
 /// level, which is no property of it. At theta, where a fit to counts has come to rest. The same for any number of threads and ranks.

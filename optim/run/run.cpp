@@ -228,10 +228,11 @@ class Run {
     errors_ = together ? joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta)
                        : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
                                            curvature.gradients(), noise, blocks, names, theta);
-    if (!has_surface_errors(problem_)) return {};
-    const std::vector<std::vector<double>> samples = curvature.samples(kErrorSamples);
+    const bool surfaces = has_surface_errors(problem_);
+    if (differences || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty()))) return {};
+    const std::vector<std::vector<double>> samples = curvature.samples(surfaces ? kErrorSamples : kTraceSamples);
     determined_ = determined_unknowns(problem_, target_, free_unknowns(problem_, theta), samples);
-    return surface_errors(problem_, samples, theta, noise.scale);
+    return surfaces ? surface_errors(problem_, samples, theta, noise.scale) : std::vector<double>{};
   }
 
   /// What the final parameters make of the counts, with far less noise than an iteration's image.
@@ -275,7 +276,7 @@ class Run {
   double target_seconds_ = 0;
   LogRow last_;
   ParameterErrors errors_;
-  std::optional<double> determined_;  ///< of the unknowns, where a prior holds surfaces
+  std::optional<double> determined_;  ///< of the unknowns, where penalties hold some
   std::optional<GoodnessOfFit> fit_;  ///< of counts
   std::string zero_gradients_;        ///< for the screen
 };

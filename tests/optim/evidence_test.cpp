@@ -190,6 +190,20 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
   EXPECT_GT(determined, 1.5 * (4 * std::sqrt(2 * left / kSamples) + 0.05 * left)) << "zero would do";
 }
 
+/// What the fit took from the deviance are the unknowns that the counts determine, not those that smoothing holds, here 15 to 70 of 81 (see
+/// above). Two samples know that to a standard error of sqrt(2 x 70 / 2) = 8.
+TEST_F(Painted, UnknownsThatSmoothingHoldsTakeNoDegreesOfFreedom) {
+  RunOptions options;
+  options.folder = folder_.file("out");
+  start_run(load_experiment(experiment_), options);
+  const std::string summary = folder_.read("out/summary.yaml"), key = "degrees_of_freedom: ";
+  const std::size_t at = summary.find(key);
+  ASSERT_NE(at, std::string::npos);
+  const double unknowns = 60.0 * kSide * kSide - std::stod(summary.substr(at + key.size()));
+  EXPECT_GT(unknowns, 4);
+  EXPECT_LT(unknowns, 75);
+}
+
 /// From a weight a hundred times too small, and one as much too large, to the same one, and to about that of the truth's own
 /// slopes, which is known as well as so many numbers that the data determine tell a variance. The images' noise makes what is found
 /// rougher: with 4096 samples 0.49 to 0.64 of the truth's weight at four seeds, 0.1 of a logarithm apart; with 512 about a third,
