@@ -241,12 +241,22 @@ class Levels {
             summary.require("status").text()};
   }
 
+  /// What became of the strips that the level began with; nothing where it had none, or where no level has followed.
+  std::string skirt_of(int level) const {
+    if (!begins_with_skirt(level) || level >= std::ssize(levels_)) return {};
+    return former_of(level + 1) == level ? "kept" : "dropped";
+  }
+
   std::string levels_yaml() const {
     std::string text = "levels:\n";
-    for (const Level& level : levels_)
-      text += fmt::format("  - {{edge_length: {}, vertices: {}, iterations: {}, loss: {}, seconds: {}, status: {}}}\n",
-                          level.edge_length, level.vertices, level.iterations,
-                          std::isnan(level.loss) ? "null" : exact(level.loss), level.seconds, level.status);
+    int number = 0;
+    for (const Level& level : levels_) {
+      const std::string skirt = skirt_of(++number);
+      text += fmt::format(
+          "  - {{edge_length: {}, vertices: {}, iterations: {}, loss: {}, seconds: {}, status: {}{}}}\n",
+          level.edge_length, level.vertices, level.iterations, std::isnan(level.loss) ? "null" : exact(level.loss),
+          level.seconds, level.status, skirt.empty() ? "" : ", skirt: " + skirt);
+    }
     return text;
   }
 
@@ -255,9 +265,12 @@ class Levels {
     std::string text = fmt::format("  {:>5}  {:>11}  {:>8}  {:>10}  {:>10}  {:>8}\n", "level", "edge length",
                                    "vertices", "iterations", "loss", "seconds");
     int number = 0;
-    for (const Level& level : levels_)
-      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}\n", ++number, level.edge_length,
-                          level.vertices, level.iterations, level.loss, level.seconds);
+    for (const Level& level : levels_) {
+      const std::string skirt = skirt_of(++number);
+      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}{}\n", number, level.edge_length,
+                          level.vertices, level.iterations, level.loss, level.seconds,
+                          skirt.empty() ? "" : "  skirt " + skirt);
+    }
     return text;
   }
 

@@ -234,6 +234,12 @@ TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
     EXPECT_GE(depth(2), corner - 1e-6);
     EXPECT_LT(depth(2), 0.6);
     EXPECT_EQ(depth(3) > 0, target == "hill");
+    const std::string summary = folder_.read("out/summary.yaml");
+    const std::size_t second = summary.find("\n  - ", summary.find("levels:\n") + 10),
+                      third = summary.find('\n', second + 1);
+    EXPECT_TRUE(summary.substr(0, third).ends_with(target == "hill" ? ", skirt: kept}" : ", skirt: dropped}"))
+        << summary;
+    EXPECT_EQ(summary.find("skirt", third), std::string::npos);
   }
 }
 
