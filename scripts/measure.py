@@ -12,7 +12,7 @@ import sys
 import time
 
 from measurement import page, record
-from measurement.steps import STEPS, egg
+from measurement.steps import STEPS, egg, hidden_s
 from reproduction.measure import ROOT
 
 
@@ -24,7 +24,8 @@ def parse(arguments):
     parser.add_argument("--list", action="store_true", help="the steps, with the version that each was measured with")
     parser.add_argument("--page", action="store_true", help="writes the pages alone, from the tables as they are")
     options = parser.parse_args(arguments)
-    options.known = STEPS | (egg(options.egg) if options.egg else {})
+    has_capture = (ROOT / "scenes/hidden_s/capture.h5").exists()
+    options.known = STEPS | (hidden_s() if has_capture else {}) | (egg(options.egg) if options.egg else {})
     for pattern in options.steps:
         if not fnmatch.filter(options.known, pattern):
             parser.error(f"there is no step {pattern} (scripts/measure --list)")

@@ -8,6 +8,7 @@ import numpy as np
 import capture_cost
 import cube_cost
 import error_coverage
+import fit_probabilities
 import interval_coverage
 import public_scene
 from reproduction.tables import markdown, read_rows
@@ -261,6 +262,10 @@ def stated_errors(folder):
     return error_coverage.tables_of(read_rows(folder / "error_coverage.csv"))
 
 
+def fit_probabilities_of(folder):
+    return fit_probabilities.tables_of(read_rows(folder / "fit_probabilities.csv"))
+
+
 def intervals(folder):
     return interval_coverage.table_of(read_rows(folder / "interval_coverage.csv"))
 
@@ -280,6 +285,7 @@ TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
                                growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, intervals, egg,
                                checks)},
+    "fit probabilities": fit_probabilities_of,
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),
