@@ -35,6 +35,8 @@ struct Level {
   long long iterations = 0;
   double loss = 0, seconds = 0;
   std::string status;
+  std::string
+      skirt;  ///< what became of the strips that it began with; empty where it had none, or no level has followed
 };
 
 /// Of the first level, 1, what the experiment says, or else what the mesh has; of those after the coarse ones half of the one before.
@@ -190,6 +192,7 @@ class Levels {
   /// Brings what the level has to DIR, the summary last. `more`: it may not be the last.
   void publish(int level, bool more) {
     levels_.push_back(found_level(level));
+    if (begins_with_skirt(level - 1)) levels_[level - 2].skirt = former_of(level) == level - 1 ? "kept" : "dropped";
     const std::string from = folder(level);
     if (status_ != RunStatus::interrupted) {
       if (level == 1) copy(from, {"initial.exr"}, "initial_");
@@ -238,25 +241,17 @@ class Levels {
             summary.require("iterations").integer(0, kMostIterations),
             number_or_nan(summary.require("loss_final")),
             summary.require("seconds").number(),
-            summary.require("status").text()};
-  }
-
-  /// What became of the strips that the level began with; nothing where it had none, or where no level has followed.
-  std::string skirt_of(int level) const {
-    if (!begins_with_skirt(level) || level >= std::ssize(levels_)) return {};
-    return former_of(level + 1) == level ? "kept" : "dropped";
+            summary.require("status").text(),
+            {}};
   }
 
   std::string levels_yaml() const {
     std::string text = "levels:\n";
-    int number = 0;
-    for (const Level& level : levels_) {
-      const std::string skirt = skirt_of(++number);
+    for (const Level& level : levels_)
       text += fmt::format(
           "  - {{edge_length: {}, vertices: {}, iterations: {}, loss: {}, seconds: {}, status: {}{}}}\n",
           level.edge_length, level.vertices, level.iterations, std::isnan(level.loss) ? "null" : exact(level.loss),
-          level.seconds, level.status, skirt.empty() ? "" : ", skirt: " + skirt);
-    }
+          level.seconds, level.status, level.skirt.empty() ? "" : ", skirt: " + level.skirt);
     return text;
   }
 
@@ -265,12 +260,10 @@ class Levels {
     std::string text = fmt::format("  {:>5}  {:>11}  {:>8}  {:>10}  {:>10}  {:>8}\n", "level", "edge length",
                                    "vertices", "iterations", "loss", "seconds");
     int number = 0;
-    for (const Level& level : levels_) {
-      const std::string skirt = skirt_of(++number);
-      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}{}\n", number, level.edge_length,
+    for (const Level& level : levels_)
+      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}{}\n", ++number, level.edge_length,
                           level.vertices, level.iterations, level.loss, level.seconds,
-                          skirt.empty() ? "" : "  skirt " + skirt);
-    }
+                          level.skirt.empty() ? "" : "  skirt " + level.skirt);
     return text;
   }
 
