@@ -53,9 +53,7 @@ struct PointLight {
     return Frame(direction).to_world({sine * phi.cosine, sine * phi.sine, cosine});
   }
   /// Its density per solid angle.
-  double direction_pdf(const Vec3& w) const {
-    return dot(w, direction) >= 1 - spread() ? 1 / (2 * kPi * spread()) : 0;
-  }
+  double direction_pdf(const Vec3& w) const { return dot(w, direction) >= 1 - spread() ? 1 / (2 * kPi * spread()) : 0; }
   /// What it is picked by, comparable to area x radiance of a shape.
   double power() const {
     if (kind == Kind::wall) return 1;
