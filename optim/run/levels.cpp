@@ -35,8 +35,7 @@ struct Level {
   long long iterations = 0;
   double loss = 0, seconds = 0;
   std::string status;
-  std::string
-      skirt;  ///< what became of the strips that it began with; empty where it had none, or no level has followed
+  std::string skirt;  ///< it began with: kept or dropped; empty where it had none, or no level has followed
 };
 
 /// Of the first level, 1, what the experiment says, or else what the mesh has; of those after the coarse ones half of the one before.
