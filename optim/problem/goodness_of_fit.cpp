@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "optim/problem/count_deviance.h"
+#include "optim/problem/likely_backgrounds.h"
 
 namespace isochron {
 namespace {
@@ -147,32 +148,6 @@ class Judge {
   double unknowns_ = 0;
 };
 
-/// The model without light: each unknown background is the mean of its readings.
-SplitImage background_alone(const CountModel& model, const GatedImage& counts, const Readings& readings,
-                            std::vector<double>& background) {
-  std::vector<double> sum, count;
-  const auto unknown = [&](int pixel) {
-    return model.background_unknown.empty() ? -1 : model.background_unknown[pixel];
-  };
-  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
-    for_each_reading(counts, readings, pixel, [&](std::size_t i) {
-      const int b = unknown(pixel);
-      if (b < 0) return;
-      sum.resize(std::max<std::size_t>(sum.size(), b + 1));
-      count.resize(sum.size());
-      sum[b] += counts.data[i];
-      ++count[b];
-    });
-  background = model.background;
-  SplitImage image{counts, {}, 1};
-  for (int pixel = 0; pixel < counts.pixels(); ++pixel) {
-    const int b = unknown(pixel);
-    if (b >= 0 && b < std::ssize(sum) && count[b] > 0) background[pixel] = sum[b] / count[b];
-    for_each_reading(counts, readings, pixel, [&](std::size_t i) { image.image.data[i] = background[pixel]; });
-  }
-  return image;
-}
-
 }  // namespace
 
 bool are_whole_numbers(const GatedImage& counts, const Readings& readings) {
@@ -210,12 +185,20 @@ FitVerdict GoodnessOfFit::verdict() const {
 
 GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss) {
   GoodnessOfFit result;
-  result.fit = test_deviance(model, counts, loss);
+  SplitImage image = *model.image;
+  CountModel lit = model;
+  lit.image = &image;
+  take_likely_backgrounds(lit, image, counts, loss);
+  result.fit = test_deviance(lit, counts, loss);
   CountModel dark = model;
   dark.other_unknowns = 0;
   dark.background_free.assign(model.background_free.size(), 1);
-  const SplitImage image = background_alone(model, counts, loss.readings, dark.background);
+  image.difference.data.clear();
+  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
+    for_each_reading(counts, loss.readings, pixel,
+                     [&](std::size_t i) { image.image.data[i] = model.background[pixel]; });
   dark.image = &image;
+  take_likely_backgrounds(dark, image, counts, loss);
   result.background = test_deviance(dark, counts, loss);
   const double k = std::max(1.0, model.other_unknowns);
   result.light_p_value =

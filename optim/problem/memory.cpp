@@ -150,11 +150,11 @@ std::vector<MemoryUse> difference_memory(const Problem& problem, int images) {
 std::vector<MemoryUse> run_memory(const Problem& problem) {
   const Experiment& experiment = problem.experiment();
   const double image = image_bytes(problem), unknowns = problem.parameters().size();
-  std::vector<MemoryUse> parts = {{"images, their mean and their file", 4.5 * image}};
+  std::vector<MemoryUse> parts = {{"images, their mean and their file", 4.5 * image},
+                                  {"target, residual and adjoint images", 3 * image}};
   if (!shares_one_image(problem))
     parts.push_back({"images of work partitions",
                      partial_bytes(problem, std::max(experiment.samples.primal, experiment.target.samples))});
-  parts.push_back({"target, residual and adjoint images", 3 * image});
   const OptimizerMethod method = experiment.optimizer.method;
   if (method == OptimizerMethod::quasi_newton) parts.push_back({"images of a line search", 3 * image});
   if (method != OptimizerMethod::levenberg_marquardt) {
