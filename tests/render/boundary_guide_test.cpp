@@ -238,9 +238,10 @@ TEST_P(Guided, MeansAgreeWithUnguidedOnes) {
             << " +- " << guided.standard_error;
       }
   }
-  // For the same work. Of four seeds: 0.67 to 0.70 (standard), 0.79 to 1.12 (ellipsoidal, mean 0.94, standard error 0.07). The
-  // limits are four standard errors above these means.
-  EXPECT_LT(scatter[1], (narrow ? 1.2 : 0.72) * scatter[0]);
+  // For the same work. Of four seeds: 0.67 to 0.70 (standard; their sum under other test seeds 0.69 to 0.73), 0.79 to 1.12 (ellipsoidal,
+  // mean 0.94, standard error 0.07). A guide that does nothing has 1: the first limit lies half way to it, the other, which only
+  // forbids harm, four standard errors above the mean.
+  EXPECT_LT(scatter[1], (narrow ? 1.2 : 0.84) * scatter[0]);
 }
 
 INSTANTIATE_TEST_SUITE_P(, Guided, ::testing::Values(Sampling::standard, Sampling::ellipsoidal), [](const auto& test) {

@@ -16,8 +16,6 @@ namespace {
 
 constexpr int kReplicates = 32;
 constexpr double kStandardErrors = 6;
-/// A standard error from so few replicates comes out larger than it is by more than this in 2 of a million cases (chi^2).
-constexpr double kScatterOfErrors = 1.6;
 
 /// How far each unknown is from where the scene has it.
 struct Offsets {
@@ -147,7 +145,7 @@ void expect_means(const Means& m, const std::vector<double>& expected, double re
   for (std::size_t g = 0; g < expected.size(); ++g) {
     EXPECT_NEAR(m.mean[g], expected[g], kStandardErrors * m.error[g] + reference_error * scale)
         << what << ", gate " << g;
-    EXPECT_LT(m.error[g], kScatterOfErrors * precision * scale) << what << ", gate " << g;
+    EXPECT_LT(m.error[g], scatter_of_errors(kReplicates) * precision * scale) << what << ", gate " << g;
   }
 }
 

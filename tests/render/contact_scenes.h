@@ -125,7 +125,7 @@ inline std::vector<ContactCase> cases() {
       ContactCase{"slides_gated", [] { return with_box(); }, slide, true, Sampling::standard, 64},
       ContactCase{"slides_ellipsoidal", [] { return with_box(); }, slide, true, Sampling::ellipsoidal, 64},
       ContactCase{"turns", [] { return with_box(); }, turn, false, Sampling::standard, 128, 0.07},
-      ContactCase{"turns_ellipsoidal", [] { return with_box(); }, turn, true, Sampling::ellipsoidal, 96, 0.15},
+      ContactCase{"turns_ellipsoidal", [] { return with_box(); }, turn, true, Sampling::ellipsoidal, 192, 0.12},
       ContactCase{"grows", [] { return with_box(); }, grow, false, Sampling::standard, 64},
       ContactCase{"shears", [] { return with_box(); }, shear, false, Sampling::standard, 256, 0.14},
       ContactCase{"glossy", [] { return with_box(conductor(Rgb(0.8), 0.2)); }, slide, false, Sampling::standard, 64},

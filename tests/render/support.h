@@ -127,6 +127,14 @@ class Batches {
   double mean_ = 0, squares_ = 0;
 };
 
+/// By how much a standard error of so many normal replicates comes out too large, once in 10 000 cases: the root of chi^2 over its
+/// degrees of freedom (Wilson and Hilferty). Limits on errors are limits on the true ones, times this.
+inline double scatter_of_errors(int replicates) {
+  constexpr double kQuantile = 3.719;  // of the normal law
+  const double v = 2.0 / (9 * (replicates - 1));
+  return std::pow(1 - v + kQuantile * std::sqrt(v), 1.5);
+}
+
 /// z-score of the difference of two independent estimates.
 inline double z_score(const Estimate& a, const Estimate& b) {
   const double error = std::hypot(a.standard_error, b.standard_error);

@@ -23,8 +23,8 @@ QUICK = {
     "corridor": (32768, 2),
     "cube": (256, 16),
     "figure1": (2048, 16),
-    "height_field": (512, 8),
-    "height_field_steady": (512, 8),
+    "height_field": (2048, 8),
+    "height_field_steady": (8192, 8),
     "tree": (8192, 16),
 }
 
