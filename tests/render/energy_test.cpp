@@ -136,7 +136,7 @@ TEST_P(ClosedForm, EmitterSeenDirectly) {
         EXPECT_NEAR(e.mean, expected, kLimit * e.standard_error + 1e-3 * expected)
             << "sampling " << static_cast<int>(sampling) << " pixel " << pixel << " gate " << g;
         if (expected > 0.1) {
-          EXPECT_LT(e.standard_error, 0.05 * (expected + 1));
+          EXPECT_LT(e.standard_error, scatter_of_errors(kEnergyBatches) * 0.05 * (expected + 1));
         }
         if (gate.kind == PlainGate::steady) {
           EXPECT_NEAR(e.mean, radiance.r, 1e-12);
@@ -215,7 +215,7 @@ TEST_P(ClosedForm, DirectLightOnAFloor) {
       ASSERT_NEAR(coarse, expected, 1e-3 * expected) << "the quadrature itself";
       EXPECT_NEAR(means[g].mean, expected, kLimit * means[g].standard_error + 1e-3 * expected) << "gate " << g;
       EXPECT_GT(expected, 0.01);
-      EXPECT_LT(means[g].standard_error, 8e-3 * expected) << "gate " << g;
+      EXPECT_LT(means[g].standard_error, scatter_of_errors(kEnergyBatches) * 8e-3 * expected) << "gate " << g;
     }
   }
 }
@@ -254,7 +254,8 @@ TEST(Furnace, EveryBounceAddsItsPower) {
       const Stream stream{static_cast<std::uint64_t>(12 + bounces), 0, 0};
       const Estimate e = image_means(renderer, 1, run.samples, kEnergyBatches, stream)[0];
       EXPECT_NEAR(e.mean, expected * run.weight, kLimit * e.standard_error + 1e-12) << bounces << " bounces";
-      EXPECT_LT(e.standard_error, run.error * expected * run.weight) << bounces << " bounces";
+      EXPECT_LT(e.standard_error, scatter_of_errors(kEnergyBatches) * run.error * expected * run.weight)
+          << bounces << " bounces";
       // The last bounce alone: nothing beyond it arrives, nothing short of it is missing.
       const double last = power * run.weight, error = std::hypot(e.standard_error, previous.standard_error);
       EXPECT_NEAR(e.mean - previous.mean, last, kLimit * error + 1e-12);
@@ -272,7 +273,7 @@ TEST(Furnace, RouletteKeepsTheMean) {
   const Renderer renderer(scene, steady, {.max_bounces = 12});
   const Estimate e = image_means(renderer, 1, 200, kEnergyBatches, {16, 0, 0})[0];
   EXPECT_NEAR(e.mean, (1 - std::pow(albedo, 13)) / (1 - albedo), kLimit * e.standard_error);
-  EXPECT_LT(e.standard_error, 2e-3);
+  EXPECT_LT(e.standard_error, scatter_of_errors(kEnergyBatches) * 2e-3);
 }
 
 class Agreement : public ::testing::TestWithParam<std::tuple<bool, int>> {};
@@ -319,7 +320,8 @@ TEST_P(Agreement, OfStandardAndEllipsoidalPerBlock) {
     for (const auto& r : results) {
       const Estimate& whole = r[blocks * gates.size() + g];
       EXPECT_GT(whole.mean, 0);
-      EXPECT_LT(whole.standard_error, 0.03 * whole.mean) << "too noisy to tell, gate " << g;
+      EXPECT_LT(whole.standard_error, scatter_of_errors(kEnergyBatches) * 0.03 * whole.mean)
+          << "too noisy to tell, gate " << g;
     }
 }
 

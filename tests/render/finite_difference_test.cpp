@@ -136,9 +136,10 @@ TEST_P(FiniteDifference, TotalDerivative) {
       EXPECT_LT(std::abs(z_score(total, difference[g])), 4)
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
-      EXPECT_LT(total.standard_error, parameters[p].own_slack * limit / std::sqrt(factor) * scale)
+      EXPECT_LT(total.standard_error,
+                scatter_of_errors(kBatches) * parameters[p].own_slack * limit / std::sqrt(factor) * scale)
           << parameters[p].name << ", gate " << g;
-      EXPECT_LT(error, parameters[p].slack * limit / std::sqrt(factor) * scale)
+      EXPECT_LT(error, scatter_of_errors(kBatches) * parameters[p].slack * limit / std::sqrt(factor) * scale)
           << parameters[p].name << ", gate " << g << ": ours " << total.standard_error << ", finite difference "
           << difference[g].standard_error;
     }

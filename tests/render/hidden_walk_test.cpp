@@ -36,8 +36,8 @@ TEST_P(HiddenWalk, LeavesDerivativesUnbiased) {
       EXPECT_LT(std::abs(z_score(a, b)), 4.5)
           << "motion " << m << " gate " << g << ": " << a.mean << " +- " << a.standard_error << ", without " << b.mean
           << " +- " << b.standard_error;
-      EXPECT_LT(a.standard_error, 0.03 * scale) << "motion " << m << " gate " << g;
-      EXPECT_LT(b.standard_error, 0.03 * scale) << "motion " << m << " gate " << g;
+      EXPECT_LT(a.standard_error, scatter_of_errors(kBatches) * 0.03 * scale) << "motion " << m << " gate " << g;
+      EXPECT_LT(b.standard_error, scatter_of_errors(kBatches) * 0.03 * scale) << "motion " << m << " gate " << g;
     }
   }
 }
@@ -99,7 +99,8 @@ TEST(HiddenGeometry, LeavesCapturesUnbiased) {
         EXPECT_LT(std::abs(z_score(a, b)), 4.5)
             << what << (named ? ", board named" : "") << ": " << a.mean << " +- " << a.standard_error << ", without "
             << b.mean << " +- " << b.standard_error;
-        EXPECT_LT(std::hypot(a.standard_error, b.standard_error), 0.03 * std::abs(b.mean)) << what;
+        EXPECT_LT(std::hypot(a.standard_error, b.standard_error), scatter_of_errors(kBatches) * 0.03 * std::abs(b.mean))
+            << what;
       };
       for (int g = 0; g < 2; ++g) {
         compare(image[g], expected_image[g], "image");

@@ -43,7 +43,8 @@ void expect_equal_images(const Scene& scene, const GateSet& gates, const Estimat
     EXPECT_LT(std::abs(z_score(found[g], expected[g])), 4.5)
         << "gate " << g << ": " << found[g].mean << " +- " << found[g].standard_error << ", standard "
         << expected[g].mean << " +- " << expected[g].standard_error;
-    EXPECT_LT(std::hypot(found[g].standard_error, expected[g].standard_error), 0.01 * expected[g].mean);
+    EXPECT_LT(std::hypot(found[g].standard_error, expected[g].standard_error),
+              scatter_of_errors(kBatches) * 0.01 * expected[g].mean);
   }
 }
 
@@ -74,7 +75,8 @@ TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
             << ::isochron::name(term) << " motion " << m << " gate " << g << ": " << found[m][g].mean << " +- "
             << found[m][g].standard_error << ", without " << expected[m][g].mean << " +- "
             << expected[m][g].standard_error;
-        EXPECT_LE(std::hypot(found[m][g].standard_error, expected[m][g].standard_error), (m < 2 ? 0.02 : 0.1) * scale)
+        EXPECT_LE(std::hypot(found[m][g].standard_error, expected[m][g].standard_error),
+                  scatter_of_errors(kBatches) * (m < 2 ? 0.02 : 0.1) * scale)
             << ::isochron::name(term) << " motion " << m << " gate " << g;
       }
     }

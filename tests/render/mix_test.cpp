@@ -44,7 +44,7 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
   const auto image = image_means(ours, 2, 40, kBatches, {42, 0, 0});
   for (int g = 0; g < 2; ++g) {
     EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5) << image[g].mean << ", standard " << expected[g].mean;
-    EXPECT_LT(image[g].standard_error, 0.005 * expected[g].mean);
+    EXPECT_LT(image[g].standard_error, scatter_of_errors(kBatches) * 0.005 * expected[g].mean);
   }
   // Term by term: the gate's slope is part of the interior term, its jumps are the path length's, however they are sampled.
   const bool smooth = GetParam().shape.kind() == GateKind::gaussian;
@@ -67,7 +67,8 @@ TEST_P(Combined, GivesWhatStandardSamplingGives) {
         error = std::hypot(error, a.standard_error);
       }
       const double of_block = smooth ? 0.08 : 0.15;
-      EXPECT_LT(error, (m == 0 ? of_block : 0.005) * scale) << "motion " << m << " gate " << g;
+      EXPECT_LT(error, scatter_of_errors(kBatches) * (m == 0 ? of_block : 0.005) * scale)
+          << "motion " << m << " gate " << g;
     }
   }
 }
@@ -98,7 +99,7 @@ TEST(ArcPick, UniformHasTheSameMean) {
   for (int g = 0; g < 2; ++g) {
     EXPECT_LT(std::abs(z_score(image[g], expected[g])), 4.5)
         << image[g].mean << ", by contribution " << expected[g].mean;
-    EXPECT_LT(image[g].standard_error, 0.04 * expected[g].mean);
+    EXPECT_LT(image[g].standard_error, scatter_of_errors(kBatches) * 0.04 * expected[g].mean);
   }
   for (const Term term : {Term::interior, Term::path_length}) {
     const auto exact = term_means(by_contribution, term, 1, 2, 12, kBatches, {63, 0, 0})[0];
@@ -107,7 +108,8 @@ TEST(ArcPick, UniformHasTheSameMean) {
     for (int g = 0; g < 2; ++g) {
       EXPECT_LT(std::abs(z_score(derivative[g], exact[g])), 4.5)
           << name(term) << " gate " << g << ": " << derivative[g].mean << ", by contribution " << exact[g].mean;
-      EXPECT_LT(derivative[g].standard_error, 0.03 * scale) << name(term) << " gate " << g;
+      EXPECT_LT(derivative[g].standard_error, scatter_of_errors(kBatches) * 0.03 * scale)
+          << name(term) << " gate " << g;
     }
   }
 }

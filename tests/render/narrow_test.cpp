@@ -148,7 +148,7 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
   const auto image = image_means(renderer, 2, samples, batches, {11, 0, 0});
   for (int g = 0; g < 2; ++g) {
     const double exact = pixel_value(c.gate, gates.center(g), {});
-    EXPECT_LT(image[g].standard_error, 0.02 * exact);
+    EXPECT_LT(image[g].standard_error, scatter_of_errors(batches) * 0.02 * exact);
     EXPECT_LT(std::abs(image[g].mean - exact), 4.5 * image[g].standard_error) << "gate " << g << ": " << exact;
   }
   std::vector<std::vector<Estimate>> terms[3];
@@ -170,7 +170,7 @@ TEST_P(NarrowFieldOfView, MatchesQuadrature) {
         error = std::hypot(error, term[m][g].standard_error);
         scale = std::hypot(scale, term[m][g].mean);
       }
-      EXPECT_LT(error, 0.03 * scale) << "motion " << m << " gate " << g;
+      EXPECT_LT(error, scatter_of_errors(batches) * 0.03 * scale) << "motion " << m << " gate " << g;
       EXPECT_LT(std::abs(total - exact), 4.5 * error)
           << "motion " << m << " gate " << g << ": " << total << " +- " << error << ", exact " << exact;
     }

@@ -97,9 +97,10 @@ TEST_P(Reference, EveryTerm) {
       agrees("path_length", length, row.at("path_length"));
       const Estimate total = sum(sum(in, vis), length);
       agrees("total", total, row.at("total"));
-      EXPECT_LT(total.standard_error, (standard       ? 0.04
-                                       : c.antithetic ? 0.06
-                                                      : 0.08) *
+      EXPECT_LT(total.standard_error, scatter_of_errors(kBatches) *
+                                          (standard       ? 0.04
+                                           : c.antithetic ? 0.06
+                                                          : 0.08) *
                                           scale)
           << c.names[g] << " parameter " << p;
     }

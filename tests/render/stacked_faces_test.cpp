@@ -56,7 +56,7 @@ void expect_mean(const Scene& scene, double albedo, const char* name) {
       EXPECT_LT(std::abs(mean.mean - expected), 4.5 * mean.standard_error + 1e-6)
           << name << (narrow ? ", narrow" : ", steady") << ", sampling " << static_cast<int>(sampling) << ": "
           << mean.mean << " +- " << mean.standard_error << ", expected " << expected;
-      EXPECT_LT(mean.standard_error, (noisy ? 0.03 : 0.005) * expected);
+      EXPECT_LT(mean.standard_error, scatter_of_errors(16) * (noisy ? 0.03 : 0.005) * expected);
     }
   }
 }
@@ -105,7 +105,7 @@ TEST(StackedFaces, ALampThatIsThereTwiceShinesOnce) {
     };
     const Estimate once = mean(with_lamps(1, false), 32), twice = mean(with_lamps(2, true), 33);
     EXPECT_LT(std::abs(z_score(once, twice)), 4.5) << once.mean << ", " << twice.mean;
-    EXPECT_LT(std::hypot(once.standard_error, twice.standard_error), 0.01 * once.mean);
+    EXPECT_LT(std::hypot(once.standard_error, twice.standard_error), scatter_of_errors(32) * 0.01 * once.mean);
   }
 }
 
@@ -138,7 +138,7 @@ TEST(StackedFaces, BinsOfCapturesCountThemOnce) {
             << "hidden " << hidden.value_or(-1) << ", sampling " << static_cast<int>(sampling) << ", gate " << g << ": "
             << one[g].mean << " +- " << one[g].standard_error << ", doubled " << two[g].mean << " +- "
             << two[g].standard_error;
-        EXPECT_LT(std::hypot(one[g].standard_error, two[g].standard_error), 0.03 * one[g].mean);
+        EXPECT_LT(std::hypot(one[g].standard_error, two[g].standard_error), scatter_of_errors(32) * 0.03 * one[g].mean);
       }
     }
 }
@@ -171,7 +171,8 @@ TEST(StackedFaces, APatchThatSlidesOverAFloor) {
     EXPECT_LT(std::abs(z_score(total, difference)), 4.5)
         << (narrow ? "gated: " : "steady: ") << total.mean << " +- " << total.standard_error << ", finite difference "
         << difference.mean << " +- " << difference.standard_error;
-    EXPECT_LT(std::hypot(total.standard_error, difference.standard_error), 0.08 * std::abs(difference.mean));
+    EXPECT_LT(std::hypot(total.standard_error, difference.standard_error),
+              scatter_of_errors(kReplicates) * 0.08 * std::abs(difference.mean));
   }
 }
 
