@@ -3,25 +3,30 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
 namespace isochron {
 namespace {
 
+/// The sum over a pixel's readings, and what both halves disagree in of it.
+struct PixelSum {
+  double value = 0, error = 0;
+
+  void add(double reading, double reading_error) {
+    value += reading;
+    error += reading_error;
+  }
+};
+
 /// Adds up a mean and its variance over pixels, each of which has values of its own.
 class PixelSums {
  public:
-  /// `error`: what both halves disagree in, of the value.
-  void add(double value, double error) {
-    pixel_value_ += value;
-    pixel_error_ += error;
-  }
-  void end_pixel() {
-    value_ += pixel_value_;
-    squared_values_ += pixel_value_ * pixel_value_;
-    squared_errors_ += pixel_error_ * pixel_error_;
-    pixel_value_ = pixel_error_ = 0;
+  void add(const PixelSum& pixel) {
+    value_ += pixel.value;
+    squared_values_ += pixel.value * pixel.value;
+    squared_errors_ += pixel.error * pixel.error;
   }
   double value() const { return value_; }
   /// Of the sum.
@@ -31,7 +36,7 @@ class PixelSums {
   }
 
  private:
-  double value_ = 0, squared_values_ = 0, squared_errors_ = 0, pixel_value_ = 0, pixel_error_ = 0;
+  double value_ = 0, squared_values_ = 0, squared_errors_ = 0;
 };
 
 /// Integral of (m - N) / max(m, floor) over m, from `from` to `to`, both on one side of the floor.
@@ -94,8 +99,12 @@ LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, co
   constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
   if (!image.halved()) return {kUnknown, kUnknown, kUnknown, kUnknown};
   const double first = image.first, second = 1 - first;
-  PixelSums loss, squared;
-  for (int pixel = 0; pixel < target.pixels(); ++pixel) {
+  struct Sums {
+    PixelSum loss, squared;
+  };
+  std::vector<Sums> sums(target.pixels());
+  parallel_pixels(target, [&](int pixel) {
+    auto& [loss, squared] = sums[pixel];
     for_each_reading(target, rho.readings, pixel, [&](std::size_t i) {
       const double m = image.image.data[i], t = target.data[i], r = m - t, d = image.difference.data[i];
       // Halves of unequal size add a term whose expectation is 0: so the squared loss is their product exactly.
@@ -103,8 +112,11 @@ LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, co
       loss.add(rho.value(m, t) + odd * slope - rho.second(m, t) / 2 * variance, slope * d / 2);
       squared.add((r + second * d) * (r - first * d), r * d);
     });
-    loss.end_pixel();
-    squared.end_pixel();
+  });
+  PixelSums loss, squared;
+  for (const Sums& pixel : sums) {
+    loss.add(pixel.loss);
+    squared.add(pixel.squared);
   }
   if (!std::isfinite(loss.value()) || !std::isfinite(squared.value())) return {kUnknown, kUnknown, kUnknown, kUnknown};
   const double n = rho.readings.count(target), pixels = rho.readings.pixels(target);
@@ -114,39 +126,42 @@ LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, co
 GatedImage loss_adjoint(const SplitImage& image, const GatedImage& target, const ReadingLoss& rho) {
   if (rho.kind == LossKind::poisson && !image.halved())
     throw std::logic_error("the slope of a Poisson likelihood needs two halves of the image's samples");
-  GatedImage adjoint = loss_adjoint(image.image, target, rho);
   if ((rho.kind != LossKind::cauchy && rho.kind != LossKind::poisson) || !image.halved())
-    return adjoint;  // rho''' is 0, or v unknown
-  const double first = image.first, second = 1 - first, n = rho.readings.count(target);
-  for (int pixel = 0; pixel < target.pixels(); ++pixel)
+    return loss_adjoint(image.image, target, rho);  // rho''' is 0, or v unknown
+  GatedImage adjoint(target.width, target.height, target.gates, target.channels);
+  const double first = image.first, second = 1 - first, scale = 2 / rho.readings.count(target);
+  parallel_pixels(target, [&](int pixel) {
     for_each_reading(target, rho.readings, pixel, [&](std::size_t i) {
       const double m = image.image.data[i], t = target.data[i], d = image.difference.data[i];
       const double a = m + second * d, b = m - first * d;  // the halves
       if (rho.kind == LossKind::poisson)
-        adjoint.data[i] = 2 * (first * (a - t) * rho.weight(b, t) + second * (b - t) * rho.weight(a, t)) / n;
+        adjoint.data[i] = scale * (first * (a - t) * rho.weight(b, t) + second * (b - t) * rho.weight(a, t));
       else
-        adjoint.data[i] -= rho.third(m, t) / 2 * first * second * d * d / n;
+        adjoint.data[i] = scale * (rho.weight(m, t) * (m - t) - rho.third(m, t) / 4 * first * second * d * d);
     });
+  });
   return adjoint;
 }
 
 GatedImage loss_adjoint(const GatedImage& image, const GatedImage& target, const ReadingLoss& rho) {
   GatedImage adjoint(image.width, image.height, image.gates, image.channels);
   const double scale = 2 / rho.readings.count(image);
-  for (int pixel = 0; pixel < target.pixels(); ++pixel)
+  parallel_pixels(target, [&](int pixel) {
     for_each_reading(target, rho.readings, pixel, [&](std::size_t i) {
       const double m = image.data[i], t = target.data[i];
       adjoint.data[i] = scale * rho.weight(m, t) * (m - t);
     });
+  });
   return adjoint;
 }
 
 std::vector<double> curvature_weights(const GatedImage& image, const GatedImage& target, const ReadingLoss& rho) {
   std::vector<double> weights(image.data.size(), 0.0);
   const double scale = 2 / rho.readings.count(image);
-  for (int pixel = 0; pixel < image.pixels(); ++pixel)
+  parallel_pixels(image, [&](int pixel) {
     for_each_reading(image, rho.readings, pixel,
                      [&](std::size_t i) { weights[i] = scale * rho.weight(image.data[i], target.data[i]); });
+  });
   return weights;
 }
 
@@ -155,26 +170,29 @@ double root_mean_square_error(double mean_squared_error) {
 }
 
 double mean_square(const GatedImage& image, const Readings& readings) {
-  double sum = 0;
-  for (int pixel = 0; pixel < image.pixels(); ++pixel)
-    for_each_reading(image, readings, pixel, [&](std::size_t i) { sum += image.data[i] * image.data[i]; });
-  return sum / readings.count(image);
+  std::vector<double> pixels(image.pixels(), 0.0);
+  parallel_pixels(image, [&](int pixel) {
+    for_each_reading(image, readings, pixel, [&](std::size_t i) { pixels[pixel] += image.data[i] * image.data[i]; });
+  });
+  return std::accumulate(pixels.begin(), pixels.end(), 0.0) / readings.count(image);
 }
 
 double typical_power(const GatedImage& image, const Readings& readings, int power) {
-  std::vector<double> pixels;
-  for (int pixel = 0; pixel < image.pixels(); ++pixel) {
+  std::vector<double> means(image.pixels(), 0.0);
+  parallel_pixels(image, [&](int pixel) {
     double sum = 0;
     int count = 0;
     for_each_reading(image, readings, pixel, [&](std::size_t i) {
-      sum += std::pow(std::abs(image.data[i]), power);
+      const double value = std::abs(image.data[i]);
+      sum += power == 1 ? value : value * value;
       ++count;
     });
-    if (sum > 0) pixels.push_back(sum / count);
-  }
-  if (pixels.empty()) return 0;
-  const auto middle = pixels.begin() + static_cast<std::ptrdiff_t>(pixels.size() / 2);
-  std::nth_element(pixels.begin(), middle, pixels.end());
+    if (sum > 0) means[pixel] = sum / count;
+  });
+  std::erase(means, 0.0);
+  if (means.empty()) return 0;
+  const auto middle = means.begin() + static_cast<std::ptrdiff_t>(means.size() / 2);
+  std::nth_element(means.begin(), middle, means.end());
   return *middle;
 }
 

@@ -93,8 +93,8 @@ double root_mean_square_error(double mean_squared_error);
 
 /// Over the readings that count.
 double mean_square(const GatedImage& image, const Readings& readings = {});
-/// The median, over the pixels that hold anything, of a pixel's mean of |value|^power: what half of all pixels, however hot,
-/// do not move. 0 of a black image.
+/// The median, over the pixels that hold anything, of a pixel's mean of |value|^power, power 1 or 2: what half of all pixels, however
+/// hot, do not move. 0 of a black image.
 double typical_power(const GatedImage& image, const Readings& readings, int power);
 
 /// Sum over all entries of a * b.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 #include "core/image/npy.h"
 
 namespace isochron {
@@ -18,6 +19,14 @@ double Readings::count(const GatedImage& image) const {
   const auto gates =
       gate.empty() ? image.gates : static_cast<double>(gate.size() - std::count(gate.begin(), gate.end(), 0));
   return pixels(image) * gates * image.channels;
+}
+
+void parallel_pixels(const GatedImage& image, const std::function<void(int)>& f) {
+  constexpr int kReadings = 1 << 15;  // of a chunk: a thread's start takes as long as some hundred
+  const int pixels = image.pixels(), chunk = std::max(1, kReadings / std::max(1, image.gates * image.channels));
+  parallel((pixels + chunk - 1) / chunk, [&](int number) {
+    for (int p = number * chunk; p < std::min((number + 1) * chunk, pixels); ++p) f(p);
+  });
 }
 
 Readings make_readings(const Experiment& experiment, const GateSet& gates, int width, int height, int spots) {

@@ -1,6 +1,7 @@
 // Which readings of a target count. A reading is the value of a pixel, gate and channel.
 #pragma once
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ void for_each_reading(const GatedImage& image, const Readings& readings, int pix
     if (readings.uses_gate(g))
       for (int c = 0; c < image.channels; ++c) f(image.index(pixel, g, c));
 }
+
+/// Calls f(pixel) for every pixel, in any order, on several threads.
+void parallel_pixels(const GatedImage& image, const std::function<void(int)>& f);
 
 /// As `target.window` and `target.mask` say, for images of so many pixels. The image has `spots` parts one below the other,
 /// to each of which the mask applies. Throws InputError where they do not fit or leave nothing.
