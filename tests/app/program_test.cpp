@@ -240,7 +240,8 @@ TEST_F(Program, EveryFileWrittenIsNamed) {
     const std::string name = command[0] + std::to_string(command.size()), out = folder_.file(name);
     command.insert(command.begin() + 1, {file, "-o", out});
     const Result result = run(command);
-    EXPECT_EQ(result.status, 0) << result.errors;
+    // A check disagrees by chance, too.
+    EXPECT_TRUE(result.status == 0 || (command[0] == "check" && result.status == 1)) << result.errors;
     const std::string shown = result.errors + folder_.read("stdout");
     for (const auto& entry : std::filesystem::directory_iterator(out)) {
       const std::string written = entry.path().filename().string();
