@@ -82,7 +82,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
     parameters.push_back({"ior", change_material(scene, "block", "ior"), 0.01, false, 2.5, 0.5});
   if (two_lobes) parameters.push_back({"reflectance", change_material(scene, "block", "reflectance"), 0.01, false});
   // What roughness changes is little beside the noise of the finite differences, and of glass beside our own, rare and large: there dual
-  // numbers have to do (materials/dielectric_lobe_test.cpp).
+  // numbers have to do (materials/dielectric_test.cpp).
   if (c.look != Look::diffuse && !glass)
     parameters.push_back({"roughness", change_material(scene, "block", "roughness"), 0.01, false, two_lobes ? 2.5 : 1.0,
                           two_lobes ? 0.5 : INFINITY});
