@@ -3,8 +3,8 @@
 
 Usage: over_seeds.py BUILD SEEDS [options of ctest]     (scripts/test --seeds builds, then calls this)
 
-Seed 0 is that of the tests as they are; SEEDS others follow. A test states its rate where a comment at the head of its file, or
-inside the test, or the head of a script, says "false alarms: 1e-5" or "by chance 1 %" (the largest of what is said counts); one that states none should
+Seed 0 is that of the tests as they are; SEEDS others follow. A test states its rate in a comment inside it or at the head of its file,
+a script in its docstring: "false alarms: 1e-5" or "by chance 1 %" (the largest of what is said counts). One that states none should
 never fail, for which one in a million is taken. A test is one too many where so many failures had a probability below 1 % at
 twice its rate. Writes a table, for tests/README.md, into BUILD/seeds.md; exit status 1 where a test fails too often.
 """
@@ -39,7 +39,7 @@ def comments_of(text):
 def stated_rate(name):
     """Of ctest's Prefix/Suite.Case/0, by the source that defines it; of scripts.NAME, by what its script says of itself."""
     suite, _, case = name.partition(".")
-    script = ROOT / f"tests/scripts/{case}_test.py"
+    script = ROOT / f"tests/scripts/{case.removesuffix('.long')}_test.py"
     if suite == "scripts" and script.exists():
         return max(rates_in(re.sub(r"\s+", " ", ast.get_docstring(ast.parse(script.read_text())) or "")) or [NEVER])
     suite, case = suite.split("/")[-1], case.split("/")[0]

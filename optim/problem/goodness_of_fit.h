@@ -5,8 +5,8 @@
 // makes T scatter less than it would for known means. So its part that is linear in the counts, sum of (N - m) F'(m), is projected,
 // with the counts' weights, on what multiples of the light and of each unknown background change: sum of (N - m) e. At the maximum
 // of the likelihood that is 0 whatever e; it is taken off, so that T is insensitive to these, and of its variance.
-// Backgrounds. Unknown ones are those that are most likely beside the model's light: a fit's own scatter about these by the noise of its
-// images, and thousands of them add up.
+// Backgrounds. Unknown ones count with the values that are most likely beside the model's light (likely_backgrounds.h). A fit's own
+// scatter about these with the noise of its images. Each deviation is small, but there are thousands.
 // Unknowns. Each takes its leverage times m h''(m) from the deviance, summed over the readings: 1 where counts are many, less
 // where they are few. That of a background lies on the readings of its points, in proportion to 1 / m, that of all else is taken to lie where light is, in
 // proportion to light^2 / m. Unknowns at a bound take nothing.

@@ -2,40 +2,38 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "optim/problem/readings.h"
 
 namespace isochron {
 namespace {
 
-/// One reading of a half: its light, and the count.
+/// One reading: the light of both halves, and the count.
 struct LitCount {
-  double light, count;
+  double light[2], count;
 };
 
-/// The root b >= 0 of sum of (N - l - b) / V(l + b), which falls; 0 where it is nowhere positive. Above the scale it is convex, so that
-/// Newton's steps from the left stay there; the scale's kink may send one too far, which a bisection mends.
-double likely_background(const std::vector<LitCount>& readings, double scale) {
+/// Fisher's scoring: each step solves for both halves with the weights of the step before.
+void find_likely(const std::vector<LitCount>& readings, double scale, double (&background)[2]) {
   constexpr int kMostSteps = 100;
-  constexpr double kNearlyThere = 1e-12;
-  double b = 0, low = 0, high = std::numeric_limits<double>::infinity();
+  constexpr double kNearlyThere = 1e-9;
   for (int i = 0; i < kMostSteps; ++i) {
-    double value = 0, slope = 0;
-    for (const LitCount& r : readings) {
-      const double m = r.light + b, v = std::max(m, scale);
-      value += (r.count - m) / v;
-      slope -= m > scale ? r.count / (v * v) : 1 / v;
+    double weights[2] = {}, sums[2] = {};
+    for (const LitCount& r : readings)
+      for (const int half : {0, 1}) {
+        const int other = 1 - half;
+        const double w = 1 / std::max(r.light[other] + background[other], scale);
+        weights[half] += w;
+        sums[half] += w * (r.count - r.light[half]);
+      }
+    double change = 0;
+    for (const int half : {0, 1}) {
+      const double next = weights[half] > 0 ? std::max(0.0, sums[half] / weights[half]) : background[half];
+      change = std::max(change, std::abs(next - background[half]) - kNearlyThere * next);
+      background[half] = next;
     }
-    if (i == 0 && !(value > 0)) return 0;
-    (value > 0 ? low : high) = b;
-    double next = b - value / slope;
-    if (!(next >= low && next <= high)) next = std::isfinite(high) ? (low + high) / 2 : 2 * b + scale;
-    const double step = std::abs(next - b);
-    b = next;
-    if (step <= kNearlyThere * b) break;
+    if (change <= 0) return;
   }
-  return b;
 }
 
 }  // namespace
@@ -44,30 +42,31 @@ void take_likely_backgrounds(CountModel& model, SplitImage& image, const GatedIm
   std::vector<std::vector<int>> pixels(model.background_free.size());
   for (int pixel = 0; pixel < std::ssize(model.background_unknown); ++pixel) {
     const int b = model.background_unknown[pixel];
-    if (b >= 0 && model.background_free[b]) pixels[b].push_back(pixel);
+    if (b >= 0 && model.background_free[b] && loss.readings.uses_pixel(pixel)) pixels[b].push_back(pixel);
   }
   const double shares[] = {1 - image.first, -image.first};  // of the difference, in either half
   std::vector<LitCount> lit;
-  for (const std::vector<int>& own : pixels) {
+  for (std::size_t b = 0; b < pixels.size(); ++b) {
+    if (pixels[b].empty()) continue;
     const auto for_own = [&](auto&& f) {
-      for (const int pixel : own) for_each_reading(counts, loss.readings, pixel, [&](std::size_t i) { f(pixel, i); });
+      for (const int pixel : pixels[b])
+        for_each_reading(counts, loss.readings, pixel, [&](std::size_t i) { f(model.background[pixel], i); });
     };
-    double most_likely[2] = {};
-    for (int half = 0; half < (image.halved() ? 2 : 1); ++half) {
-      lit.clear();
-      for_own([&](int pixel, std::size_t i) {
-        const double d = image.halved() ? shares[half] * image.difference.data[i] : 0;
-        lit.push_back({std::max(0.0, image.image.data[i] + d - model.background[pixel]), counts.data[i]});
-      });
-      most_likely[half] = likely_background(lit, loss.scale);
-    }
-    if (!image.halved()) most_likely[1] = most_likely[0];
-    const double mean = image.first * most_likely[0] + (1 - image.first) * most_likely[1];
-    for_own([&](int pixel, std::size_t i) {
-      image.image.data[i] += mean - model.background[pixel];
-      if (image.halved()) image.difference.data[i] += most_likely[0] - most_likely[1];
+    lit.clear();
+    for_own([&](double background, std::size_t i) {
+      const double d = image.halved() ? image.difference.data[i] : 0, light = image.image.data[i] - background;
+      lit.push_back({{std::max(0.0, light + shares[0] * d), std::max(0.0, light + shares[1] * d)}, counts.data[i]});
     });
-    for (const int pixel : own) model.background[pixel] = mean;
+    const double before = model.background[pixels[b][0]];
+    double likely[] = {before, before};
+    find_likely(lit, loss.scale, likely);
+    const double mean = image.first * likely[0] + (1 - image.first) * likely[1];
+    for_own([&](double background, std::size_t i) {
+      image.image.data[i] += mean - background;
+      if (image.halved()) image.difference.data[i] += likely[0] - likely[1];
+    });
+    for (const int pixel : pixels[b]) model.background[pixel] = mean;
+    model.background_free[b] = mean > 0;
   }
 }
 

@@ -301,9 +301,9 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
   ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
   SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
-  stage.advance();
   set_loss(loss(image, target, theta), result);
   const GatedImage adjoint = loss_adjoint(image, target, reading_loss(target));
+  stage.advance();
   result.image = std::move(image.image);
   poll();
   if (differences) {

@@ -7,9 +7,9 @@
 // 5 % of the derivative's scale (15 % in the glossy ones, 50 % with glass and twice that for motions of the
 // glass): the terms' root mean square over gates and over all motions, which have comparable speeds; over
 // gates for a material's parameter. The steps are small enough that their bias, of second order, stays below
-// that. The glass's roughness and, under ellipsoidal sampling, its ior change these images little, and so does that of a retroreflector: limits on their errors
-// are wider, about 1.4 to 2 times what was seen, so that z-tests of them catch gross errors alone but more noise than
-// that shows. Of the roughness most is the finite differences'; our own error has a limit of its own.
+// that. Under ellipsoidal sampling the glass's ior changes these images little, and so does the roughness of a retroreflector: limits
+// on their errors are wider, about 1.4 to 2 times what was seen, so that z-tests of them catch gross errors alone but more noise than
+// that shows. Of that roughness most is the finite differences'; our own error has a limit of its own. The glass's is not tested here.
 // ISOCHRON_TEST_SAMPLES=16 in the environment takes 16 times the samples, for errors four times smaller.
 #include <gtest/gtest.h>
 

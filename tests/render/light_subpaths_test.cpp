@@ -2,7 +2,7 @@
 // images and in derivatives; and they are used where light leaves its case by a slit.
 //
 // Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each, below 2e-3 for the file), fixed seeds.
-// Standard errors are below 1 % of the image and 2 % of the derivatives' scale, 10 % by the block's motion: what lacks 9 % of the
+// Standard errors are below 1 % of the image and 2 % of the derivatives' scale, 10 % by the block's motion: what lacks 14 % of the
 // former fails. How paths are shared has a test without noise (weights_test.cpp).
 #include <gtest/gtest.h>
 

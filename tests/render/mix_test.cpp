@@ -3,8 +3,8 @@
 // kind of gate.
 //
 // Statistics: z-tests at 4.5 standard errors of the difference (false alarms: 7e-6 each, below 1e-3 for the file), fixed
-// seeds. The combination's own standard error must be below 0.5 % of the image (measured: 0.2 %) and of the scale of the
-// derivative by the light's motion (0.2 %), the root mean square over gates: what lacks 2.5 % fails. By the block's motion,
+// seeds. The combination's own true standard error must be below 0.5 % of the image (measured: 0.2 %) and of the scale of the
+// derivative by the light's motion (0.2 %), the root mean square over gates: what lacks 3.4 % fails. By the block's motion,
 // whose rare large samples are many, it must be below 15 %: that sees what only moving surfaces have, if it is dropped or
 // counted twice.
 #include <gtest/gtest.h>
