@@ -22,7 +22,8 @@ double Readings::count(const GatedImage& image) const {
 }
 
 void parallel_pixels(const GatedImage& image, const std::function<void(int)>& f) {
-  constexpr int kReadings = 1 << 15;  // of a chunk: a thread's start takes as long as some hundred
+  constexpr int kReadings =
+      1 << 15;  // of a chunk: many beside what it takes to share one out, few beside an image; not tuned
   const int pixels = image.pixels(), chunk = std::max(1, kReadings / std::max(1, image.gates * image.channels));
   parallel((pixels + chunk - 1) / chunk, [&](int number) {
     for (int p = number * chunk; p < std::min((number + 1) * chunk, pixels); ++p) f(p);
