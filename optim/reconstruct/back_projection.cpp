@@ -31,6 +31,7 @@ double distance_of_light(const Histograms& histograms, double sigma, const Detec
 
 /// What decides on the filter and on the size of voxels.
 struct Setting {
+  double narrowest;  ///< sigma that the response and the bins allow
   double sigma;
   double sine;  ///< of the angle between the wall's normal and the way from the light's distance to the wall's edge
   double ways;  ///< that change from one point of the wall to the next
@@ -47,7 +48,7 @@ Setting setting(const Histograms& histograms, const DetectorResponse& response) 
   // In groups and with a wide filter, for the few counts of single points.
   const double wide = std::min(4 * narrowest, histograms.bin * histograms.bins / 16);
   const double distance = distance_of_light(grouped(histograms, std::max(half / 8, spacing)), wide, response);
-  Setting result{narrowest, half / std::hypot(half, distance), histograms.spots.empty() ? 2.0 : 1.0};
+  Setting result{narrowest, narrowest, half / std::hypot(half, distance), histograms.spots.empty() ? 2.0 : 1.0};
   const double apart = result.ways * spacing * result.sine, needed = 0.25 * apart * apart - deviation * deviation;
   if (needed > narrowest * narrowest) result.sigma = std::sqrt(needed);
   return result;
@@ -106,6 +107,7 @@ BackProjection back_project(const CaptureFile& capture, const DetectorResponse& 
   result.filter = time_filter(set.sigma, response, all.bin);
   result.depth_resolution = 0.5 * result.filter.width;
   result.lateral_resolution = result.filter.width / (set.ways * set.sine);
+  result.finest_resolution = time_filter(set.narrowest, response, all.bin).width / (2 * set.sine);
 
   SearchRegion region = reached_region(all, result.filter);
   if (!(region.high.z > 0)) throw InputError("the capture's bins end before light can have come back to the wall");

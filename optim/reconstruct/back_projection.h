@@ -32,6 +32,9 @@ struct BackProjection {
   TimeFilter filter;
   /// Resolution along the depth, and across it at the distance of the light. Metres. Twice the voxels' sides.
   double depth_resolution = 0, lateral_resolution = 0;
+  /// Across it, as far as the detector's response alone limits it, where the ways from the spots and to the sensor points
+  /// both change.
+  double finest_resolution = 0;
 
   std::size_t index(std::size_t d, std::size_t u, std::size_t a) const {
     return (d * up.size() + u) * across.size() + a;

@@ -119,7 +119,7 @@ class MeshFilesTest(unittest.TestCase):
         lines += [f"3 {a + 1} {b + 1} {c + 1}" for a, b, c in TRIANGLES]
         text = self.write("b.ply", (head.format("ascii 1.0") + "\n".join(lines) + "\n").encode())
         for path in (binary, text):
-            np.testing.assert_allclose(read_vertex_values(path, "albedo"), 0.1 * np.arange(6), rtol=1e-15)
+            np.testing.assert_allclose(read_vertex_values(str(path), "albedo"), 0.1 * np.arange(6), rtol=1e-15)
             np.testing.assert_array_equal(read_vertex_values(path, "standard_error"), [0, 0.5, np.nan, 1.5, 2, 2.5])
             found, triangles, values = read_run_surface(path)
             np.testing.assert_array_equal(found[triangles], np.array(POINTS)[TRIANGLES])

@@ -1,5 +1,6 @@
 """Files of meshes: OBJ, PLY, OFF and STL, text or binary, also as a scene places them."""
 
+import pathlib
 import re
 import struct
 from dataclasses import dataclass, field
@@ -79,6 +80,7 @@ def _least_area(points):
 
 def read_polygons(path, kind=None):
     """A file as it is. `kind`: obj, ply, off or stl in place of the name's end. Raises InputError."""
+    path = pathlib.Path(path)
     kind = kind or path.suffix[1:]
     if kind not in READERS:
         raise InputError(f"{path}: '.{kind}' is no kind of mesh (allowed: {', '.join('.' + k for k in READERS)})")
