@@ -4,9 +4,10 @@
 Usage: over_seeds.py BUILD SEEDS [options of ctest]     (scripts/test --seeds builds, then calls this)
 
 Seed 0 is that of the tests as they are; SEEDS others follow. A test states its rate in a comment inside it or at the head of its file,
-a script in its docstring: "false alarms: 1e-5" or "by chance 1 %" (the largest of what is said counts). One that states none should
-never fail, for which one in a million is taken. A test is one too many where so many failures had a probability below 1 % at
-twice its rate. Writes a table, for tests/README.md, into BUILD/seeds.md; exit status 1 where a test fails too often.
+a script in its docstring: "false alarms: 1e-5", "by chance 1 %" or "by chance once in 1000" (the largest of what is said counts).
+One that states none should never fail, for which one in a million is taken. A test is one too many where so many failures had a
+probability below 1 % at twice its rate. Writes a table, for tests/README.md, into BUILD/seeds.md; exit status 1 where a test fails too
+often.
 """
 
 import ast
@@ -22,13 +23,14 @@ from scipy.stats import binom
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 NEVER = 1e-6
 SURE = 0.01
-RATE = r"(\d+(?:\.\d+)?(?:e-\d+| ?%))"
-STATED = re.compile(rf"(?:false alarms?|by chance)\b[^.;]*?{RATE}|{RATE}[^.;]*?by chance", re.IGNORECASE)
+RATE = r"(\d+(?:\.\d+)?(?:e-\d+| ?%)|once in \d+(?: \d{3})*)"
+STATED = re.compile(rf"(?:false(?:ly)? alarm(?:s|ed)?|by chance)\b[^.;]*?{RATE}|{RATE}[^.;]*?by chance", re.IGNORECASE)
 
 
 def rates_in(comments):
     numbers = ["".join(groups) for groups in STATED.findall(comments)]
-    return [float(n[:-1]) / 100 if n.endswith("%") else float(n) for n in numbers]
+    return [1 / float(n[len("once in"):].replace(" ", "")) if n.startswith("once") else
+            float(n[:-1]) / 100 if n.endswith("%") else float(n) for n in numbers]
 
 
 def comments_of(text):

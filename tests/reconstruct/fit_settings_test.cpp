@@ -1,0 +1,57 @@
+// How fine the meshes of a reconstruction become. Closed forms, no random numbers.
+#include "optim/reconstruct/fit_settings.h"
+
+#include <gtest/gtest.h>
+
+#include "optim/reconstruct/back_projection.h"
+#include "tests/reconstruct/simulated.h"
+
+namespace isochron {
+namespace {
+
+constexpr double kBin = 0.01;
+
+BackProjection projected(const CaptureGeometry& wall) {
+  return back_project(expected_counts(wall, {{{0, 0, 0.4}, {0, 0, -1}, 1}}, 256, kBin, 100));
+}
+
+FitSettings settings_for(const BackProjection& volume, int vertices) {
+  Mesh start;
+  start.positions.resize(vertices);
+  return fit_settings(start, volume.lateral_resolution, volume.finest_resolution, 4096, 300);
+}
+
+TEST(FitSettings, OneFinerLevelWherePointsAreDense) {
+  const BackProjection dense = projected(square_wall(64, 0.5));
+  EXPECT_DOUBLE_EQ(dense.finest_resolution, dense.lateral_resolution);
+  EXPECT_EQ(settings_for(dense, 300).levels, settings_for(dense, 300).coarse_levels + 1);
+}
+
+TEST(FitSettings, MoreWhereLayoutOrPointsLimitBackProjectionAlone) {
+  const BackProjection dense = projected(square_wall(64, 0.5)), sparse = projected(square_wall(12, 0.5));
+  CaptureGeometry wall = square_wall(64, 0.5);
+  add_spots(wall, {{0, 0, 0}});
+  const BackProjection one_spot = projected(wall);
+  // Walls end at different points of the pixels, by which the angle differs a little.
+  EXPECT_NEAR(one_spot.lateral_resolution, 2 * dense.lateral_resolution, 0.1 * dense.lateral_resolution);
+  EXPECT_NEAR(one_spot.finest_resolution, dense.finest_resolution, 0.05 * dense.finest_resolution);
+  EXPECT_NEAR(sparse.finest_resolution, dense.finest_resolution, 0.05 * dense.finest_resolution);
+  EXPECT_EQ(settings_for(one_spot, 300).levels, settings_for(dense, 300).levels + 1);
+  EXPECT_GT(settings_for(sparse, 300).levels, settings_for(dense, 300).levels);
+}
+
+TEST(FitSettings, NoLevelOfTooManyVertices) {
+  const BackProjection dense = projected(square_wall(64, 0.5));
+  EXPECT_EQ(settings_for(dense, 6000).levels, settings_for(dense, 6000).coarse_levels);
+}
+
+TEST(FitSettings, TheWorkOfALevelFallsWithTheirNumber) {
+  CaptureGeometry wall = square_wall(64, 0.5);
+  const FitSettings dense = settings_for(projected(wall), 300);
+  add_spots(wall, {{0, 0, 0}});
+  const FitSettings one_spot = settings_for(projected(wall), 300);
+  EXPECT_NEAR(one_spot.samples * one_spot.levels, dense.samples * dense.levels, 2 * one_spot.levels);
+}
+
+}  // namespace
+}  // namespace isochron
