@@ -105,6 +105,10 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
   if (scene_.capture && experiment_.estimator.light.value_or(0) > 0)
     experiment_.estimator_keys.at("light").fail("paths of captures have no light subpaths", "allowed here: 0");
+  if (const double unit = experiment_.gates.scene_unit_m;
+      scene_.capture && !scene_.capture->file.empty() && unit > 0 && unit != 1)
+    throw InputError(fmt::format("{}: gates.scene_unit_m: {}, but the points of {} are in metres (allowed here: 1)",
+                                 experiment_.file, unit, scene_.capture->file));
   if (counts_) {
     settle_unused(*counts_, readings_, experiment_.target.capture);
     require_usable(*counts_, experiment_.target.capture);

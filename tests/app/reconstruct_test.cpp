@@ -39,6 +39,24 @@ class Reconstruct : public Program {
   }
 };
 
+/// Bins alone would be of another unit than the points.
+TEST_F(Reconstruct, PointsOfAFileAreInMetres) {
+  folder_.write("plane.obj", "v -0.1 -0.1 0.4\nv 0.1 -0.1 0.4\nv 0.1 0.1 0.4\nf 1 3 2\n");
+  folder_.write("wall.yaml",
+                "capture: {file: plate.h5}\nmaterials: {paint: {type: diffuse, albedo: 0.5}}\n"
+                "shapes: [{name: plane, file: plane.obj, material: paint}]\n");
+  const std::string file =
+      folder_.write("units.yaml",
+                    "name: units\nscene: wall.yaml\nmax_bounces: 1\n"
+                    "gates: {kind: bins, unit: ps, scene_unit_m: 0.5}\ntarget: {capture: plate.h5}\n"
+                    "loss: {kind: poisson}\n");
+  const Result result = run({"render", file, "-o", folder_.file("out")});
+  EXPECT_EQ(result.status, 2);
+  EXPECT_NE(result.errors.find("units.yaml: gates.scene_unit_m: 0.5, but the points of "), std::string::npos)
+      << result.errors;
+  EXPECT_FALSE(folder_.has("out"));
+}
+
 /// The plate's depth, middle and size; counts are those of 1000 photons at each of 100 points, so that depths are known to a fraction
 /// of a millimetre, and what is left is the fit, of few samples here.
 TEST_F(Reconstruct, FindsAPlate) {
