@@ -9,6 +9,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "optim/analysis/solver_race.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/memory.h"
@@ -35,10 +36,10 @@ void chart_solvers(const ChartCommand& command, const Problem& problem, const st
   options.core_seconds = command.seconds * thread_count(command.common);
   options.error = command.error_percent / 100;
   options.seeds = command.seeds;
-  options.poll = poll_interrupt;
+  options.poll = throw_if_stopped;
   options.progress = note_progress;
   ProgressDisplay display(command.common.quiet);
-  const Race race = race_solvers(problem.experiment(), problem.make_target(poll_interrupt), options);
+  const Race race = race_solvers(problem.experiment(), problem.make_target(throw_if_stopped), options);
   display.end();
   write_file_atomically(folder + "/chart_solvers.csv", race_csv(race));
   fmt::print("{}", race_table(race));
@@ -51,11 +52,11 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
   options.core_seconds = command.seconds * thread_count(command.common);
   options.error = command.error_percent / 100;
   options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
-  options.poll = poll_interrupt;
+  options.poll = throw_if_stopped;
   options.progress = note_progress;
   options.progress("target");
   ProgressDisplay display(command.common.quiet);
-  const GatedImage target = problem.make_target(poll_interrupt);
+  const GatedImage target = problem.make_target(throw_if_stopped);
   const Chart chart = make_chart(problem.experiment(), theta, target, options);
   display.end();
   write_file_atomically(folder + "/chart.csv", chart_csv(chart));
@@ -68,7 +69,7 @@ int chart(const ChartCommand& command) {
   const Problem problem(read_experiment(command.common), warn);
   problem.require_parameters();
   require_memory(problem, image_memory(problem));
-  const std::string folder = output_folder(command.common, problem.experiment(), "-chart");
+  const std::string folder = output_folder(command.common.output, problem.experiment(), "-chart");
   make_output_folder(folder);
   catch_interrupts();
   (command.solvers ? chart_solvers : chart_gradient)(command, problem, folder);
@@ -83,8 +84,8 @@ int chart(const ChartCommand& command) {
 }  // namespace
 
 void add_chart(CLI::App& app, Action& action) {
-  auto command = std::make_shared<ChartCommand>();
-  CLI::App* sub = app.add_subcommand("chart", "Chart the error of the loss gradient against time, for every method");
+  const auto [sub, command] =
+      add_command(app, action, "chart", "Chart the error of the loss gradient against time, for every method", chart);
   add_experiment_options(*sub, command->common);
   sub->add_option("--seconds", command->seconds,
                   "about the whole time on idle cores; a quarter is for the reference, the target is not "
@@ -117,7 +118,6 @@ void add_chart(CLI::App& app, Action& action) {
       "  isochron chart cube.yaml --solvers --seeds 5\n"
       "  isochron chart cube.yaml --seconds 300 --at height=0.1 -o charts\n"
       "  isochron chart cube.yaml --set gates.sigma=0.1 --steps 0.1,0.01");
-  sub->callback([&action, command] { action = [command] { return chart(*command); }; });
 }
 
 }  // namespace isochron

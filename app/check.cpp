@@ -11,6 +11,7 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/darkness.h"
 #include "optim/problem/estimates.h"
@@ -20,11 +21,6 @@
 
 namespace isochron {
 namespace {
-
-struct CheckCommand {
-  CommonOptions common;
-  std::string parameter;  ///< empty: all
-};
 
 /// Most components of one parameter that are checked, evenly spaced.
 constexpr int kMostComponents = 32;
@@ -76,18 +72,18 @@ void print_table(const Problem& problem, const std::vector<Comparison>& table) {
         false_alarm_limit(comparisons, row.degrees), verdict(row, comparisons));
 }
 
-int check(const CheckCommand& command) {
-  begin_session(command.common);
+int check(const CommonOptions& command) {
+  begin_session(command);
   std::vector<std::string> notes;
-  const Problem problem(check_experiment(read_experiment(command.common, false), notes), warn);
+  const Problem problem(check_experiment(read_experiment(command, false), notes), warn);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
-  const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
+  const std::vector<double> theta = parameters.parse_point(command.at.empty() ? "initial" : command.at);
   const Parameters::Block chosen = chosen_parameter(parameters, command.parameter);
   std::vector<MemoryUse> memory = derivative_memory(problem, 1);
   for (const MemoryUse& part : difference_memory(problem, kMostCheckReplicates)) memory.push_back(part);
   require_memory(problem, memory);
-  const std::string folder = output_folder(command.common, problem.experiment(), "-check");
+  const std::string folder = output_folder(command.output, problem.experiment(), "-check");
   make_output_folder(folder);
   catch_interrupts();
   for (const std::string& note : notes) fmt::print("{}\n", note);
@@ -95,11 +91,11 @@ int check(const CheckCommand& command) {
   for (int component : components) check_step(problem, theta, component);  // fails before anything is rendered
 
   std::vector<Comparison> table;
-  ProgressDisplay display(command.common.quiet);
+  ProgressDisplay display(command.quiet);
   {
     ProgressStage stage("comparing derivatives", static_cast<int>(components.size()));
     for (int component : components) {
-      const auto rows = check_derivative(problem, theta, component, poll_interrupt);
+      const auto rows = check_derivative(problem, theta, component, throw_if_stopped);
       table.insert(table.end(), rows.begin(), rows.end());
       stage.advance();
     }
@@ -144,11 +140,11 @@ int check(const CheckCommand& command) {
 }  // namespace
 
 void add_check(CLI::App& app, Action& action) {
-  auto command = std::make_shared<CheckCommand>();
-  CLI::App* sub = app.add_subcommand(
-      "check", "Compare the derivatives with finite differences; exit status 1 if they differ or are all zero");
-  add_experiment_options(*sub, command->common);
-  add_parameter_option(*sub, command->parameter);
+  const auto [sub, command] = add_command(
+      app, action, "check",
+      "Compare the derivatives with finite differences; exit status 1 if they differ or are all zero", check);
+  add_experiment_options(*sub, *command);
+  add_parameter_option(*sub, *command);
   sub->footer(
       "Every term takes the same number of samples: --samples, or the largest number of the experiment.\n"
       "gradient.step is the largest of the three steps; by default it follows from scene, gates and value.\n"
@@ -156,7 +152,6 @@ void add_check(CLI::App& app, Action& action) {
       "  isochron check cube.yaml --samples 64\n"
       "  isochron check cube.yaml --parameter height --at height=0.1 -o check\n"
       "  isochron check cube.yaml --set gradient.step=0.02");
-  sub->callback([&action, command] { action = [command] { return check(*command); }; });
 }
 
 }  // namespace isochron

@@ -7,6 +7,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/darkness.h"
@@ -19,11 +20,6 @@
 namespace isochron {
 namespace {
 
-struct DeriveCommand {
-  CommonOptions common;
-  std::string parameter;  ///< empty: all
-};
-
 /// Of images held at a time, about; more unknowns are done in groups, each with the same random numbers.
 constexpr double kMostBytes = 1e9;
 
@@ -34,15 +30,15 @@ std::vector<std::string> written(const Parameters& parameters, const Parameters:
   return files;
 }
 
-int derive(const DeriveCommand& command) {
-  begin_session(command.common);
-  Problem problem(read_experiment(command.common, false), warn);
+int derive(const CommonOptions& command) {
+  begin_session(command);
+  Problem problem(read_experiment(command, false), warn);
   problem.set_evaluations(1);
   problem.require_parameters();
   const Parameters& parameters = problem.parameters();
-  const std::vector<double> theta = parameters.parse_point(command.common.at.empty() ? "initial" : command.common.at);
+  const std::vector<double> theta = parameters.parse_point(command.at.empty() ? "initial" : command.at);
   const Parameters::Block block = chosen_parameter(parameters, command.parameter);
-  const std::string folder = output_folder(command.common, problem.experiment(), "-derive");
+  const std::string folder = output_folder(command.output, problem.experiment(), "-derive");
 
   double bytes = 0;
   for (const MemoryUse& part : derivative_memory(problem, 1)) bytes += part.bytes;
@@ -50,7 +46,7 @@ int derive(const DeriveCommand& command) {
   require_memory(problem, derivative_memory(problem, std::min(group, block.count)));
   make_output_folder(folder);
   catch_interrupts();
-  ProgressDisplay display(command.common.quiet);
+  ProgressDisplay display(command.quiet);
   ProgressStage stage("rendering the derivatives", (block.count + group - 1) / group);
   std::string table =
       "parameter,gate,component,mean,standard_error,replicates,degrees_of_freedom,effective_count,half_width_95" +
@@ -59,7 +55,7 @@ int derive(const DeriveCommand& command) {
   bool dark = true;  // every derivative is exactly zero
   for (int first = block.begin; first < block.begin + block.count; first += group) {
     const int count = std::min(group, block.begin + block.count - first);
-    auto components = estimate_derivatives(problem, theta, first, count, poll_interrupt);
+    auto components = estimate_derivatives(problem, theta, first, count, throw_if_stopped);
     for (int i = 0; i < count; ++i) {
       const std::string& name = parameters.component_names()[first + i];
       std::vector<std::string> names;
@@ -92,26 +88,24 @@ int derive(const DeriveCommand& command) {
     warn(warning.empty() ? "every derivative is zero: no parameter changes what the gates see" : warning);
   }
   if (const std::string warning = tails.warning(); !warning.empty()) spdlog::warn(warning);
-  const bool plotted = !command.common.no_plots && draw_plots(folder);
+  const bool plotted = !command.no_plots && draw_plots(folder);
   say_written(folder, written(parameters, block, ".exr"));
   if (plotted) say_written(folder, written(parameters, block, ".png"));
   say_written(folder, {"derive.csv"});
-  return command.common.no_plots || plotted ? 0 : 1;
+  return command.no_plots || plotted ? 0 : 1;
 }
 
 }  // namespace
 
 void add_derive(CLI::App& app, Action& action) {
-  auto command = std::make_shared<DeriveCommand>();
-  CLI::App* sub = app.add_subcommand("derive", "Render derivative images, term by term");
-  add_experiment_options(*sub, command->common);
-  add_parameter_option(*sub, command->parameter);
+  const auto [sub, command] = add_command(app, action, "derive", "Render derivative images, term by term", derive);
+  add_experiment_options(*sub, *command);
+  add_parameter_option(*sub, *command);
   sub->footer(
       "Examples:\n"
       "  isochron derive cube.yaml --samples 256\n"
       "  isochron derive cube.yaml --parameter height --at target -o derivative\n"
       "  isochron derive cube.yaml --set gradient.method=finite_difference");
-  sub->callback([&action, command] { action = [command] { return derive(*command); }; });
 }
 
 }  // namespace isochron

@@ -6,23 +6,19 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "optim/run/report.h"
 
 namespace isochron {
 
-int execute_run(const std::string& folder, const CommonOptions& common, bool force,
-                const std::function<RunStatus(const RunOptions&)>& start) {
-  return *execute_run_if_any(folder, common, force, start);
-}
-
-std::optional<int> execute_run_if_any(const std::string& folder, const CommonOptions& common, bool force,
-                                      const std::function<std::optional<RunStatus>(const RunOptions&)>& start) {
+std::optional<int> execute_run(const std::string& folder, const CommonOptions& common,
+                               const std::function<std::optional<RunStatus>(const RunOptions&)>& start) {
   catch_interrupts();
   ProgressDisplay display(common.quiet);
   RunOptions options;
   options.folder = folder;
-  options.force = force;
-  options.stop = interrupted;
+  options.force = common.force;
+  options.stop = stop_requested;
   options.progress = [&](const Progress& progress) { display.show(progress); };
   options.warning = warn;
   std::string report;

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "app/interrupt.h"
+#include "core/base/progress.h"
 #include "core/base/ranks.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
@@ -80,12 +80,12 @@ void write_final_derivatives(const std::string& of_run) {
   SampleSpec few = wanted;
   few.set_all(samples);
   problem.set_samples(few);
-  const double seconds = write_images(problem, theta, unknowns, folder, poll_interrupt);
+  const double seconds = write_images(problem, theta, unknowns, folder, throw_if_stopped);
   const int fitting = static_cast<int>(std::min<double>(most, samples * kSeconds / std::max(seconds, 1e-6)));
   if (fitting >= 2 * samples) {
     few.set_all(samples = fitting);
     problem.set_samples(few);
-    write_images(problem, theta, unknowns, folder, poll_interrupt);
+    write_images(problem, theta, unknowns, folder, throw_if_stopped);
   }
   write_file_atomically(folder + "/derivatives.yaml", of + fmt::format("samples: {}\n", samples));
 }

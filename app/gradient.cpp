@@ -8,6 +8,7 @@
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/darkness.h"
 #include "optim/problem/estimates.h"
@@ -40,17 +41,17 @@ int gradient(const CommonOptions& options) {
   const Parameters& parameters = problem.parameters();
   const std::vector<double> theta = parameters.parse_point(options.at.empty() ? "initial" : options.at);
   require_memory(problem, image_memory(problem));
-  const std::string folder = output_folder(options, problem.experiment(), "-gradient");
+  const std::string folder = output_folder(options.output, problem.experiment(), "-gradient");
   make_output_folder(folder);
   catch_interrupts();
   gradient_repeats(problem);  // too few samples must show before the target is rendered
   ProgressDisplay display(options.quiet);
-  const GatedImage target = problem.make_target(poll_interrupt);
+  const GatedImage target = problem.make_target(throw_if_stopped);
   const GatedImage image =
       problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
   if (const std::string dark = darkness_warning(problem, theta, image, target); !dark.empty()) warn(dark);
   const auto start = std::chrono::steady_clock::now();
-  const GradientEstimate estimate = estimate_gradient(problem, theta, target, poll_interrupt);
+  const GradientEstimate estimate = estimate_gradient(problem, theta, target, throw_if_stopped);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   display.end();
@@ -79,15 +80,14 @@ int gradient(const CommonOptions& options) {
 }  // namespace
 
 void add_gradient(CLI::App& app, Action& action) {
-  auto options = std::make_shared<CommonOptions>();
-  CLI::App* sub = app.add_subcommand("gradient", "Estimate the gradient of the loss, its standard error and cost");
+  const auto [sub, options] =
+      add_command(app, action, "gradient", "Estimate the gradient of the loss, its standard error and cost", gradient);
   add_experiment_options(*sub, *options);
   sub->footer(
       "Examples:\n"
       "  isochron gradient cube.yaml --samples 64\n"
       "  isochron gradient cube.yaml --at height=0.1 -o gradient --threads 2\n"
       "  isochron gradient cube.yaml --set gradient.method=finite_difference");
-  sub->callback([&action, options] { action = [options] { return gradient(*options); }; });
 }
 
 }  // namespace isochron

@@ -9,6 +9,7 @@
 #include "app/interrupt.h"
 #include "app/progress.h"
 #include "core/base/error.h"
+#include "core/base/progress.h"
 #include "optim/analysis/advice.h"
 #include "optim/experiment/choices.h"
 #include "optim/experiment/experiment_edit.h"
@@ -203,11 +204,11 @@ int inspect_experiment(const InspectCommand& command) {
   problem.require_parameters();
   const std::vector<double> start =
       problem.parameters().parse_point(command.common.at.empty() ? "initial" : command.common.at);
-  const std::string folder = output_folder(command.common, experiment, "-inspect");
+  const std::string folder = output_folder(command.common.output, experiment, "-inspect");
   make_output_folder(folder);
   catch_interrupts();
   ProgressDisplay display(command.common.quiet);
-  const Inspection inspection = inspect(problem, start, command.seconds, poll_interrupt);
+  const Inspection inspection = inspect(problem, start, command.seconds, throw_if_stopped);
   display.end();
   fmt::print("{}: {} unknowns, {} gates, {} bounces at most\n", experiment.name, problem.parameters().size(),
              problem.gates().size(), full_bounces(experiment));
@@ -234,9 +235,9 @@ int inspect_experiment(const InspectCommand& command) {
 }  // namespace
 
 void add_inspect(CLI::App& app, Action& action) {
-  auto command = std::make_shared<InspectCommand>();
-  CLI::App* sub = app.add_subcommand(
-      "inspect", "Measure how much of the model a scene needs: bounces, terms, sampling, numbers of samples");
+  const auto [sub, command] = add_command(
+      app, action, "inspect",
+      "Measure how much of the model a scene needs: bounces, terms, sampling, numbers of samples", inspect_experiment);
   add_experiment_options(*sub, command->common);
   sub->add_option("--seconds", command->seconds, "about how many CPU seconds to spend, summed over cores; default 60")
       ->check(CLI::Range(0.1, 1e6))
@@ -250,7 +251,6 @@ void add_inspect(CLI::App& app, Action& action) {
       "  isochron inspect cube.yaml\n"
       "  isochron inspect cube.yaml --seconds 120 -o look\n"
       "  isochron inspect cube.yaml --apply");
-  sub->callback([&action, command] { action = [command] { return inspect_experiment(*command); }; });
 }
 
 }  // namespace isochron

@@ -5,8 +5,5 @@ namespace isochron {
 /// From now on the first SIGINT or SIGTERM requests a stop (core/base/progress.h): work under way ends by Interrupted,
 /// renderers within a sample. The second ends the program at once.
 void catch_interrupts();
-bool interrupted();
-/// Throws Interrupted once a stop was requested. Can be passed wherever a Poll is asked for.
-void poll_interrupt();
 
 }  // namespace isochron

@@ -89,18 +89,10 @@ int run_program(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer("Examples:\n  isochron run cube.yaml\n  isochron render cube.yaml --at target\n  isochron run --help");
   isochron::Action action;
-  isochron::add_run(app, action);
-  isochron::add_reconstruct(app, action);
-  isochron::add_resume(app, action);
-  isochron::add_report(app, action);
-  isochron::add_render(app, action);
-  isochron::add_derive(app, action);
-  isochron::add_gradient(app, action);
-  isochron::add_check(app, action);
-  isochron::add_inspect(app, action);
-  isochron::add_chart(app, action);
-  isochron::add_stability(app, action);
-  isochron::add_plot(app, action);
+  using namespace isochron;
+  for (const auto add : {add_run, add_reconstruct, add_resume, add_report, add_render, add_derive, add_gradient,
+                         add_check, add_inspect, add_chart, add_stability, add_plot})
+    add(app, action);
   isochron::add_man_pages_option(app);
   try {
     isochron::start_ranks();

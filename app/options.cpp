@@ -57,12 +57,14 @@ void warn(const std::string& text) {
   spdlog::warn("{}", text);
 }
 
-std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix) {
-  return output_folder(options.output, experiment, suffix);
+void add_parameter_option(CLI::App& command, CommonOptions& options) {
+  command.add_option("--parameter", options.parameter, "only this parameter (NAME or NAME[INDEX]); default all")
+      ->type_name("NAME");
 }
 
-void add_parameter_option(CLI::App& command, std::string& name) {
-  command.add_option("--parameter", name, "only this parameter (NAME or NAME[INDEX]); default all")->type_name("NAME");
+void add_force_option(CLI::App& command, CommonOptions& options) {
+  command.add_flag("--force", options.force,
+                   "overwrite the run that the folder holds (else it is moved to DIR.1, DIR.2, ...)");
 }
 
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name) {

@@ -23,6 +23,8 @@ struct CommonOptions : ExperimentSource {
   int threads = 0;     ///< 0: all cores
   bool quiet = false;
   bool no_plots = false;
+  std::string parameter;  ///< of derive and check; empty: all
+  bool force = false;     ///< of run and reconstruct
 };
 
 /// Options of every command.
@@ -36,11 +38,10 @@ void begin_session(const CommonOptions& options);
 /// Shows a warning of one line.
 void warn(const std::string& text);
 
-/// The -o folder or runs/NAME followed by `suffix`.
-std::string output_folder(const CommonOptions& options, const Experiment& experiment, const std::string& suffix = "");
-
 /// --parameter, of the commands that can be restricted to one parameter.
-void add_parameter_option(CLI::App& command, std::string& name);
+void add_parameter_option(CLI::App& command, CommonOptions& options);
+/// --force, of those that may replace a run.
+void add_force_option(CLI::App& command, CommonOptions& options);
 /// Unknowns [begin, begin + count) that --parameter names; all for an empty name. Throws InputError.
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name);
 

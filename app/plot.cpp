@@ -23,13 +23,12 @@ int plot(const std::string& folder) {
 }  // namespace
 
 void add_plot(CLI::App& app, Action& action) {
-  auto folder = std::make_shared<std::string>();
-  CLI::App* sub = app.add_subcommand("plot", "Draw the pictures of an output folder again, as after --no-plots");
+  const auto [sub, folder] =
+      add_command(app, action, "plot", "Draw the pictures of an output folder again, as after --no-plots", plot);
   sub->add_option("folder", *folder, "folder that a command has written")->required()->type_name("DIR");
   sub->footer(
       "Examples:\n"
       "  isochron plot runs/cube");
-  sub->callback([&action, folder] { action = [folder] { return plot(*folder); }; });
 }
 
 }  // namespace isochron

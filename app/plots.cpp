@@ -17,7 +17,6 @@
 
 #include "app/final_derivatives.h"
 #include "app/installation.h"
-#include "app/interrupt.h"
 #include "core/base/progress.h"
 #include "core/base/ranks.h"
 
@@ -85,7 +84,7 @@ ModuleResult run_module(const std::string& module, const std::vector<std::string
     std::array<char, 4096> buffer;
     for (pollfd ready{ends[0], POLLIN, 0};;) {
       const int count = poll(&ready, 1, kPause);
-      if (interrupted()) kill(child, SIGTERM);
+      if (stop_requested()) kill(child, SIGTERM);
       if (count <= 0) continue;
       const ssize_t n = read(ends[0], buffer.data(), buffer.size());
       if (n > 0) messages.append(buffer.data(), static_cast<std::size_t>(n));
@@ -104,7 +103,7 @@ ModuleResult run_module(const std::string& module, const std::vector<std::string
 bool draw(const std::string& module, const std::string& folder) {
   const ModuleResult result = run_module(module, {as_path(folder)});
   if (result.status == 0) return true;
-  if (interrupted())
+  if (stop_requested())
     spdlog::warn("plots: interrupted; draw them with: isochron plot {}", as_path(folder));
   else
     spdlog::warn("plots: {} failed: {}", module, result.message);
@@ -126,7 +125,7 @@ bool write_report(const std::string& folder) {
   if (!first_rank()) return true;
   const ModuleResult result = run_module("isochron.report", {as_path(folder)});
   if (result.status == 0) return true;
-  if (interrupted())
+  if (stop_requested())
     spdlog::warn("report: interrupted; write it with: isochron report {}", folder);
   else
     spdlog::warn("report: failed: {}", result.message);
@@ -150,7 +149,7 @@ int run_report(std::vector<std::string> arguments) {
   if (result.status == 0)
     spdlog::info("wrote {}", result.message);
   else
-    spdlog::error("{}", interrupted() ? "interrupted, nothing was written" : result.message);
+    spdlog::error("{}", stop_requested() ? "interrupted, nothing was written" : result.message);
   return result.status < 0 ? 1 : result.status;
 }
 

@@ -12,7 +12,6 @@ namespace {
 struct ReconstructCommand {
   CommonOptions common;
   ReconstructionSpec spec;
-  bool force = false;
 };
 
 int reconstruct(const ReconstructCommand& command) {
@@ -24,7 +23,7 @@ int reconstruct(const ReconstructCommand& command) {
     photons_needed = result.photons_needed;
     return result.status;
   };
-  const std::optional<int> status = execute_run_if_any(folder, command.common, command.force, start);
+  const std::optional<int> status = execute_run(folder, command.common, start);
   if (status) return *status;
   spdlog::error(
       "{}: no light of a hidden surface stands out of the background; the weakest detectable surface would "
@@ -36,8 +35,8 @@ int reconstruct(const ReconstructCommand& command) {
 }  // namespace
 
 void add_reconstruct(CLI::App& app, Action& action) {
-  auto command = std::make_shared<ReconstructCommand>();
-  CLI::App* sub = app.add_subcommand("reconstruct", "Find the hidden surface behind a capture's photon counts");
+  const auto [sub, command] =
+      add_command(app, action, "reconstruct", "Find the hidden surface behind a capture's photon counts", reconstruct);
   sub->add_option("capture", command->spec.capture, "HDF5 file of photon counts at points of a wall")
       ->required()
       ->type_name("CAPTURE.h5");
@@ -51,14 +50,12 @@ void add_reconstruct(CLI::App& app, Action& action) {
       ->check(CLI::Range(0.1, 1e6))
       ->type_name("N");
   sub->add_option("--seed", command->spec.seed, "seed of the random numbers")->type_name("N");
-  sub->add_flag("--force", command->force,
-                "overwrite the run that the folder holds (else it is moved to DIR.1, DIR.2, ...)");
+  add_force_option(*sub, command->common);
   add_session_options(*sub, command->common);
   sub->footer(
       "Examples:\n"
       "  isochron reconstruct capture.h5\n"
       "  isochron reconstruct capture.h5 --response response.csv -o runs/mine --seconds 60");
-  sub->callback([&action, command] { action = [command] { return reconstruct(*command); }; });
 }
 
 }  // namespace isochron

@@ -5,6 +5,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/capture_data.h"
@@ -22,11 +23,11 @@ int render(const CommonOptions& options) {
   const Problem problem(read_experiment(options, false), warn);
   const std::vector<double> theta = problem.parameters().parse_point(options.at.empty() ? "initial" : options.at);
   require_memory(problem, image_memory(problem));
-  const std::string folder = output_folder(options, problem.experiment(), "-render");
+  const std::string folder = output_folder(options.output, problem.experiment(), "-render");
   make_output_folder(folder);
   catch_interrupts();
   ProgressDisplay display(options.quiet);
-  const ImageEstimate estimate = estimate_image(problem, theta, poll_interrupt);
+  const ImageEstimate estimate = estimate_image(problem, theta, throw_if_stopped);
   display.end();
   require_finite(estimate.image, "the image");
   if (const std::string dark = darkness_warning(problem, theta, estimate.gates.mean, "the image"); !dark.empty())
@@ -55,15 +56,13 @@ int render(const CommonOptions& options) {
 }  // namespace
 
 void add_render(CLI::App& app, Action& action) {
-  auto options = std::make_shared<CommonOptions>();
-  CLI::App* sub = app.add_subcommand("render", "Render the gated images");
+  const auto [sub, options] = add_command(app, action, "render", "Render the gated images", render);
   add_experiment_options(*sub, *options);
   sub->footer(
       "Examples:\n"
       "  isochron render cube.yaml --samples 256\n"
       "  isochron render cube.yaml --at target -o target_images\n"
       "  isochron render cube.yaml --at height=0.1 --set gates.sigma=0.05");
-  sub->callback([&action, options] { action = [options] { return render(*options); }; });
 }
 
 }  // namespace isochron

@@ -27,8 +27,8 @@ int report(const ReportCommand& command) {
 }  // namespace
 
 void add_report(CLI::App& app, Action& action) {
-  auto command = std::make_shared<ReportCommand>();
-  CLI::App* sub = app.add_subcommand("report", "Write a page about a run, or a comparison of several");
+  const auto [sub, command] =
+      add_command(app, action, "report", "Write a page about a run, or a comparison of several", report);
   sub->add_option("folders", command->folders, "folders of runs, finished or not")->required()->type_name("DIR...");
   sub->add_option("-o,--output", command->output,
                   "the page; default DIR/report.html, for several runs comparison.html in the current folder")
@@ -43,7 +43,6 @@ void add_report(CLI::App& app, Action& action) {
       "Examples:\n"
       "  isochron report runs/cube\n"
       "  isochron report runs/cube runs/cube_standard -o comparison.html");
-  sub->callback([&action, command] { action = [command] { return report(*command); }; });
 }
 
 }  // namespace isochron

@@ -12,6 +12,7 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "core/base/progress.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/memory.h"
 
@@ -44,13 +45,13 @@ int stability(const StabilityCommand& command) {
   problem.require_parameters();
   const std::vector<double> theta = problem.parameters().initial();
   require_memory(problem, image_memory(problem));
-  const std::string folder = output_folder(command.common, experiment, "-stability");
+  const std::string folder = output_folder(command.common.output, experiment, "-stability");
   make_output_folder(folder);
   catch_interrupts();
   options.core_seconds = command.seconds * thread_count(command.common);
   options.iterations = command.iterations;
   options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
-  options.poll = poll_interrupt;
+  options.poll = throw_if_stopped;
   options.progress = [](const std::string& what) { spdlog::info("{}", what); };
   ProgressDisplay display(command.common.quiet);
   const Stability map = map_stability(experiment, options);
@@ -67,9 +68,8 @@ int stability(const StabilityCommand& command) {
 }  // namespace
 
 void add_stability(CLI::App& app, Action& action) {
-  auto command = std::make_shared<StabilityCommand>();
-  CLI::App* sub =
-      app.add_subcommand("stability", "Map over gate width and method where gradients and reconstructions fail");
+  const auto [sub, command] = add_command(
+      app, action, "stability", "Map over gate width and method where gradients and reconstructions fail", stability);
   add_experiment_options(*sub, command->common);
   sub->get_option("--at")->group("");
   sub->add_option("--seconds", command->seconds,
@@ -97,7 +97,6 @@ void add_stability(CLI::App& app, Action& action) {
       "  isochron stability cube.yaml\n"
       "  isochron stability cube.yaml --widths 1e-2,1e-3,0 --seconds 60 -o map\n"
       "  isochron stability corridor.yaml --iterations 100 --seconds 600");
-  sub->callback([&action, command] { action = [command] { return stability(*command); }; });
 }
 
 }  // namespace isochron

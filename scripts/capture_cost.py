@@ -7,15 +7,13 @@
 """
 
 import pathlib
-import resource
 import statistics
-import subprocess
 import sys
 import tempfile
 
 import numpy as np
 
-from reproduction.measure import PROGRAM, ROOT
+from reproduction.measure import ROOT, program
 from reproduction.tables import markdown, read_rows, run_action, write_rows
 
 POINTS = (16, 32, 64)  # along each side
@@ -53,22 +51,15 @@ optimizer: {{method: adam, learning_rate: 0.001, iterations: {iterations}}}
 """
 
 
-def cpu_seconds():
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
-
-
 def run(folder, points, bins, iterations):
     """CPU seconds of the whole run, and the least wall seconds of an iteration but the first."""
     values = {"points": points, "bins": bins, "iterations": iterations, "width": WINDOW / bins,
               "plane": ROOT / "scenes/hidden_s/plane.obj", "response": ROOT / "scenes/letter/response.csv"}
     (folder / "scene.yaml").write_text(SCENE.format(**values), encoding="utf-8")
     (folder / "cost.yaml").write_text(EXPERIMENT.format(**values), encoding="utf-8")
-    before = cpu_seconds()
-    subprocess.run([str(PROGRAM), "run", str(folder / "cost.yaml"), "-o", str(folder / "run"), "--force", "--quiet",
-                    "--no-plots", "--threads", str(THREADS)], check=True)
+    usage = program("run", folder / "cost.yaml", "-o", folder / "run", "--force", "--threads", THREADS)
     wall = np.diff([float(row["seconds"]) for row in read_rows(folder / "run/log.csv")])
-    return cpu_seconds() - before, min(wall)
+    return usage.cpu_seconds, min(wall)
 
 
 def measure(file):

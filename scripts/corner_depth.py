@@ -10,7 +10,6 @@ A depth is the distance from the camera, which lights the scene itself. The phas
 that was reflected once: d = c / (4 pi f) atan2(I90 - I270, I0 - I180).
 """
 
-import csv
 import pathlib
 import sys
 
@@ -18,8 +17,11 @@ import numpy as np
 import yaml
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
+from mitsuba_scenes.walls import distances
+from reproduction.tables import write_rows
 import use_package
 from isochron import exr
+from isochron.mesh_files import read_mesh
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SPEED_OF_LIGHT = 299792458
@@ -54,30 +56,13 @@ class Camera:
         return np.stack([self.size[0] / 2 + d @ self.right / depth, self.size[1] / 2 - d @ self.up / depth], 1)
 
 
-def read_obj(path):
-    words = [line.split() for line in path.read_text(encoding="ascii").splitlines()]
-    vertices = np.array([[float(x) for x in w[1:4]] for w in words if w and w[0] == "v"])
-    triangles = np.array([[int(i.split("/")[0]) - 1 for i in w[1:]] for w in words if w and w[0] == "f"])
-    return vertices, triangles
-
-
 def cast(origin, rays, mesh):
     """Distance along each ray to the mesh; infinite where it is missed."""
     vertices, triangles = mesh
     flat = rays.reshape(-1, 3)
     nearest = np.full(len(flat), np.inf)
     for a, b, c in vertices[triangles]:
-        e, f = b - a, c - a
-        p = np.cross(flat, f)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            inverse = 1 / (p @ e)
-            u = p @ (origin - a) * inverse
-            q = np.cross(origin - a, e)
-            v = flat @ q * inverse
-            t = f @ q * inverse
-            # A hair beyond the border, so that no ray slips through between two triangles.
-            hit = (u > -1e-9) & (v > -1e-9) & (u + v < 1 + 1e-9) & (t > 0)
-        nearest[hit] = np.minimum(nearest[hit], t[hit])
+        nearest = np.minimum(nearest, distances(origin - a, flat, b - a, c - a))
     return nearest.reshape(rays.shape[:-1])
 
 
@@ -111,7 +96,7 @@ def write_start(folder, path):
     seen = np.stack([columns, rows], 1) + 0.5
     between, outside = LinearNDInterpolator(seen, depth[rows, columns]), NearestNDInterpolator(seen, depth[rows, columns])
     parameter = experiment["parameters"][0]
-    vertices, _ = read_obj(ROOT / "scenes/corner/walls.obj")
+    vertices, _ = read_mesh(ROOT / "scenes/corner/walls.obj")
     direction = np.array(parameter["direction"], dtype=float)
     offsets = np.zeros(len(vertices))
     for _ in range(20):  # a vertex that moves is seen elsewhere
@@ -137,7 +122,7 @@ def evaluate(folder):
     rays, shape = camera.rays(RAYS), experiment["parameters"][0]["shape"]
     depths = {}
     for state in ("target", "initial", "final"):
-        t = cast(camera.position, rays, read_obj(folder / f"geometry/{state}_{shape}.obj"))
+        t = cast(camera.position, rays, read_mesh(folder / f"geometry/{state}_{shape}.obj"))
         hits = np.isfinite(t)
         depths[state] = np.where(hits, t, 0).sum(-1) / np.maximum(hits.sum(-1), 1)
         if state == "target":
@@ -172,18 +157,16 @@ def report(folder, depths, whole):
 
 
 def write_table(path, folders):
-    with open(path, "w", encoding="ascii", newline="") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(["seed", "iterations", "seconds", "pixels", "phases_rms_mm", "start_rms_mm", "fit_rms_mm",
-                        "fit_median_mm", "fit_largest_mm", "fit_missed"])
-        for folder in folders:
-            depths, _, whole = evaluate(folder)
-            summary, (error, missed) = read_summary(folder), errors_of(depths, whole, "final")
-            sizes = [rms(errors_of(depths, whole, name)[0]) for name in ("phases", "initial", "final")]
-            sizes += [np.median(np.abs(error)), np.abs(error).max()]
-            seed = yaml.safe_load((folder / "experiment.yaml").read_text(encoding="utf-8"))["seed"]
-            table.writerow([seed, summary["iterations"], f"{summary['seconds']:.0f}", whole.sum(),
-                            *(f"{1000 * x:.2f}" for x in sizes), missed])
+    rows = []
+    for folder in folders:
+        depths, _, whole = evaluate(folder)
+        summary, (error, missed) = read_summary(folder), errors_of(depths, whole, "final")
+        sizes = [rms(errors_of(depths, whole, name)[0]) for name in ("phases", "initial", "final")]
+        sizes += [np.median(np.abs(error)), np.abs(error).max()]
+        seed = yaml.safe_load((folder / "experiment.yaml").read_text(encoding="utf-8"))["seed"]
+        rows.append([seed, summary["iterations"], f"{summary['seconds']:.0f}", whole.sum(), *(f"{1000 * x:.2f}" for x in sizes), missed])
+    write_rows(path, ["seed", "iterations", "seconds", "pixels", "phases_rms_mm", "start_rms_mm", "fit_rms_mm", "fit_median_mm",
+                      "fit_largest_mm", "fit_missed"], rows)
 
 
 def draw(path, depths, amplitude, whole):

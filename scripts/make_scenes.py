@@ -9,22 +9,7 @@ import sys
 
 from scenes import branches, bunny, corner, corridor, cove, cube, glass_bunny, height_field, hidden_s, letter, rabbit, relief, sofa, tree
 
-SCENES = {
-    "branches": branches.write,
-    "bunny": bunny.write,
-    "corner": corner.write,
-    "corridor": corridor.write,
-    "cove": cove.write,
-    "cube": cube.write,
-    "glass_bunny": glass_bunny.write,
-    "height_field": height_field.write,
-    "hidden_s": hidden_s.write,
-    "letter": letter.write,
-    "rabbit": rabbit.write,
-    "relief": relief.write,
-    "sofa": sofa.write,
-    "tree": tree.write,
-}
+SCENES = (branches, bunny, corner, corridor, cove, cube, glass_bunny, height_field, hidden_s, letter, rabbit, relief, sofa, tree)
 
 
 def main(arguments):
@@ -33,10 +18,11 @@ def main(arguments):
         return 0 if arguments in (["-h"], ["--help"]) else 2
     default = pathlib.Path(__file__).resolve().parent.parent / "scenes"
     root = pathlib.Path(arguments[0]) if arguments else default
-    for name, write in SCENES.items():
-        directory = root / name
+    for scene in SCENES:
+        directory = root / scene.__name__.rpartition(".")[2]
         directory.mkdir(parents=True, exist_ok=True)
-        write(directory)
+        scene.write(directory)
+        (directory / "scene.yaml").write_text(scene.SCENE, encoding="ascii")
     return 0
 
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/base/bounds.h"
 #include "core/base/error.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/gate_columns.h"
@@ -36,14 +37,9 @@ ParameterType type_of(const Problem& problem, int component) {
 
 /// Diagonal of the box around all vertices.
 double extent(const Scene& scene) {
-  Vec3 lower = scene.positions.front(), upper = lower;
-  for (const Vec3& p : scene.positions) {
-    for (int axis = 0; axis < 3; ++axis) {
-      lower[axis] = std::min(lower[axis], p[axis]);
-      upper[axis] = std::max(upper[axis], p[axis]);
-    }
-  }
-  return length(upper - lower);
+  Bounds box;
+  for (const Vec3& p : scene.positions) box.add(p);
+  return length(box.high - box.low);
 }
 
 /// Speed of the fastest vertex or light, or of all lengths, scene units per unit of the unknown.

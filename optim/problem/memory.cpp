@@ -13,6 +13,7 @@
 #include "core/base/ranks.h"
 #include "core/techniques/gate_pick.h"
 #include "optim/problem/estimates.h"
+#include "optim/problem/jacobian.h"
 
 namespace isochron {
 namespace {
@@ -62,19 +63,14 @@ double limit(int resource, const std::string& used) {
   return static_cast<double>(most.rlim_cur) - kilobytes("/proc/self/status", used);
 }
 
-double values_of_image(const Problem& problem) {
-  const Camera& camera = problem.scene().camera;
-  return 1.0 * camera.width * camera.height * problem.gates().size() * (problem.scene().grey ? 1 : 3);
-}
-
 /// In double precision.
 double image_bytes(const Problem& problem) {
-  return sizeof(double) * values_of_image(problem);
+  return sizeof(double) * residual_count(problem);
 }
 
 /// As results are kept.
 double stored_bytes(const Problem& problem) {
-  return sizeof(float) * values_of_image(problem);
+  return sizeof(float) * residual_count(problem);
 }
 
 /// What samples bring of an image's values, as lists (core/base/listed_sum.h), of so many per pixel; `copies` of the image at
@@ -84,7 +80,7 @@ double listed_bytes(const Problem& problem, int samples, double copies) {
   const GateSet& gates = problem.gates();
   int of_a_length = 0;
   gates.for_each_value(gates.center(gates.size() / 2), [&](int, double) { ++of_a_length; });
-  const double entries = values_of_image(problem) / gates.size() * samples * kEntriesPerVertex *
+  const double entries = residual_count(problem) / gates.size() * samples * kEntriesPerVertex *
                          (problem.experiment().estimator.max_bounces + 1) * std::max(of_a_length, 1);
   return std::min(copies * image_bytes(problem), kEntry * entries);
 }

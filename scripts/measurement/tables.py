@@ -224,10 +224,6 @@ def growth_of_cost(folder):
     return markdown(["CPU time of more over less", "standard, image", "gradient", "ellipsoidal, image", "gradient"], lines)
 
 
-def cubes(folder):
-    return cube_cost.table_of(read_rows(folder / "cube_cost.csv"))
-
-
 def hidden_share(folder):
     shares = ("0", "0.25", "0.5", "0.75", "0.9")
     lines = [[f"{r['scene']}, {r['of']}", r["bounces"], *(number(1e6 * float(r[share])) for share in shares)]
@@ -254,26 +250,6 @@ def share_trial(folder):
     return markdown(["", "chosen (trials)", "times the best", *shares], lines)
 
 
-def captures(folder):
-    return capture_cost.table_of(read_rows(folder / "capture_cost.csv"))
-
-
-def stated_errors(folder):
-    return error_coverage.tables_of(read_rows(folder / "error_coverage.csv"))
-
-
-def fit_probabilities_of(folder):
-    return fit_probabilities.tables_of(read_rows(folder / "fit_probabilities.csv"))
-
-
-def intervals(folder):
-    return interval_coverage.table_of(read_rows(folder / "interval_coverage.csv"))
-
-
-def egg(folder):
-    return public_scene.table_of(read_rows(folder / "egg.csv"))
-
-
 def checks(folder):
     columns = ("rows", "largest_z", "rms_z", "beyond_limit", "clearest")
     rows = read_rows(folder / "checks.csv")
@@ -281,11 +257,19 @@ def checks(folder):
                     [[f"`{r['experiment']}`", *(r[c] for c in columns)] for r in rows])
 
 
+def _of(name, table_of):
+    return lambda folder: table_of(read_rows(folder / f"{name}.csv"))
+
+
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, cubes, hidden_share, light_share, share_trial, captures, stated_errors, intervals, egg,
-                               checks)},
-    "fit probabilities": fit_probabilities_of,
+                               growth_of_cost, hidden_share, light_share, share_trial, checks)},
+    "cubes": _of("cube_cost", cube_cost.table_of),
+    "captures": _of("capture_cost", capture_cost.table_of),
+    "stated_errors": _of("error_coverage", error_coverage.tables_of),
+    "fit probabilities": _of("fit_probabilities", fit_probabilities.tables_of),
+    "intervals": _of("interval_coverage", interval_coverage.table_of),
+    "egg": _of("egg", public_scene.table_of),
     "stability cube": lambda folder: stability(folder, "cube"),
     "stability branches": lambda folder: stability(folder, "branches"),
     "stability corridor": lambda folder: stability(folder, "corridor"),

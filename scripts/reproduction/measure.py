@@ -1,6 +1,5 @@
 """Runs an experiment under measurement and keeps the numbers of every run."""
 
-import csv
 import os
 import pathlib
 import resource
@@ -9,6 +8,8 @@ import time
 from dataclasses import asdict, dataclass, fields
 
 import yaml
+
+from reproduction.tables import read_rows, write_rows
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("ISOCHRON_PROGRAM", ROOT / "build/isochron")
@@ -113,19 +114,11 @@ def run(name, seed, folder, iterations=None, samples=None):
 
 def load(file):
     """The runs of a CSV; none where there is no such file."""
-    if not file.exists():
-        return []
-    with open(file, encoding="ascii", newline="") as lines:
-        return [Run(**{f.name: f.type(row[f.name]) for f in fields(Run)}) for row in csv.DictReader(lines)]
+    return [Run(**{f.name: f.type(row[f.name]) for f in fields(Run)}) for row in read_rows(file)] if file.exists() else []
 
 
 def store(file, runs):
-    """Writes the CSV atomically. Times are rounded to what a noisy machine can tell."""
+    """Times are rounded to what a noisy machine can tell."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    temporary = file.with_name(file.name + ".tmp")
-    with open(temporary, "w", encoding="ascii", newline="") as out:
-        table = csv.writer(out, lineterminator="\n")
-        table.writerow([f.name for f in fields(Run)])
-        for run_ in runs:
-            table.writerow([f"{x:.5g}" if isinstance(x, float) else x for x in asdict(run_).values()])
-    os.replace(temporary, file)
+    write_rows(file, [f.name for f in fields(Run)],
+               [[f"{x:.5g}" if isinstance(x, float) else x for x in asdict(run_).values()] for run_ in runs])

@@ -62,4 +62,3 @@ def write(directory):
     mesh.write_obj(directory / "branches.obj", branches, "Trunk and branches at the target angle, facing outwards")
     mesh.write_obj(directory / "ground.obj", ground, "Ground, facing up")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing the ground")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

@@ -65,4 +65,3 @@ def write(directory):
     mesh.write_obj(directory / "left_wall.obj", left, "Left wall of the box, facing inwards")
     mesh.write_obj(directory / "bunny.obj", bunny, "Rabbit, facing outwards")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing down")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

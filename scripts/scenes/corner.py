@@ -41,4 +41,3 @@ def walls():
 def write(directory):
     vertices, triangles = walls()
     mesh.write_obj(directory / "walls.obj", (vertices, triangles), f"{len(vertices)} vertices; three walls, facing inwards")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

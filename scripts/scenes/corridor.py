@@ -47,4 +47,3 @@ def write(directory):
     lamp = mesh.face_towards(mesh.square(LIGHT_EDGE), LIGHT_CENTRE, (-0.5 * WIDTH, 0.5 * WIDTH, 0.5 * WIDTH - BEND))
     mesh.write_obj(directory / "corridor.obj", corridor, "Two segments, facing inwards")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing the wall opposite the second segment")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

@@ -58,4 +58,3 @@ def write(directory):
     mesh.write_obj(directory / "case.obj", case, "Thin walls, facing inwards")
     mesh.write_obj(directory / "lamp.obj", horizontal(x0, z0, x1, z1, y, True), "Area light, facing up")
     mesh.write_obj(directory / "block.obj", block, "Block on the floor, facing outwards")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

@@ -41,4 +41,3 @@ def write(directory):
     mesh.write_obj(directory / "room.obj", mesh.join(floor, wall), "Floor and back wall, facing inwards")
     mesh.write_obj(directory / "cube.obj", cube, "Cube at its target height, facing outwards")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing down")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

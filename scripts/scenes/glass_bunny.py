@@ -36,4 +36,3 @@ def write(directory):
     lamp = mesh.face_towards(mesh.square(LAMP_EDGE), LAMP_CENTRE, (LAMP_CENTRE[0], 0, LAMP_CENTRE[2]))
     mesh.write_obj(directory / "patch.obj", patch, "Square patch, facing the camera")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing down")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

@@ -46,4 +46,3 @@ def write(directory):
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing the terrain")
     heights = [f"{h:.6f}" for h in terrain_heights(x, z).ravel()]
     (directory / "heights.txt").write_text("\n".join(heights) + "\n", encoding="ascii")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

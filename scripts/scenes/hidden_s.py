@@ -25,4 +25,3 @@ def write(directory):
     y, x = np.meshgrid(-along, along, indexing="ij")
     vertices = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
     mesh.write_obj(directory / "plane.obj", (vertices, mesh.grid(SIDE, SIDE)), "40 x 40 vertices, rows from top to bottom")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

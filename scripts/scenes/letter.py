@@ -65,4 +65,3 @@ def write(directory):
     offsets = np.arange(0, LAST_PS + STEP_PS, STEP_PS)
     rows = "".join(f"{t},{np.exp(-t / DECAY_PS):.6f}\n" for t in offsets)
     (directory / "response.csv").write_text("offset,value\n" + rows, encoding="ascii")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

@@ -51,4 +51,3 @@ def write(directory):
     mesh.write_obj(directory / "rabbit.obj", rabbit(), "Rabbit, facing outwards")
     rows = "".join(f"{t},{v:.6f}\n" for t, v in zip(*response()))
     (directory / "response.csv").write_text("offset,value\n" + rows, encoding="ascii")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

@@ -42,4 +42,3 @@ def write(directory):
     mesh.write_obj(directory / "relief.obj", (vertices, mesh.grid(SIDE, SIDE)), f"{SIDE} x {SIDE} vertices, facing the wall")
     text = "\n".join(f"{d:.6f}" for d in depths(x, y).ravel())
     (directory / "depths.txt").write_text(text + "\n", encoding="ascii")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

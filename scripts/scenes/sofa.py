@@ -61,4 +61,3 @@ def write(directory):
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing the sofa")
     lines = [f"{h:.6f}" for h in offsets[1:-1, 1:-1].ravel()]
     (directory / "initial.txt").write_text("\n".join(lines) + "\n", encoding="ascii")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

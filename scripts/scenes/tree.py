@@ -52,4 +52,3 @@ def write(directory):
     mesh.write_obj(directory / "ground.obj", ground, "Ground, facing up")
     mesh.write_obj(directory / "tree.obj", mesh.rounded(mesh.join(*parts)), "Trunk and foliage, closed, facing outwards")
     mesh.write_obj(directory / "lamp.obj", lamp, "Area light, facing the tree")
-    (directory / "scene.yaml").write_text(SCENE, encoding="ascii")

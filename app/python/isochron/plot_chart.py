@@ -126,8 +126,7 @@ def draw_stability(folder):
     ]
     for axis, (column, title, cmap, norm) in zip(axes, panels):
         values = grid(column)
-        colormap = matplotlib.colormaps[cmap].copy()
-        colormap.set_bad("0.85")
+        colormap = matplotlib.colormaps[cmap].with_extremes(bad="0.85")
         image = axis.imshow(np.ma.masked_invalid(values), cmap=colormap, norm=norm, aspect="auto")
         for i, width in enumerate(widths):
             for j, method in enumerate(methods):

@@ -91,8 +91,7 @@ def draw_slices(figure, run):
     images = (("counts", counts, "inferno", (0, scale)), ("fit", fit, "inferno", (0, scale)),
               ("residual", rest, "RdBu_r", (-DEVIATIONS, DEVIATIONS)))
     for axes, (title, values, colours, (low, high)) in zip(panels, images):
-        cmap = matplotlib.colormaps[colours].copy()
-        cmap.set_bad("0.7")
+        cmap = matplotlib.colormaps[colours].with_extremes(bad="0.7")
         mesh = axes.pcolormesh(edges_of(places), run.times, values, cmap=cmap, vmin=low, vmax=high, rasterized=True)
         axes.set_title(f"{title.capitalize()}, {words}")
         axes.set_xlabel(label)

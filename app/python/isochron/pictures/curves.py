@@ -131,8 +131,7 @@ def plot_row(path, output, experiment, stacks, gates, row):
         raise PlotError(f"{path}: gates with the same centre cannot be sliced")
     scale = scale_of(values)
     figure, axes = plt.subplots(figsize=(6.4, 5), layout="constrained")
-    cmap = matplotlib.colormaps["RdBu_r" if signed else "inferno"].copy()
-    cmap.set_bad("magenta")
+    cmap = matplotlib.colormaps["RdBu_r" if signed else "inferno"].with_extremes(bad="magenta")
     columns = np.arange(values.shape[1] + 1) - 0.5
     mesh = axes.pcolormesh(columns, edges_of(positions), np.ma.masked_invalid(values[order]), cmap=cmap,
                            vmin=-scale if signed else 0, vmax=scale)

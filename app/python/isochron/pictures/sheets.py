@@ -112,8 +112,7 @@ def draw_images(title, stack, scale, gates):
         cmap = colors.ListedColormap(np.repeat(srgb(np.linspace(0, 1, 256))[:, None], 3, axis=1))
     else:
         picture = np.ma.masked_invalid(bright)
-        cmap = matplotlib.colormaps["inferno"].copy()
-        cmap.set_bad(NON_FINITE)
+        cmap = matplotlib.colormaps["inferno"].with_extremes(bad=NON_FINITE)
     for i, g in enumerate(shown):
         label = gates.label(g) + (f", × {factors[i]}" if factors[i] > 1 else "")
         axes = sheet.cell(*divmod(i, columns), label, stack[g])
@@ -145,8 +144,7 @@ def draw_signed(title, rows, quantity, gates):
     drawn = {name: stack[shown].mean(-1) if stack.ndim == 4 else stack[shown] for name, stack in drawn.items()}
     scale = scale_of(*drawn.values())
     norm = colors.Normalize(-scale, scale)
-    cmap = matplotlib.colormaps["RdBu_r"].copy()
-    cmap.set_bad(NON_FINITE)
+    cmap = matplotlib.colormaps["RdBu_r"].with_extremes(bad=NON_FINITE)
     beyond = False
     for row, (name, stack) in enumerate(drawn.items()):
         beyond |= bool(np.abs(np.nan_to_num(stack)).max() > scale)

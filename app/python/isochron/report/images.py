@@ -63,10 +63,6 @@ def root_mean_square(values):
     return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
 
 
-def figure(class_, uri, alt, words):
-    return element("figure", element("img", src=uri, alt=alt, class_=class_), element("figcaption", words))
-
-
 class Viewer:
     """Pictures side by side that a slider changes. `steps` is a label per step; pictures are lists of URIs, one per step, or
     a single one that stays."""
