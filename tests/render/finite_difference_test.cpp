@@ -2,8 +2,8 @@
 // ones with retroreflectors and glass, under every kind of gate and both samplings. The finite differences render the moved scenes
 // with common random numbers.
 //
-// Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at 4 standard errors of the difference
-// (false alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below
+// Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at what a normal number has at 4 standard errors of the
+// difference, Student's law taken into account (false alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below
 // 5 % of the derivative's scale (15 % in the glossy ones, 50 % with glass and twice that for motions of the
 // glass): the terms' root mean square over gates and over all motions, which have comparable speeds; over
 // gates for a material's parameter. The steps are small enough that their bias, of second order, stays below
@@ -135,7 +135,7 @@ TEST_P(FiniteDifference, TotalDerivative) {
         total.standard_error = std::hypot(total.standard_error, term[p][g].standard_error);
       }
       const double error = std::hypot(total.standard_error, difference[g].standard_error);
-      EXPECT_LT(std::abs(z_score(total, difference[g])), 4)
+      EXPECT_LT(std::abs(z_score(total, difference[g])), student_limit(4, kBatches))
           << parameters[p].name << ", gate " << g << ": " << total.mean << " +- " << total.standard_error
           << ", finite difference " << difference[g].mean << " +- " << difference[g].standard_error;
       EXPECT_LT(total.standard_error,

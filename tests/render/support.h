@@ -135,6 +135,14 @@ inline double scatter_of_errors(int replicates) {
   return std::pow(1 - v + kQuantile * std::sqrt(v), 1.5);
 }
 
+/// What a z-score of so many replicates exceeds as rarely as a normal number exceeds z: Student's law with a degree of freedom less
+/// (Cornish and Fisher).
+inline double student_limit(double z, int replicates) {
+  const double n = replicates - 1, z2 = z * z;
+  return z * (1 + (z2 + 1) / (4 * n) + ((5 * z2 + 16) * z2 + 3) / (96 * n * n) +
+              (((3 * z2 + 19) * z2 + 17) * z2 - 15) / (384 * n * n * n));
+}
+
 /// z-score of the difference of two independent estimates.
 inline double z_score(const Estimate& a, const Estimate& b) {
   const double error = std::hypot(a.standard_error, b.standard_error);
