@@ -2,10 +2,10 @@
 // ones with retroreflectors and glass, under every kind of gate and both samplings. The finite differences render the moved scenes
 // with common random numbers.
 //
-// Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at what a normal number has at 4 standard errors of the
-// difference, Student's law taken into account (false alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the difference must be below
-// 5 % of the derivative's scale (15 % in the glossy ones, 50 % with glass and twice that for motions of the
-// glass): the terms' root mean square over gates and over all motions, which have comparable speeds; over
+// Statistics: 2 gates x 7 to 9 parameters per case, each a z-test at 4.6 standard errors of the difference, which 32 replicates
+// exceed as rarely as normal numbers exceed 4 (false alarms: 18 x 6e-5 = 0.1 % per case), fixed seeds. The standard error of the
+// difference must be below 5 % of the derivative's scale (15 % in the glossy ones, 50 % with glass and twice that for motions of
+// the glass): the terms' root mean square over gates and over all motions, which have comparable speeds; over
 // gates for a material's parameter. The steps are small enough that their bias, of second order, stays below
 // that. The glass's roughness and, under ellipsoidal sampling, its ior change these images little, and so does the roughness of a
 // retroreflector: limits on their errors are wider, about 1.4 to 2 times what was seen, so that z-tests of them catch gross errors alone
