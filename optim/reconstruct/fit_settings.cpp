@@ -24,8 +24,9 @@ constexpr int kCoarseLevels = 7;
 constexpr double kMostVertices = 20000;
 /// In lateral resolutions. The rabbit's median, 80 % and silhouette with it 0.85 / 2.8 mm and 0.90, without 1.05 / 3.3 mm and 0.87.
 constexpr double kSkirt = 1.5;
-/// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos across the surface.
-constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.03;
+/// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos, a quarter on average, across
+/// the surface.
+constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.015;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;

@@ -53,11 +53,11 @@ parameters:
     initial: 0
     smoothing: {{bending: {bending}, slopes: {motion:.4g}, evidence: true}}
     remesh: {{levels: {levels}, coarse_levels: {coarse}, edge_length: {edge:.4g}, skirt: {skirt:.4g}}}
-  - name: albedo            # what is known is gain * albedo
+  - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo
     shape: surface
     per: vertex
-    initial: 0.5
+    initial: 0.25
     smoothing: {{slopes: {albedo:.4g}, evidence: true}}
   - {{name: gain, type: gain, initial: {gain:.6g}, lower: {low:.6g}, upper: {high:.6g}}}
   - {{name: background, type: background{per}}}
@@ -85,7 +85,7 @@ std::string scene_text(const std::string& capture) {
       "# Lengths in metres; start.ply is in the coordinates of the capture.\n"
       "capture: {{file: {}}}\n"
       "materials:\n"
-      "  surface: {{type: diffuse, albedo: 0.5}}\n"
+      "  surface: {{type: diffuse, albedo: 0.25}}\n"
       "shapes:\n"
       "  - {{name: surface, file: start.ply, material: surface}}\n",
       capture);
@@ -155,7 +155,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   const DetectorResponse response = response_of(load_experiment(experiment).gates, capture);
   const BackProjection volume = back_projected(capture, response, spec.capture);
   const FirstSurface first = first_surface(volume);
-  const Mesh start = start_surface(volume, first);
+  const Mesh start = start_surface(likely_albedos(volume, histograms(capture, volume.frame), response));
 
   result.photons_needed = photons_needed(capture, volume);
   result.has_signal = !start.faces.empty();

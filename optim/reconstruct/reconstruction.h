@@ -4,9 +4,10 @@
 // weights of the first and the third follow from the evidence of the level before (evidence.h).
 // - The surface bends little, and so do its borders (bending.h).
 // - It does not move far from where a level began: offsets of neighbours differ by a sixteenth of their distance.
-// - Albedos differ little, by 0.03 across the surface. One that falls off freely imitates a border that is elsewhere, and tilts
+// - Albedos differ little, by 6 % across the surface. One that falls off freely imitates a border that is elsewhere, and tilts
 //   the surface to do so.
-// - Only the product of gain and albedo is known: the gain is that of a start with an albedo of a half.
+// - Only the product of gain and albedo is known: the gain is that of a start with an albedo of a quarter, so that parts may be four
+//   times as bright, or the surface a quarter as large.
 #pragma once
 #include <cstdint>
 #include <functional>

@@ -1,8 +1,7 @@
 // A surface for a fit to begin with.
 #pragma once
 #include "core/scene/mesh.h"
-#include "optim/reconstruct/back_projection.h"
-#include "optim/reconstruct/first_surface.h"
+#include "optim/reconstruct/likely_albedos.h"
 
 namespace isochron {
 
@@ -13,6 +12,6 @@ namespace isochron {
 /// - smooth over a lateral resolution.
 /// Pieces whose margins meet, at depths that a surface may have there, become one part; others may overlap, seen from the wall.
 /// Counter-clockwise seen from the wall, manifold, in the capture's coordinates; empty where nothing is significant.
-Mesh start_surface(const BackProjection& volume, const FirstSurface& first);
+Mesh start_surface(const LikelyAlbedos& volume);
 
 }  // namespace isochron

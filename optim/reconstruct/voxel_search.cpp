@@ -62,7 +62,7 @@ std::vector<SummedBlock> sums(const Level& level, const SearchRegion& region, co
   std::vector<SummedBlock> result(blocks.size());
   parallel(static_cast<int>(blocks.size()), [&](int b) {
     result[b].place = blocks[b];
-    const auto block = std::make_unique<VoxelBlock>();
+    const auto block = std::make_unique<SummedVoxels>();
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
       const VoxelPlace voxel = result[b].voxel(i);
       const auto middle = [&](int axis) {

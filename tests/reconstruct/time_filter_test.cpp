@@ -55,7 +55,7 @@ TEST(FilteredHistograms, SumsAreTheFiltersAtTheDistanceInTime) {
   const Histograms histograms = one_count(400, kStep, kAt);
   const TimeFilter filter{kSigma, 0.04, 0};
   const FilteredHistograms filtered(histograms, filter);
-  VoxelBlock block;
+  SummedVoxels block;
   std::mt19937 random(test_seed(1));
   std::uniform_real_distribution<float> at(0.15f, 0.35f);
   for (int i = 0; i < VoxelBlock::kVoxels; ++i)
@@ -95,7 +95,7 @@ TEST(FilteredHistograms, SumsOfNoiseHaveTheVarianceThatIsStated) {
     for (int i = 0; i < 64; ++i) histograms.rows.push_back({{0.05 * (i % 8), 0.05 * (i / 8), 0}, -1, 0.005});
     for (int i = 0; i < 64 * 128; ++i) histograms.counts.push_back(static_cast<float>(counts(random)));
     const TimeFilter filter{0.02, 0, 0};
-    VoxelBlock block;
+    SummedVoxels block;
     block.across.fill(0.2f);
     block.up.fill(0.2f);
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) block.depth[i] = 0.1f + 0.4f * static_cast<float>(i % 27) / 27;
