@@ -16,12 +16,13 @@ namespace {
 /// nearly all of which grows with them.
 constexpr double kLevelSamplesPerSecond = 56000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// Borders move by a part of their way in each level, as slopes hold offsets to its start. Silhouettes after one, two, four and six coarse
-/// levels: of two plates 0.85, 0.88 and 0.91 (not six), of the rabbit 0.84, 0.86, 0.87 and 0.875, where p rises from 3e-9 to 3e-7. The
-/// seventh is for the level in which skirts are tried: where they are dropped, it is lost. A second finer one changes the rabbit's
-/// errors by a hundredth. Metrics of more vertices take longer than rendering.
+/// Borders move by a part of their way in each level, as slopes hold offsets to its start. Silhouettes of the rabbit after one to seven, the
+/// fifth of which has skirts: 0.861, 0.860, 0.871, 0.868, 0.897, 0.899, 0.900, where p is 0.8 at the end. With three and twice the samples
+/// 0.864, 0.870, 0.893, p = 1e-4. Metrics of more vertices take longer than rendering.
 constexpr int kCoarseLevels = 7;
 constexpr double kMostVertices = 20000;
+/// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
+constexpr double kCoarseVertices = 500;
 /// In lateral resolutions. The rabbit's median, 80 % and silhouette with it 0.85 / 2.8 mm and 0.90, without 1.05 / 3.3 mm and 0.87.
 constexpr double kSkirt = 1.5;
 /// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos, a quarter on average, across
@@ -101,16 +102,16 @@ double area_of(const Mesh& mesh) {
 
 }  // namespace
 
-FitSettings fit_settings(const Mesh& start, double edge_length, double finest, int histograms, double seconds) {
+FitSettings fit_settings(const Mesh& start, double resolution, int histograms, double seconds) {
   FitSettings settings;
-  settings.edge_length = edge_length;
-  settings.skirt = kSkirt * edge_length;
+  // Of regular triangles there are two for each vertex.
+  const double area = area_of(start), of_vertex = std::sqrt(3.0) / 2;
+  settings.edge_length = std::max(resolution, std::sqrt(area / (of_vertex * kCoarseVertices)));
+  settings.skirt = kSkirt * settings.edge_length;
   settings.levels = settings.coarse_levels = kCoarseLevels;
-  auto vertices = static_cast<double>(start.positions.size());
-  for (double edge = edge_length; edge > std::numbers::sqrt2 / 2 * finest && 4 * vertices <= kMostVertices; edge /= 2) {
-    vertices *= 4;
+  for (double edge = settings.edge_length / 2;
+       edge > std::numbers::sqrt2 / 4 * resolution && area / (of_vertex * edge * edge) <= kMostVertices; edge /= 2)
     ++settings.levels;
-  }
   const double each = kLevelSamplesPerSecond * seconds / (settings.levels * histograms);
   settings.samples = static_cast<int>(std::clamp(each, 1.0 * kLeastSamples, 1.0 * kMostSamples)) / 2 * 2;
   return settings;
@@ -154,7 +155,7 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
   const double gain = multiple_of(by_gate(light, readings), by_gate(counts, readings));
   if (gain > 0 && std::isfinite(gain)) settings.gain = gain;
   // Weights of slopes that are normal with such a standard deviation (optim/README.md).
-  const double edges = 1.5 * static_cast<double>(start.faces.size());
+  const double edges = 1.5 * area_of(start) / (std::sqrt(3.0) / 4 * settings.edge_length * settings.edge_length);
   const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings));
   settings.motion = unit / (kMotionSlope * kMotionSlope);
   const double slope = kAlbedoChange / std::sqrt(area_of(start));

@@ -29,9 +29,9 @@ struct FitSettings {
   TimeWindow window;
 };
 
-/// Levels, the first of which has edges as long as that and the last ones half as long as `finest`, and samples for a fit of so many
-/// seconds on two cores.
-FitSettings fit_settings(const Mesh& start, double edge_length, double finest, int histograms, double seconds);
+/// Levels, the coarse ones with edges as long as the resolution (of a surface much larger than that, longer) and the last one with edges of
+/// half of it, and samples for a fit of so many seconds on two cores.
+FitSettings fit_settings(const Mesh& start, double resolution, int histograms, double seconds);
 
 /// Times, as optical paths, at which light of the mesh may be counted at any point, and a quarter as much before and after, for the
 /// background.

@@ -12,7 +12,7 @@ namespace isochron {
 namespace {
 
 constexpr int kFiner = 2;  // voxels per side of one of the back-projection
-constexpr int kNear = 2;  // of the back-projection's voxels: a resolution
+constexpr int kNear = 2;   // of the back-projection's voxels: a resolution
 constexpr int kSteps = 256;
 /// Of a step. Fewer make it jump.
 constexpr std::size_t kLeastRows = 64;
@@ -40,8 +40,8 @@ struct BinResponse {
     const int last = static_cast<int>(std::ceil(response->upper() / bin - 0.5));
     shares.clear();
     for (int i = first; i <= last; ++i)
-      shares.push_back(static_cast<float>(response->cumulated((i + 0.5) * bin).below -
-                                          response->cumulated((i - 0.5) * bin).below));
+      shares.push_back(
+          static_cast<float>(response->cumulated((i + 0.5) * bin).below - response->cumulated((i - 0.5) * bin).below));
   }
 };
 
@@ -71,8 +71,8 @@ std::vector<char> near_surfaces(const BackProjection& volume) {
         const auto [first_a, last_a] = range(a, 0);
         for (int e = first_d; e <= last_d; ++e)
           for (int v = first_u; v <= last_u; ++v)
-            std::fill_n(result.begin() + static_cast<std::ptrdiff_t>(volume.index(e, v, first_a)),
-                        last_a - first_a + 1, 1);
+            std::fill_n(result.begin() + static_cast<std::ptrdiff_t>(volume.index(e, v, first_a)), last_a - first_a + 1,
+                        1);
       }
   return result;
 }
@@ -247,7 +247,7 @@ LikelyAlbedos likely_albedos(const BackProjection& volume, const Histograms& his
                              const DetectorResponse& response) {
   LikelyAlbedos result;
   result.frame = volume.frame;
-  result.lateral_resolution = volume.lateral_resolution;
+  result.resolution = volume.finest_resolution;
   if (volume.across.size() < 2 || volume.up.size() < 2 || volume.depth.size() < 2) return result;
   result.across = finer(volume.across);
   result.up = finer(volume.up);

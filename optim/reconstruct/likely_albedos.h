@@ -13,7 +13,9 @@ struct LikelyAlbedos {
   std::vector<double> across, up, depth;
   /// [depth][up][across], up to a factor; zero where back-projection shows nothing nearby.
   std::vector<float> albedo;
-  double lateral_resolution = 0;  ///< of the back-projection: four voxels
+  /// Across the lines of sight, as far as the detector's response limits it (BackProjection::finest_resolution): the counts' noise lets
+  /// through what a filter for few points blurs.
+  double resolution = 0;
 
   std::size_t index(std::size_t d, std::size_t u, std::size_t a) const {
     return (d * up.size() + u) * across.size() + a;

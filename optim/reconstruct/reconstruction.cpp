@@ -160,8 +160,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   result.photons_needed = photons_needed(capture, volume);
   result.has_signal = !start.faces.empty();
   if (result.has_signal) {
-    settings = fit_settings(start, volume.lateral_resolution, volume.finest_resolution, capture.counts.pixels(),
-                            spec.seconds);
+    settings = fit_settings(start, volume.finest_resolution, capture.counts.pixels(), spec.seconds);
     settings.bin = capture.delta_t;
     settings.window = time_window(start, capture.geometry, response, volume.depth_resolution);
     result.files["back_projection.ply"] = ply(first.mesh, first.albedo);

@@ -11,23 +11,24 @@
 #include <utility>
 #include <vector>
 
-#include "optim/remesh/remesh.h"
-
 namespace isochron {
 namespace {
 
-constexpr int kCellLines = 2;  // voxels from vertex to vertex, before remeshing
-constexpr int kRings = 2;      // voxels of margin: half of a lateral resolution
-constexpr int kSameSurface = 4;      // voxels on either side of the brightest that count as the same surface: a depth resolution
-constexpr int kBlurs = 4;      // of albedos, by the weights 1, 2, 1 along each axis
-constexpr int kSmoothings = 6; // means of depths over 3 x 3 voxels: about a lateral resolution wide
-constexpr int kRoundings = 6;  // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
+constexpr int kCellLines = 2;  // voxels from vertex to vertex
+constexpr int kSameSurface =
+    4;                     // voxels on either side of the brightest that count as the same surface: a depth resolution
+constexpr int kBlurs = 4;  // of albedos, by the weights 1, 2, 1 along each axis
+constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
 constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
+constexpr double kMargin = 0.5;       // resolutions
+constexpr double kSmoothing = 0.5;    // standard deviation of the weights that depths are averaged with, resolutions
 /// Of the albedo that light comes from on average, along a line. Flat sheets end where half is left, but steep parts send as little.
 /// Silhouettes of seven shapes (rabbit, spots, blob, plates, one spot, bust, wide wall) with 0.1, 0.15 and 0.2: means of 0.787, 0.788, 0.768.
 constexpr double kOutline = 0.15;
 /// Before the parts are known, of all.
 constexpr double kLeastOutline = 0.05;
+/// Of the same: a margin has at least that, as gaps have less.
+constexpr double kLeastMargin = 0.08;
 /// What noise leaves, far from all light and close to the wall, passes for specks of surfaces. Six of them before a wall of 2 m, where
 /// the blob has all other light, had less than this each.
 constexpr double kLeastLight = 0.01;
@@ -65,20 +66,31 @@ struct DepthMap {
       for (int a = 0; a < width; ++a) result.at(a, u) = change(a, u);
     return result;
   }
-  /// With a margin, whose depths are those of its lines if they are no farther than `jump` from those nearby.
-  DepthMap grown(const Lines& lines, double jump) const {
+  /// With the margin of a part, whose depths are those of its lines if they are no farther than `jump` from those nearby.
+  DepthMap grown(const Lines& lines, int rings, double jump) const {
+    const double least = kLeastMargin * mean_albedo(lines);
     DepthMap result = *this;
-    for (int ring = 0; ring < kRings; ++ring)
+    for (int ring = 0; ring < rings; ++ring)
       result = result.changed([&](int a, int u) {
-        if (result.has(a, u)) return result.at(a, u);
+        if (result.has(a, u) || lines.albedo[index(a, u)] < least) return result.at(a, u);
         const double nearby = result.mean_around(a, u), own = lines.depth[index(a, u)];
         return std::abs(own - nearby) <= jump ? own : nearby;
       });
     return result;
   }
-  DepthMap smooth() const {
+  /// That light of it comes from.
+  double mean_albedo(const Lines& lines) const {
+    double sum = 0, squares = 0;
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+      if (!std::isfinite(depth[i])) continue;
+      sum += lines.albedo[i];
+      squares += lines.albedo[i] * lines.albedo[i];
+    }
+    return sum > 0 ? squares / sum : 0;
+  }
+  DepthMap smooth(int rounds) const {
     DepthMap result = *this;
-    for (int round = 0; round < kSmoothings; ++round)
+    for (int round = 0; round < rounds; ++round)
       result = result.changed([&](int a, int u) { return result.has(a, u) ? result.mean_around(a, u) : kNone; });
     return result;
   }
@@ -145,16 +157,9 @@ std::vector<DepthMap> pieces(const DepthMap& map, double jump, double least_line
   return result;
 }
 
-/// Without lines of less than `share` of the albedo that light of the piece comes from on average: what lies beyond its outline looks
-/// as if it had less, as the outline is blurred.
+/// Without lines of less than `share` of its albedo: what lies beyond its outline looks as if it had less, as the outline is blurred.
 DepthMap within_outline(const DepthMap& piece, const Lines& lines, double share) {
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < piece.depth.size(); ++i) {
-    if (!std::isfinite(piece.depth[i])) continue;
-    sum += lines.albedo[i];
-    squares += lines.albedo[i] * lines.albedo[i];
-  }
-  const double least = sum > 0 ? share * squares / sum : 0;
+  const double least = share * piece.mean_albedo(lines);
   DepthMap result = piece;
   for (std::size_t i = 0; i < piece.depth.size(); ++i)
     if (!(lines.albedo[i] >= least)) result.depth[i] = kNone;
@@ -167,7 +172,8 @@ double light_of(const DepthMap& part, const LikelyAlbedos& volume, const Lines& 
   for (int u = 0; u < part.height; ++u)
     for (int a = 0; a < part.width; ++a)
       if (part.has(a, u))
-        light += lines.albedo[part.index(a, u)] / std::pow(length(Vec3{volume.across[a], volume.up[u], part.at(a, u)}), 4);
+        light +=
+            lines.albedo[part.index(a, u)] / std::pow(length(Vec3{volume.across[a], volume.up[u], part.at(a, u)}), 4);
   return light;
 }
 
@@ -189,15 +195,15 @@ bool meet(const DepthMap& one, const DepthMap& other, double jump) {
 }
 
 /// The parts with their margins, those together that meet then.
-std::vector<DepthMap> joined(std::vector<DepthMap> parts, const Lines& lines, double step, double jump) {
+std::vector<DepthMap> joined(std::vector<DepthMap> parts, const Lines& lines, int rings, double step, double jump) {
   std::vector<DepthMap> grown;
-  for (const DepthMap& part : parts) grown.push_back(part.grown(lines, step));
+  for (const DepthMap& part : parts) grown.push_back(part.grown(lines, rings, step));
   for (std::size_t i = 0; i < parts.size(); ++i)
     for (std::size_t k = i + 1; k < parts.size(); ++k) {
       if (!meet(grown[i], grown[k], jump)) continue;
       parts[i] =
           parts[i].changed([&](int a, int u) { return parts[i].has(a, u) ? parts[i].at(a, u) : parts[k].at(a, u); });
-      grown[i] = parts[i].grown(lines, step);
+      grown[i] = parts[i].grown(lines, rings, step);
       parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(k));
       grown.erase(grown.begin() + static_cast<std::ptrdiff_t>(k));
       k = i;  // what is larger now may meet others
@@ -290,23 +296,25 @@ Mesh start_surface(const LikelyAlbedos& volume) {
   if (volume.albedo.empty()) return result;
   const double voxel = volume.across[1] - volume.across[0];
   const Lines lines = brightest(volume);
-  const DepthMap map =
-      within_outline({static_cast<int>(volume.across.size()), static_cast<int>(volume.up.size()), lines.depth}, lines,
-                     kLeastOutline);
+  const DepthMap map = within_outline(
+      {static_cast<int>(volume.across.size()), static_cast<int>(volume.up.size()), lines.depth}, lines, kLeastOutline);
   // Half of a disc as wide as the resolution: a single point looks larger.
-  const double least_lines = 0.125 * std::numbers::pi * std::pow(volume.lateral_resolution / voxel, 2);
+  const double least_lines = 0.125 * std::numbers::pi * std::pow(volume.resolution / voxel, 2);
   const double step = kSteepestJoint * voxel;
   std::vector<DepthMap> parts;
   for (const DepthMap& piece : pieces(map, step, least_lines))
     for (DepthMap& part : pieces(within_outline(piece, lines, kOutline), step, least_lines))
       parts.push_back(std::move(part));
   const double jump = kSteepestJoint * std::numbers::sqrt2 * kCellLines * voxel;
-  for (const DepthMap& part : joined(lit(std::move(parts), volume, lines), lines, step, jump)) {
-    Mesh mesh = meshed(part.smooth(), jump);
+  const double resolution = volume.resolution / voxel;  // voxels
+  const int rings = std::max(1, static_cast<int>(std::lround(kMargin * resolution)));
+  // A mean over 3 x 3 lines adds 2 / 3 to the variance.
+  const int smoothings = std::max(1, static_cast<int>(std::lround(1.5 * std::pow(kSmoothing * resolution, 2))));
+  for (const DepthMap& part : joined(lit(std::move(parts), volume, lines), lines, rings, step, jump)) {
+    Mesh mesh = meshed(part.smooth(smoothings), jump);
     round_borders(mesh);
     for (Vec3& p : mesh.positions)
       p = volume.frame.to_capture({volume.across[0] + p.x * voxel, volume.up[0] + p.y * voxel, p.z});
-    if (!mesh.faces.empty()) mesh = remesh(mesh, volume.lateral_resolution).mesh;
     const int before = static_cast<int>(result.positions.size());
     result.positions.insert(result.positions.end(), mesh.positions.begin(), mesh.positions.end());
     for (const auto& face : mesh.faces) result.faces.push_back({face[0] + before, face[1] + before, face[2] + before});

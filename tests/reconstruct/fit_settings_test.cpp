@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "optim/reconstruct/back_projection.h"
 #include "tests/reconstruct/simulated.h"
 
@@ -15,49 +17,44 @@ BackProjection wall_projected(const CaptureGeometry& wall) {
   return back_project(expected_counts(wall, {{{0, 0, 0.4}, {0, 0, -1}, 1}}, 256, kBinOfWall, 100));
 }
 
-FitSettings settings_for(const BackProjection& volume, int vertices) {
-  Mesh start;
-  start.positions.resize(vertices);
-  return fit_settings(start, volume.lateral_resolution, volume.finest_resolution, 4096, 300);
+/// For a square of that area.
+FitSettings settings_for(double area, double resolution) {
+  const double side = std::sqrt(area);
+  return fit_settings({{{0, 0, 0}, {side, 0, 0}, {side, side, 0}, {0, side, 0}}, {{0, 1, 2}, {0, 2, 3}}}, resolution,
+                      4096, 300);
 }
 
-struct Volumes {
-  BackProjection dense = wall_projected(square_wall(32, 0.5)), sparse = wall_projected(square_wall(12, 0.5)),
-                 one_spot = wall_projected(lit_once(square_wall(32, 0.5)));
-  static CaptureGeometry lit_once(CaptureGeometry wall) {
-    add_spots(wall, {{0, 0, 0}});
-    return wall;
-  }
-};
-
-const Volumes& volumes() {
-  static const Volumes all;
-  return all;
-}
-
-TEST(FitSettings, OneFinerLevelWherePointsAreDense) {
-  const BackProjection& dense = volumes().dense;
+TEST(FitSettings, NeitherTheLayoutNorThePointsLimitTheResolution) {
+  CaptureGeometry lit_once = square_wall(32, 0.5);
+  add_spots(lit_once, {{0, 0, 0}});
+  const BackProjection dense = wall_projected(square_wall(32, 0.5)), sparse = wall_projected(square_wall(12, 0.5)),
+                       one_spot = wall_projected(lit_once);
   EXPECT_DOUBLE_EQ(dense.finest_resolution, dense.lateral_resolution);
-  EXPECT_EQ(settings_for(dense, 300).levels, settings_for(dense, 300).coarse_levels + 1);
-}
-
-TEST(FitSettings, MoreWhereLayoutOrPointsLimitBackProjectionAlone) {
-  const auto& [dense, sparse, one_spot] = volumes();
   EXPECT_NEAR(one_spot.lateral_resolution, 2 * dense.lateral_resolution, 0.1 * dense.lateral_resolution);
   EXPECT_NEAR(one_spot.finest_resolution, dense.finest_resolution, 0.05 * dense.finest_resolution);
+  EXPECT_GT(sparse.lateral_resolution, 1.5 * dense.lateral_resolution);
   EXPECT_NEAR(sparse.finest_resolution, dense.finest_resolution, 0.05 * dense.finest_resolution);
-  EXPECT_EQ(settings_for(one_spot, 300).levels, settings_for(dense, 300).levels + 1);
-  EXPECT_GT(settings_for(sparse, 300).levels, settings_for(dense, 300).levels);
 }
 
-TEST(FitSettings, NoLevelOfTooManyVertices) {
-  const FitSettings many = settings_for(volumes().dense, 6000);
-  EXPECT_EQ(many.levels, many.coarse_levels);
+TEST(FitSettings, EdgesOfAResolutionAndOneLevelWithHalfOfThat) {
+  const FitSettings small = settings_for(0.04, 0.0137);
+  EXPECT_DOUBLE_EQ(small.edge_length, 0.0137);
+  EXPECT_EQ(small.levels, small.coarse_levels + 1);
+}
+
+/// 500 triangles' pairs of 4.8 cm make a square metre.
+TEST(FitSettings, LargeSurfacesBeginCoarser) {
+  const FitSettings large = settings_for(1, 0.0137);
+  EXPECT_NEAR(large.edge_length, 0.048, 0.0005);
+  EXPECT_EQ(large.levels, large.coarse_levels + 2) << "2.4 and 1.2 cm; 0.6 would make 32000 vertices";
+  EXPECT_EQ(settings_for(1, 0.03).levels, large.coarse_levels + 2) << "2.4 and 1.2 cm, which is no finer than half";
+  EXPECT_EQ(settings_for(0.5, 0.0137).levels, large.coarse_levels + 2) << "1.7 and 0.8 cm";
 }
 
 TEST(FitSettings, TheWorkOfALevelFallsWithTheirNumber) {
-  const FitSettings dense = settings_for(volumes().dense, 300), one_spot = settings_for(volumes().one_spot, 300);
-  EXPECT_NEAR(one_spot.samples * one_spot.levels, dense.samples * dense.levels, 2 * one_spot.levels);
+  const FitSettings small = settings_for(0.04, 0.0137), large = settings_for(1, 0.0137);
+  ASSERT_LT(small.levels, large.levels);
+  EXPECT_NEAR(large.samples * large.levels, small.samples * small.levels, 2 * large.levels);
 }
 
 }  // namespace

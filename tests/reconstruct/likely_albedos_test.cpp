@@ -91,8 +91,8 @@ TEST(LikelyAlbedos, APatchIsWhereItIs) {
     sum += found.albedo[i];
   }
   mean = mean / sum;
-  EXPECT_NEAR(mean.x, hidden.x, 0.1 * found.lateral_resolution);
-  EXPECT_NEAR(mean.y, hidden.y, 0.1 * found.lateral_resolution);
+  EXPECT_NEAR(mean.x, hidden.x, 0.1 * found.resolution);
+  EXPECT_NEAR(mean.y, hidden.y, 0.1 * found.resolution);
   EXPECT_NEAR(mean.z, hidden.z, 0.25 * kStep);
 }
 
@@ -113,10 +113,10 @@ TEST(LikelyAlbedos, AreNoneBelowZeroAndNoneFarFromWhatIsSignificant) {
     for (int e = d - 2; e <= d + 2; ++e)
       for (int v = u - 2; v <= u + 2; ++v)
         for (int b = a - 2; b <= a + 2; ++b)
-          near = near || (b >= 0 && v >= 0 && e >= 0 && b < static_cast<int>(found.volume.across.size()) &&
-                          v < static_cast<int>(found.volume.up.size()) &&
-                          e < static_cast<int>(found.volume.depth.size()) &&
-                          found.volume.is_surface(found.volume.index(e, v, b)));
+          near = near ||
+                 (b >= 0 && v >= 0 && e >= 0 && b < static_cast<int>(found.volume.across.size()) &&
+                  v < static_cast<int>(found.volume.up.size()) && e < static_cast<int>(found.volume.depth.size()) &&
+                  found.volume.is_surface(found.volume.index(e, v, b)));
     ASSERT_TRUE(near);
   }
   EXPECT_GT(lit, 100u);
