@@ -5,12 +5,11 @@
 
 namespace isochron {
 
-/// What the wall sees first (FirstSurface::depth), in triangles of about a lateral resolution, as a fit needs it:
-/// - with a margin of a lateral resolution beyond what is significant: steep parts send little light, so that back-projection misses
-///   them, and a fit draws a border back more easily than it extends one;
-/// - without small holes, which the margin closes, and without the steps of the grid at borders;
-/// - smooth over a lateral resolution.
-/// Pieces whose margins meet, at depths that a surface may have there, become one part; others may overlap, seen from the wall.
+/// Of each line of sight the brightest voxels, as a fit needs them:
+/// - where a line has at least 0.15 of the albedo that the part's light comes from, with a margin of half a resolution;
+/// - in parts that end where the depth jumps. Those that have hardly any light, or are smaller than half of a disc as wide as the
+///   resolution, are left out; those whose margins meet, at depths that a surface may have there, become one;
+/// - smooth over half a resolution, without the steps of the grid at borders.
 /// Counter-clockwise seen from the wall, manifold, in the capture's coordinates; empty where nothing is significant.
 Mesh start_surface(const LikelyAlbedos& volume);
 
