@@ -11,9 +11,9 @@
 namespace isochron {
 namespace {
 
-constexpr int kFiner = 2;  // voxels per side of one of the back-projection
-constexpr int kNear = 2;   // of the back-projection's voxels: a resolution
-constexpr int kSteps = 256;
+constexpr int kFiner = 2;    // voxels per side of one of the back-projection
+constexpr int kNear = 2;     // of the back-projection's voxels: a resolution
+constexpr int kSteps = 256;  // by the silhouettes of seven shapes (optim/README.md)
 /// Of a step. Fewer make it jump.
 constexpr std::size_t kLeastRows = 64;
 constexpr double kLeastPhotons = 1e5;
@@ -103,10 +103,12 @@ class Maximisation {
     while (std::gcd(stride, rows) != 1) stride += 2;
     std::size_t next = 0;
     scale_to(photons / static_cast<double>(rows));
+    ProgressStage stage("likely albedos", kSteps);
     for (int step = 0; step < kSteps; ++step) {
       std::vector<std::size_t> some;
       for (std::size_t i = 0; i < each; ++i, next = (next + stride) % rows) some.push_back(next);
       make_step(some);
+      stage.advance();
       if ((step + 1) % 32 == 0) drop_dark();
     }
   }

@@ -27,7 +27,8 @@ constexpr double kSmoothing = 0.5;    // standard deviation of the weights that 
 constexpr double kOutline = 0.15;
 /// Before the parts are known, of all.
 constexpr double kLeastOutline = 0.05;
-/// Of the same: a margin has at least that, as gaps have less.
+/// Of the same: a margin has at least that, as gaps have less. The same silhouettes with a margin of two voxels, where at least 0, 0.05
+/// and 0.08 are left: 0.743, 0.763, 0.780.
 constexpr double kLeastMargin = 0.08;
 /// What noise leaves, far from all light and close to the wall, passes for specks of surfaces. Six of them before a wall of 2 m, where
 /// the blob has all other light, had less than this each.

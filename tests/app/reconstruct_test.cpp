@@ -79,7 +79,7 @@ TEST_F(Reconstruct, FindsAPlate) {
   const std::string ply = folder_.read("out/geometry/final_surface.ply");
   EXPECT_NE(ply.find("property double albedo\nproperty double standard_error\n"), std::string::npos);
   const std::string summary = folder_.read("out/summary.yaml");
-  for (const char* key : {"\nfit: {", "\nstart: {method: back_projection, seconds: ", "\nlevels:\n"})
+  for (const char* key : {"\nfit: {", "\nat_bounds: {}", "\nstart: {method: back_projection, seconds: ", "\nlevels:\n"})
     EXPECT_NE(summary.find(key), std::string::npos) << key;
   // The evidence weighs bending, once the coarse levels are done; slopes of offsets are about motion within a level.
   const auto smoothing = [&](const char* level) {
