@@ -146,7 +146,6 @@ class Maximisation {
   /// All albedos the same, as much light in a histogram as that many photons.
   void scale_to(double photons) {
     Arrivals arrivals;
-    arrivals.begin();
     double weights = 0;
     const std::size_t stride = std::max<std::size_t>(1, histograms_.rows.size() / kLeastRows);
     int rows = 0;
@@ -156,7 +155,7 @@ class Maximisation {
         arrive(arrivals, block, row);
         for (int i = 0; i < VoxelBlock::kVoxels; ++i) weights += block.albedo[i] * arrivals.weight[i];
       }
-    start_ = static_cast<float>(photons * rows / weights);
+    if (weights > 0) start_ = static_cast<float>(photons * rows / weights);
     for (LitVoxels& block : blocks_)
       for (float& albedo : block.albedo) albedo *= start_;
   }
@@ -174,7 +173,7 @@ class Maximisation {
         arrive(arrivals, block, rows[k]);
         const float* of = &excess[k * stride];
         for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
-          const float here = of[arrivals.entry[i]], next = of[std::min(arrivals.entry[i] + 1, bins())];
+          const float here = of[arrivals.entry[i]], next = of[arrivals.entry[i] + 1];
           sum[i] += arrivals.weight[i] * (here + arrivals.along[i] * (next - here));
           weights[i] += arrivals.weight[i];
         }
@@ -194,7 +193,7 @@ class Maximisation {
       for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
         const float sent = block.albedo[i] * arrivals.weight[i], late = sent * arrivals.along[i];
         light[arrivals.entry[i]] += sent - late;
-        light[std::min(arrivals.entry[i] + 1, bins())] += late;
+        light[arrivals.entry[i] + 1] += late;
       }
     }
     const int shares = static_cast<int>(response_.shares.size());
@@ -203,23 +202,20 @@ class Maximisation {
       for (int k = from; k < to; ++k) f(bin + response_.first + k, response_.shares[k]);
     };
     for (int bin = 0; bin < bins(); ++bin)
-      each_share(bin, [&](int counted, float share) { expected[counted] += share * light[bin]; });
+      if (light[bin] > 0) each_share(bin, [&](int counted, float share) { expected[counted] += share * light[bin]; });
+    if (photons_[row] == 0) return;
     const float* counts = histograms_.of(row);
     double& background = background_[row];
-    const auto ratio = [&](int bin) {
-      return std::max(0.0, static_cast<double>(counts[bin])) / (expected[bin] + background);
-    };
-    if (photons_[row] > 0)
-      for (int round = 0; round < kBackgroundRounds; ++round) {
-        double mean = 0;
-        for (int bin = 0; bin < bins(); ++bin) mean += ratio(bin) / bins();
-        background = std::max(background * mean, kLeastBackground * photons_[row] / bins());
-      }
-    for (int bin = 0; bin < bins(); ++bin) {
-      double sum = 0;
-      if (photons_[row] > 0) each_share(bin, [&](int counted, float share) { sum += share * ratio(counted); });
-      excess[bin] = static_cast<float>(sum);
+    const auto ratio = [&](int bin) { return std::max(0.0, 1.0 * counts[bin]) / (expected[bin] + background); };
+    for (int round = 0; round < kBackgroundRounds; ++round) {
+      double mean = 0;
+      for (int bin = 0; bin < bins(); ++bin) mean += ratio(bin) / bins();
+      background = std::max(background * mean, kLeastBackground * photons_[row] / bins());
     }
+    std::vector<float> ratios(bins());
+    for (int bin = 0; bin < bins(); ++bin) ratios[bin] = static_cast<float>(ratio(bin));
+    for (int bin = 0; bin < bins(); ++bin)
+      each_share(bin, [&](int counted, float share) { excess[bin] += share * ratios[counted]; });
   }
 
   void drop_dark() {
@@ -249,7 +245,8 @@ LikelyAlbedos likely_albedos(const BackProjection& volume, const Histograms& his
                              const DetectorResponse& response) {
   LikelyAlbedos result;
   result.frame = volume.frame;
-  result.resolution = volume.finest_resolution;
+  // Under one spot the ways to a place are the same for all histograms.
+  result.resolution = (histograms.spots.size() == 1 ? 2 : 1) * volume.finest_resolution;
   if (volume.across.size() < 2 || volume.up.size() < 2 || volume.depth.size() < 2) return result;
   result.across = finer(volume.across);
   result.up = finer(volume.up);

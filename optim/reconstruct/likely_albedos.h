@@ -13,8 +13,7 @@ struct LikelyAlbedos {
   std::vector<double> across, up, depth;
   /// [depth][up][across], up to a factor; zero where back-projection shows nothing nearby.
   std::vector<float> albedo;
-  /// Across the lines of sight, as far as the detector's response limits it (BackProjection::finest_resolution): the counts' noise lets
-  /// through what a filter for few points blurs.
+  /// Across the lines of sight, as far as the detector's response limits it, not the points' distance.
   double resolution = 0;
 
   std::size_t index(std::size_t d, std::size_t u, std::size_t a) const {

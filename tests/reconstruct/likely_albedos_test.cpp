@@ -13,8 +13,8 @@
 namespace isochron {
 namespace {
 
-constexpr double kStep = 0.01;
-constexpr int kSteps = 128;
+constexpr double kLikelyBin = 0.01;
+constexpr int kLikelyBins = 128;
 
 LinearDensity late(double width) {
   return {{0, 0.5 * width, 2 * width}, {0, 1, 0}, "response"};
@@ -44,7 +44,7 @@ CaptureFile two_plates(const CaptureGeometry& wall, const DetectorResponse& resp
   std::vector<HiddenPatch> patches = plate({-0.045, 0, 0.4}, 0.05, 0.12, 0.01);
   const std::vector<HiddenPatch> other = plate({0.045, 0, 0.4}, 0.05, 0.12, 0.01);
   patches.insert(patches.end(), other.begin(), other.end());
-  CaptureFile capture = expected_counts(wall, patches, kSteps, kStep, 5000, response);
+  CaptureFile capture = expected_counts(wall, patches, kLikelyBins, kLikelyBin, 5000, response);
   for (double& value : capture.counts.data) value += 0.5;
   return capture;
 }
@@ -80,7 +80,7 @@ TEST(LikelyAlbedos, APatchIsWhereItIs) {
   wall.laser_origin = {0.3, 0, 0.2};
   wall.sensor_origin = {-0.2, 0.1, 0.2};
   const Vec3 hidden{0.04, -0.03, 0.38};
-  CaptureFile capture = expected_counts(wall, {{hidden, {0, 0, -1}, 1}}, 160, kStep, 2000, late(0.03));
+  CaptureFile capture = expected_counts(wall, {{hidden, {0, 0, -1}, 1}}, 160, kLikelyBin, 2000, late(0.03));
   for (double& value : capture.counts.data) value += 0.2;
   const LikelyAlbedos found = Found(capture, late(0.03)).likely;
   Vec3 mean;
@@ -93,7 +93,7 @@ TEST(LikelyAlbedos, APatchIsWhereItIs) {
   mean = mean / sum;
   EXPECT_NEAR(mean.x, hidden.x, 0.1 * found.resolution);
   EXPECT_NEAR(mean.y, hidden.y, 0.1 * found.resolution);
-  EXPECT_NEAR(mean.z, hidden.z, 0.25 * kStep);
+  EXPECT_NEAR(mean.z, hidden.z, 0.25 * kLikelyBin);
 }
 
 TEST(LikelyAlbedos, AreNoneBelowZeroAndNoneFarFromWhatIsSignificant) {
