@@ -16,10 +16,10 @@ namespace {
 
 constexpr int kCellLines = 2;  // voxels from vertex to vertex
 constexpr int kSameSurface =
-    4;                     // voxels on either side of the brightest that count as the same surface: a depth resolution
-constexpr int kBlurs = 4;  // of albedos, by the weights 1, 2, 1 along each axis
+    4;  // voxels on either side of the brightest that count as the same surface: a depth resolution
 constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
 constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
+constexpr double kBlurring = 0.35;    // standard deviation of the weights that albedos are averaged with, resolutions
 constexpr double kMargin = 0.5;       // resolutions
 constexpr double kSmoothing = 0.5;    // standard deviation of the weights that depths are averaged with, resolutions
 /// Of the albedo that light comes from on average, along a line. Flat sheets end where half is left, but steep parts send as little.
@@ -98,11 +98,13 @@ struct DepthMap {
   }
 };
 
-/// Along each axis, by the weights 1, 2, 1.
+/// Along each axis, by the weights 1, 2, 1, which add 1 / 2 to the variance, in voxels, each time.
 std::vector<float> blurred(const LikelyAlbedos& volume) {
+  const double voxel = volume.across[1] - volume.across[0];
+  const int rounds = std::max(1, static_cast<int>(std::lround(2 * std::pow(kBlurring * volume.resolution / voxel, 2))));
   std::vector<float> albedo = volume.albedo;
   const std::size_t across = volume.across.size(), up = volume.up.size(), depth = volume.depth.size();
-  for (int round = 0; round < kBlurs; ++round)
+  for (int round = 0; round < rounds; ++round)
     for (const auto& [step, count] : {std::pair{std::size_t{1}, across}, {across, up}, {across * up, depth}})
       for (std::size_t line = 0; line < albedo.size() / count; ++line) {
         float* first = &albedo[line % step + line / step * step * count];
