@@ -15,13 +15,15 @@ namespace isochron {
 namespace {
 
 constexpr int kCellLines = 2;  // voxels from vertex to vertex
-constexpr int kSameSurface =
-    4;  // voxels on either side of the brightest that count as the same surface: a depth resolution
+/// Voxels on either side of the brightest that count as the same surface: a depth resolution.
+constexpr int kSameSurface = 4;
 constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
 constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
-constexpr double kBlurring = 0.35;    // standard deviation of the weights that albedos are averaged with, resolutions
-constexpr double kMargin = 0.5;       // resolutions
-constexpr double kSmoothing = 0.5;    // standard deviation of the weights that depths are averaged with, resolutions
+/// Standard deviation of the weights that albedos are averaged with, resolutions. With 1.4 voxels in place of it, twice as much where points
+/// are few, the blob under 8 x 8 spots ends at a silhouette of 0.862 and p = 2e-31, with this at 0.906 and 0.007.
+constexpr double kBlurring = 0.35;
+constexpr double kMargin = 0.5;     // resolutions
+constexpr double kSmoothing = 0.5;  // standard deviation of the weights that depths are averaged with, resolutions
 /// Of the albedo that light comes from on average, along a line. Flat sheets end where half is left, but steep parts send as little.
 /// Silhouettes of seven shapes (rabbit, spots, blob, plates, one spot, bust, wide wall) with 0.1, 0.15 and 0.2: means of 0.787, 0.788, 0.768.
 constexpr double kOutline = 0.15;
