@@ -17,8 +17,9 @@ void Arrivals::Leg::set(const VoxelBlock& block, const Vec3& from) {
 void Arrivals::set(const VoxelBlock& block, const Histograms& histograms, std::size_t row, float first, float last) {
   const Histograms::Row& of = histograms.rows[row];
   back_.set(block, of.sensor);
-  if (of.spot >= 0 && of.spot != spot_) there_.set(block, histograms.spots[of.spot]);
+  if (of.spot >= 0 && (of.spot != spot_ || &block != block_)) there_.set(block, histograms.spots[of.spot]);
   spot_ = of.spot;
+  block_ = &block;
   const Leg& to = of.spot < 0 ? back_ : there_;
   const float per_length = static_cast<float>(1 / histograms.bin);
   for (int i = 0; i < VoxelBlock::kVoxels; ++i) {

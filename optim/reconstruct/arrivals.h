@@ -19,8 +19,7 @@ class Arrivals {
   using Values = VoxelBlock::Values;
 
   /// From the voxels of `block` to a row of the histograms. Times are in bins, that of the row's first bin's middle at `first`; light
-  /// that comes before zero or from `last` on does not count. Calls for the same block, by row, share work from `begin` on.
-  void begin() { spot_ = kNone; }
+  /// that comes before zero or from `last` on does not count. Calls for one block, by spot, share work: the block must not change.
   void set(const VoxelBlock& block, const Histograms& histograms, std::size_t row, float first, float last);
 
   std::array<int, VoxelBlock::kVoxels> entry;  ///< whole bins; `last` where light does not count
@@ -30,8 +29,6 @@ class Arrivals {
   Values weight;
 
  private:
-  static constexpr int kNone = -2;
-
   /// Distances from a point of the wall, and cosine / r^2 there.
   struct Leg {
     Values distance, factor;
@@ -39,7 +36,8 @@ class Arrivals {
   };
 
   Leg back_, there_;
-  int spot_ = kNone;  ///< that `there_` is of
+  const VoxelBlock* block_ = nullptr;  ///< that `there_` is of, and its spot
+  int spot_ = -1;
 };
 
 }  // namespace isochron

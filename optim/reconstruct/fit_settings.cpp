@@ -8,6 +8,7 @@
 
 #include "optim/problem/loss.h"
 #include "optim/problem/problem.h"
+#include "optim/remesh/remesh.h"
 
 namespace isochron {
 namespace {
@@ -91,26 +92,21 @@ double multiple_of(const std::vector<double>& light, const std::vector<double>& 
   return (weights * xy - x * y) / (weights * xx - x * x);
 }
 
-/// Of faces that look away from the wall there are none: the area is that of one side.
-double area_of(const Mesh& mesh) {
-  double area = 0;
-  for (const auto& f : mesh.faces)
-    area +=
-        0.5 * length(cross(mesh.positions[f[1]] - mesh.positions[f[0]], mesh.positions[f[2]] - mesh.positions[f[0]]));
-  return area;
+/// Of a surface in regular triangles, two for each vertex.
+double vertices_of(double area, double edge_length) {
+  return area / (std::sqrt(3.0) / 2 * edge_length * edge_length);
 }
 
 }  // namespace
 
 FitSettings fit_settings(const Mesh& start, double resolution, int histograms, double seconds) {
   FitSettings settings;
-  // Of regular triangles there are two for each vertex.
-  const double area = area_of(start), of_vertex = std::sqrt(3.0) / 2;
-  settings.edge_length = std::max(resolution, std::sqrt(area / (of_vertex * kCoarseVertices)));
+  const double area = surface_area(start);
+  settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
   settings.skirt = kSkirt * settings.edge_length;
   settings.levels = settings.coarse_levels = kCoarseLevels;
   for (double edge = settings.edge_length / 2;
-       edge > std::numbers::sqrt2 / 4 * resolution && area / (of_vertex * edge * edge) <= kMostVertices; edge /= 2)
+       edge > std::numbers::sqrt2 / 4 * resolution && vertices_of(area, edge) <= kMostVertices; edge /= 2)
     ++settings.levels;
   const double each = kLevelSamplesPerSecond * seconds / (settings.levels * histograms);
   settings.samples = static_cast<int>(std::clamp(each, 1.0 * kLeastSamples, 1.0 * kMostSamples)) / 2 * 2;
@@ -155,10 +151,10 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
   const double gain = multiple_of(by_gate(light, readings), by_gate(counts, readings));
   if (gain > 0 && std::isfinite(gain)) settings.gain = gain;
   // Weights of slopes that are normal with such a standard deviation (optim/README.md).
-  const double edges = 1.5 * area_of(start) / (std::sqrt(3.0) / 4 * settings.edge_length * settings.edge_length);
+  const double area = surface_area(start), edges = 3 * vertices_of(area, settings.edge_length);
   const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings));
   settings.motion = unit / (kMotionSlope * kMotionSlope);
-  const double slope = kAlbedoChange / std::sqrt(area_of(start));
+  const double slope = kAlbedoChange / std::sqrt(area);
   settings.albedo = unit / (slope * slope);
 }
 

@@ -151,7 +151,6 @@ class Maximisation {
     int rows = 0;
     for (std::size_t row = 0; row < histograms_.rows.size(); row += stride, ++rows)
       for (const LitVoxels& block : blocks_) {
-        arrivals.begin();
         arrive(arrivals, block, row);
         for (int i = 0; i < VoxelBlock::kVoxels; ++i) weights += block.albedo[i] * arrivals.weight[i];
       }
@@ -167,7 +166,6 @@ class Maximisation {
     parallel(static_cast<int>(blocks_.size()), [&](int b) {
       LitVoxels& block = blocks_[b];
       Arrivals arrivals;
-      arrivals.begin();
       Arrivals::Values sum{}, weights{};
       for (std::size_t k = 0; k < rows.size(); ++k) {
         arrive(arrivals, block, rows[k]);
@@ -188,7 +186,6 @@ class Maximisation {
     std::vector<float> light(bins() + 1), expected(bins());
     Arrivals arrivals;
     for (const LitVoxels& block : blocks_) {
-      arrivals.begin();
       arrive(arrivals, block, row);
       for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
         const float sent = block.albedo[i] * arrivals.weight[i], late = sent * arrivals.along[i];

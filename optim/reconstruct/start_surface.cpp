@@ -100,10 +100,14 @@ struct DepthMap {
   }
 };
 
-/// Along each axis, by the weights 1, 2, 1, which add 1 / 2 to the variance, in voxels, each time.
+/// Of averages that each add a `step` to the variance, at least one: so many make that standard deviation.
+int rounds_of(double deviation, double step) {
+  return std::max(1, static_cast<int>(std::lround(deviation * deviation / step)));
+}
+
+/// Along each axis, by the weights 1, 2, 1.
 std::vector<float> blurred(const LikelyAlbedos& volume) {
-  const double voxel = volume.across[1] - volume.across[0];
-  const int rounds = std::max(1, static_cast<int>(std::lround(2 * std::pow(kBlurring * volume.resolution / voxel, 2))));
+  const int rounds = rounds_of(kBlurring * volume.resolution / (volume.across[1] - volume.across[0]), 0.5);
   std::vector<float> albedo = volume.albedo;
   const std::size_t across = volume.across.size(), up = volume.up.size(), depth = volume.depth.size();
   for (int round = 0; round < rounds; ++round)
@@ -266,8 +270,9 @@ Mesh meshed(const DepthMap& map, double jump) {
   return mesh;
 }
 
-/// Vertices of borders move towards the middle of their two neighbours there, but where a face would turn away from the wall.
-void round_borders(Mesh& mesh) {
+/// Vertices of borders move towards the middle of their two neighbours there, but where a face would turn away from the wall or reach over
+/// more than `jump` in depth.
+void round_borders(Mesh& mesh, double jump) {
   std::set<std::pair<int, int>> sides;
   std::vector<std::vector<int>> faces(mesh.positions.size());
   for (int f = 0; f < static_cast<int>(mesh.faces.size()); ++f)
@@ -281,17 +286,18 @@ void round_borders(Mesh& mesh) {
     neighbours[from][1] = to;
     neighbours[to][0] = from;
   }
-  const auto turned = [&](int f) {
+  const auto spoilt = [&](int f) {
     const auto& [a, b, c] = mesh.faces[f];
     const std::vector<Vec3>& at = mesh.positions;
-    return !(cross(at[b] - at[a], at[c] - at[a]).z < 0);
+    const auto [low, high] = std::minmax({at[a].z, at[b].z, at[c].z});
+    return !(cross(at[b] - at[a], at[c] - at[a]).z < 0) || high - low > jump;
   };
   for (int round = 0; round < kRoundings; ++round)
     for (const auto& [v, beside] : neighbours) {
       Vec3& place = mesh.positions[v];
       const Vec3 old = place;
       place = 0.5 * old + 0.25 * (mesh.positions[beside[0]] + mesh.positions[beside[1]]);
-      if (std::any_of(faces[v].begin(), faces[v].end(), turned)) place = old;
+      if (std::any_of(faces[v].begin(), faces[v].end(), spoilt)) place = old;
     }
 }
 
@@ -300,25 +306,23 @@ void round_borders(Mesh& mesh) {
 Mesh start_surface(const LikelyAlbedos& volume) {
   Mesh result;
   if (volume.albedo.empty()) return result;
-  const double voxel = volume.across[1] - volume.across[0];
+  const double voxel = volume.across[1] - volume.across[0], resolution = volume.resolution / voxel;
   const Lines lines = brightest(volume);
   const DepthMap map = within_outline(
       {static_cast<int>(volume.across.size()), static_cast<int>(volume.up.size()), lines.depth}, lines, kLeastOutline);
   // Half of a disc as wide as the resolution: a single point looks larger.
-  const double least_lines = 0.125 * std::numbers::pi * std::pow(volume.resolution / voxel, 2);
+  const double least_lines = 0.125 * std::numbers::pi * resolution * resolution;
   const double step = kSteepestJoint * voxel;
   std::vector<DepthMap> parts;
   for (const DepthMap& piece : pieces(map, step, least_lines))
     for (DepthMap& part : pieces(within_outline(piece, lines, kOutline), step, least_lines))
       parts.push_back(std::move(part));
   const double jump = kSteepestJoint * std::numbers::sqrt2 * kCellLines * voxel;
-  const double resolution = volume.resolution / voxel;  // voxels
   const int rings = std::max(1, static_cast<int>(std::lround(kMargin * resolution)));
-  // A mean over 3 x 3 lines adds 2 / 3 to the variance.
-  const int smoothings = std::max(1, static_cast<int>(std::lround(1.5 * std::pow(kSmoothing * resolution, 2))));
+  const int smoothings = rounds_of(kSmoothing * resolution, 2.0 / 3);
   for (const DepthMap& part : joined(lit(std::move(parts), volume, lines), lines, rings, step, jump)) {
     Mesh mesh = meshed(part.smooth(smoothings), jump);
-    round_borders(mesh);
+    round_borders(mesh, jump);
     for (Vec3& p : mesh.positions)
       p = volume.frame.to_capture({volume.across[0] + p.x * voxel, volume.up[0] + p.y * voxel, p.z});
     const int before = static_cast<int>(result.positions.size());

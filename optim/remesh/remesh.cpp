@@ -27,13 +27,6 @@ struct Place {
   double radius;
 };
 
-double area(const Mesh& mesh) {
-  double sum = 0;
-  for (const auto& [a, b, c] : mesh.faces)
-    sum += length(cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a])) / 2;
-  return sum;
-}
-
 /// Around each two triangles that pass through each other, unless both have a held vertex, so that they did before.
 std::vector<Place> crossings(const Mesh& mesh, const std::vector<char>& held) {
   const auto is_held = [&](int face) {
@@ -81,6 +74,13 @@ std::optional<Operations> next_round(const Operations& before, std::vector<Place
 
 }  // namespace
 
+double surface_area(const Mesh& mesh) {
+  double sum = 0;
+  for (const auto& [a, b, c] : mesh.faces)
+    sum += length(cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a])) / 2;
+  return sum;
+}
+
 double mean_edge_length(const Mesh& mesh) {
   double sum = 0;
   const std::vector<Edge> edges = build_edges(mesh);
@@ -90,7 +90,7 @@ double mean_edge_length(const Mesh& mesh) {
 
 void require_remeshable(const Mesh& mesh, double edge_length) {
   const double of_triangle = std::sqrt(3.0) / 4 * edge_length * edge_length;
-  if (const double triangles = area(mesh) / of_triangle; !(triangles <= kMostTriangles))
+  if (const double triangles = surface_area(mesh) / of_triangle; !(triangles <= kMostTriangles))
     throw InputError(fmt::format("edges of {:.6g} would make {:.3g} triangles (allowed: {:g})", edge_length, triangles,
                                  kMostTriangles));
   Operations(Surface(mesh), edge_length);

@@ -15,6 +15,9 @@ namespace isochron {
 /// Of all edges; 0 where there is none.
 double mean_edge_length(const Mesh& mesh);
 
+/// Of all faces, each once.
+double surface_area(const Mesh& mesh);
+
 struct Remeshed {
   Mesh mesh;
   std::vector<MeshPoint> origins;  ///< of each of its vertices, on the mesh that it was made of

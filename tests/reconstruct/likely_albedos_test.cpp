@@ -16,8 +16,8 @@ namespace {
 constexpr double kLikelyBin = 0.01;
 constexpr int kLikelyBins = 128;
 
-LinearDensity late(double width) {
-  return {{0, 0.5 * width, 2 * width}, {0, 1, 0}, "response"};
+LinearDensity late(double width, double first = 0) {
+  return {{first, first + 0.5 * width, first + 2 * width}, {0, 1, 0}, "response"};
 }
 
 struct Found {
@@ -80,9 +80,10 @@ TEST(LikelyAlbedos, APatchIsWhereItIs) {
   wall.laser_origin = {0.3, 0, 0.2};
   wall.sensor_origin = {-0.2, 0.1, 0.2};
   const Vec3 hidden{0.04, -0.03, 0.38};
-  CaptureFile capture = expected_counts(wall, {{hidden, {0, 0, -1}, 1}}, 160, kLikelyBin, 2000, late(0.03));
+  const LinearDensity response = late(0.03, -0.045);
+  CaptureFile capture = expected_counts(wall, {{hidden, {0, 0, -1}, 1}}, 160, kLikelyBin, 2000, response);
   for (double& value : capture.counts.data) value += 0.2;
-  const LikelyAlbedos found = Found(capture, late(0.03)).likely;
+  const LikelyAlbedos found = Found(capture, response).likely;
   Vec3 mean;
   double sum = 0;
   for (std::size_t i = 0; i < found.albedo.size(); ++i) {

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "core/scene/mesh.h"
+#include "optim/remesh/remesh.h"
 #include "tests/optim/temporary_folder.h"
 #include "tests/reconstruct/simulated.h"
 #include "tests/seed.h"
@@ -16,6 +17,17 @@ namespace isochron {
 namespace {
 
 constexpr double kBinOfPlate = 32 * 0.299792458e-3;
+
+/// What a reconstruction of a capture begins with, whose files are in `folder`.
+Reconstruction begun(const CaptureFile& capture, const TemporaryFolder& folder) {
+  ReconstructionSpec spec;
+  spec.capture = folder.file("capture.h5");
+  spec.seconds = 0.5;
+  write_capture(spec.capture, capture);
+  const Reconstruction result = begin_reconstruction(spec, folder.path(), {});
+  EXPECT_TRUE(result.has_signal);
+  return result;
+}
 
 /// A plate before 12 x 12 points whose backgrounds differ by so many parts of themselves, at random.
 std::string experiment_of(double spread) {
@@ -37,13 +49,7 @@ std::string experiment_of(double spread) {
       capture.counts.at(p, g) =
           std::poisson_distribution<int>(capture.counts.at(p, g) + std::max(0.1, background))(random);
   }
-  write_capture(folder.file("plate.h5"), capture);
-  ReconstructionSpec spec;
-  spec.capture = folder.file("plate.h5");
-  spec.seconds = 0.5;
-  const Reconstruction begun = begin_reconstruction(spec, folder.path(), {});
-  EXPECT_TRUE(begun.has_signal);
-  return begun.experiment;
+  return begun(capture, folder).experiment;
 }
 
 TEST(Reconstruction, BackgroundsOfEachPointWhereTheyDiffer) {
@@ -60,17 +66,8 @@ TEST(Reconstruction, AlbedosHaveRoomForASurfaceThatShrinks) {
   const double side = 0.12;
   CaptureFile capture = expected_counts(wall, plate({0.02, -0.01, 0.4}, side, side, 0.004), 256, kBinOfPlate, 2000);
   for (double& value : capture.counts.data) value += 0.5;
-  write_capture(folder.file("small.h5"), capture);
-  ReconstructionSpec spec;
-  spec.capture = folder.file("small.h5");
-  spec.seconds = 0.5;
-  const Reconstruction begun = begin_reconstruction(spec, folder.path(), {});
-  ASSERT_TRUE(begun.has_signal);
-  const Mesh start = read_mesh(folder.file("start.ply"));
-  double area = 0;
-  for (const auto& f : start.faces)
-    area += 0.5 *
-            length(cross(start.positions[f[1]] - start.positions[f[0]], start.positions[f[2]] - start.positions[f[0]]));
+  begun(capture, folder);
+  const double area = surface_area(read_mesh(folder.file("start.ply")));
   EXPECT_GT(area, side * side);
   for (const ParameterSpec& parameter : load_experiment(folder.file("experiment.yaml")).parameters)
     if (parameter.name == "albedo") {
