@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "core/base/parallel.h"
 #include "tests/reconstruct/simulated.h"
@@ -95,6 +94,24 @@ TEST(LikelyAlbedos, APatchIsWhereItIs) {
   EXPECT_NEAR(mean.x, hidden.x, 0.1 * found.resolution);
   EXPECT_NEAR(mean.y, hidden.y, 0.1 * found.resolution);
   EXPECT_NEAR(mean.z, hidden.z, 0.25 * kLikelyBin);
+}
+
+/// What the voxels send to all points, by the closed form, is the counts' light without their background.
+TEST(LikelyAlbedos, SendTheLightThatIsCounted) {
+  const CaptureGeometry wall = square_wall(16, 0.5);
+  for (const double background : {0.1, 10.0}) {
+    CaptureFile capture = two_plates(wall);
+    for (double& value : capture.counts.data) value += background - 0.5;
+    const LikelyAlbedos found = Found(capture).likely;
+    const std::size_t across = found.across.size(), up = found.up.size();
+    double sent = 0;
+    for (std::size_t i = 0; i < found.albedo.size(); ++i) {
+      const Vec3 voxel{found.across[i % across], found.up[i / across % up], found.depth[i / across / up]};
+      for (const Vec3& point : wall.sensor)
+        sent += found.albedo[i] * voxel.z * voxel.z / std::pow(length(voxel - found.frame.to_wall(point)), 6);
+    }
+    EXPECT_NEAR(sent / (5000 * static_cast<double>(wall.sensor.size())), 1, 0.01) << background;
+  }
 }
 
 TEST(LikelyAlbedos, AreNoneBelowZeroAndNoneFarFromWhatIsSignificant) {

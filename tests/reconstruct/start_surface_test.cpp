@@ -114,13 +114,16 @@ TEST(StartSurface, APieceAtAnotherDepthIsAPartOfItsOwn) {
     EXPECT_NEAR(apart.positions[f[0]].z, apart.positions[f[1]].z, 1e-3) << "a face across the jump";
 }
 
-/// A cap whose steep sides send too little light for the outline but enough for the margin: that lies where the data have them.
+/// A cap whose steep sides send too little light for the outline but enough for the margin: that lies where the data have them, deeper than
+/// one that goes on as flat as the cap's edge is.
 TEST(StartSurface, TheMarginFollowsTheData) {
-  const Mesh mesh =
-      HiddenLines(
-          [](int a, int u) { return from_middle(a, u) <= 18 ? 12.5 + std::max(0.0, from_middle(a, u) - 12) : kNone; },
-          [](int a, int u) { return from_middle(a, u) <= 12 ? 1 : 0.1; })
-          .start();
+  const Mesh mesh = HiddenLines(
+                        [](int a, int u) {
+                          const double r = from_middle(a, u);
+                          return r <= 18 ? 12.5 + 1.9 * std::max(0.0, r - 13) : kNone;
+                        },
+                        [](int a, int u) { return from_middle(a, u) <= 12 ? 1 : 0.1; })
+                        .start();
   double deepest = 0;
   for (const Vec3& p : mesh.positions) deepest = std::max(deepest, p.z);
   EXPECT_GT(deepest, 13.2);
@@ -177,6 +180,24 @@ TEST(StartSurface, PartsWithHardlyAnyLightAreLeftOut) {
   };
   EXPECT_NEAR(deepest(4), 40.5, 0.5);
   EXPECT_NEAR(deepest(0.4), 20.5, 0.5);
+}
+
+/// A line whose blurred albedo reaches a twentieth of the disc's in its middle alone. So near the wall it has more light than the disc.
+TEST(StartSurface, SpecksAreLeftOut) {
+  const auto nearest = [](double albedo) {
+    const Mesh mesh = HiddenLines(
+                          [](int a, int u) {
+                            if (a == 4 && u == 4) return 4.5;
+                            return from_middle(a, u) <= 10 ? 40.5 : kNone;
+                          },
+                          [=](int a, int u) { return a == 4 && u == 4 ? albedo : 1; })
+                          .start();
+    double z = kSide;
+    for (const Vec3& p : mesh.positions) z = std::min(z, p.z);
+    return z;
+  };
+  EXPECT_NEAR(nearest(0.72), 40.5, 0.5);
+  EXPECT_NEAR(nearest(20), 4.5, 0.5) << "no speck any more";
 }
 
 TEST(StartSurface, IsEmptyWhereNothingIsSignificant) {
