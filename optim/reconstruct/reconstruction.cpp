@@ -155,12 +155,13 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   const DetectorResponse response = response_of(load_experiment(experiment).gates, capture);
   const BackProjection volume = back_projected(capture, response, spec.capture);
   const FirstSurface first = first_surface(volume);
-  const Mesh start = start_surface(likely_albedos(volume, histograms(capture, volume.frame), response));
+  const LikelyAlbedos likely = likely_albedos(volume, histograms(capture, volume.frame), response);
+  const Mesh start = start_surface(likely);
 
   result.photons_needed = photons_needed(capture, volume);
   result.has_signal = !start.faces.empty();
   if (result.has_signal) {
-    settings = fit_settings(start, volume.finest_resolution, capture.counts.pixels(), spec.seconds);
+    settings = fit_settings(start, likely.resolution, capture.counts.pixels(), spec.seconds);
     settings.bin = capture.delta_t;
     settings.window = time_window(start, capture.geometry, response, volume.depth_resolution);
     result.files["back_projection.ply"] = ply(first.mesh, first.albedo);
