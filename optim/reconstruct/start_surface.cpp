@@ -18,6 +18,7 @@ constexpr int kCellLines = 2;  // voxels from vertex to vertex
 /// Voxels on either side of the brightest that count as the same surface: a depth resolution.
 constexpr int kSameSurface = 4;
 constexpr int kRoundings = 6;         // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
+constexpr double kRounded = 0.25;     // how far borders move by that, diagonals of a cell: a part of one cell keeps half its width
 constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
 /// Standard deviation of the weights that albedos are averaged with, resolutions. With 1.4 voxels in place of it, twice as much where points
 /// are few, the blob under 8 x 8 spots ends at a silhouette of 0.862 and p = 2e-31, with this at 0.906 and 0.007.
@@ -270,8 +271,8 @@ Mesh meshed(const DepthMap& map, double jump) {
   return mesh;
 }
 
-/// Vertices of borders move towards the middle of their two neighbours there, but where a face would turn away from the wall or reach over
-/// more than `jump` in depth.
+/// Vertices of borders move towards the middle of their two neighbours there, no further than kRounded, but where a face would turn away from
+/// the wall or reach over more than `jump` in depth.
 void round_borders(Mesh& mesh, double jump) {
   std::set<std::pair<int, int>> sides;
   std::vector<std::vector<int>> faces(mesh.positions.size());
@@ -292,11 +293,16 @@ void round_borders(Mesh& mesh, double jump) {
     const auto [low, high] = std::minmax({at[a].z, at[b].z, at[c].z});
     return !(cross(at[b] - at[a], at[c] - at[a]).z < 0) || high - low > jump;
   };
+  const std::vector<Vec3> before = mesh.positions;
+  const double farthest = kRounded * std::numbers::sqrt2 * kCellLines;
   for (int round = 0; round < kRoundings; ++round)
     for (const auto& [v, beside] : neighbours) {
       Vec3& place = mesh.positions[v];
       const Vec3 old = place;
       place = 0.5 * old + 0.25 * (mesh.positions[beside[0]] + mesh.positions[beside[1]]);
+      const Vec3 moved = place - before[v];
+      const double far = std::hypot(moved.x, moved.y);
+      if (far > farthest) place = before[v] + moved * (farthest / far);
       if (std::any_of(faces[v].begin(), faces[v].end(), spoilt)) place = old;
     }
 }

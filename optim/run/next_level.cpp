@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "optim/remesh/remesh.h"
 #include "optim/remesh/skirt.h"
@@ -28,24 +29,21 @@ const std::vector<double>* find(const LevelSurface& surface, int parameter, cons
   return nullptr;
 }
 
-/// Without the vertices that no face has.
-void drop_unused(LevelSurface& surface) {
-  std::vector<int> number(surface.mesh.positions.size(), -1);
-  for (const auto& face : surface.mesh.faces)
-    for (const int v : face) number[v] = 0;
-  int count = 0;
-  for (int& n : number)
-    if (n == 0) n = count++;
-  const auto keep = [&](auto& values, int columns) {
-    for (std::size_t v = 0; v < number.size(); ++v)
-      if (number[v] >= 0)
-        for (int k = 0; k < columns; ++k) values[number[v] * columns + k] = values[v * columns + k];
-    values.resize(static_cast<std::size_t>(count) * columns);
-  };
-  keep(surface.mesh.positions, 1);
-  for (SurfaceField& field : surface.fields) keep(field.values, field.columns);
-  for (auto& face : surface.mesh.faces)
-    for (int& v : face) v = number[v];
+/// Its vertices are those of a clean mesh: a fit may bring two of them to one place.
+LevelSurface cleaned(const LevelSurface& surface) {
+  LevelSurface result{clean_mesh(surface.mesh), surface.fields};
+  if (!result.mesh.file_vertices) return result;
+  const std::vector<int>& vertex = result.mesh.file_vertices->vertex;
+  for (SurfaceField& field : result.fields) {
+    const std::vector<double> old = std::exchange(field.values, {});
+    field.values.resize(result.mesh.positions.size() * field.columns);
+    for (std::size_t v = vertex.size(); v-- > 0;)  // so that of several the first is left
+      if (vertex[v] >= 0)
+        std::copy_n(old.begin() + static_cast<std::ptrdiff_t>(v) * field.columns, field.columns,
+                    field.values.begin() + static_cast<std::ptrdiff_t>(vertex[v]) * field.columns);
+  }
+  result.mesh.file_vertices.reset();
+  return result;
 }
 
 }  // namespace
@@ -112,8 +110,7 @@ LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_
 }
 
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {
-  LevelSurface old = surface;
-  drop_unused(old);
+  const LevelSurface old = cleaned(surface);
   Remeshed result = remesh(old.mesh, edge_length);
   LevelSurface next{result.mesh, old.fields};
   for (SurfaceField& field : next.fields) field.values = carry_over(result, old.mesh, field.values, field.columns);

@@ -214,6 +214,22 @@ TEST_F(LevelsTest, EverythingIsCarriedOver) {
   EXPECT_EQ(next[3].scale, 2);
 }
 
+/// A fit may bring vertices to one place, by rounding: they go on as one, and with one value.
+TEST_F(LevelsTest, VerticesAtOnePlaceAreOne) {
+  LevelSurface surface;
+  surface.mesh = {{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {1, 1 + 1e-15, 0}}, {{0, 1, 2}, {0, 4, 3}}};
+  surface.fields.push_back({0, "initial", 2, {1, 10, 2, 20, 3, 30, 4, 40, 3 + 1e-14, 30}});
+  const LevelSurface next = remeshed_surface(surface, 1.2);
+  EXPECT_EQ(next.mesh.faces.size(), 2u);
+  ASSERT_EQ(next.mesh.positions.size(), 4u);
+  ASSERT_EQ(next.fields[0].values.size(), 8u);
+  for (std::size_t v = 0; v < 4; ++v) {
+    const Vec3& p = next.mesh.positions[v];
+    EXPECT_EQ(next.fields[0].values[2 * v], p.y == 0 ? 1 + p.x : 4 - p.x);
+    EXPECT_EQ(next.fields[0].values[2 * v + 1], 10 * next.fields[0].values[2 * v]);
+  }
+}
+
 /// After one of two coarse levels: the second begins with strips behind the borders, and the third goes on with them or with the
 /// first. Nothing moves but by remeshing, which rounds the bend at a border: that makes a flat sheet more like a hill, and less like itself.
 TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
