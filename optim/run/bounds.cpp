@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 
@@ -12,6 +13,12 @@ bool reaches(double value, double bound, bool upper) {
   constexpr double kRounding = 1e-12;  // of a mean over some hundred rows, relative to the bound
   const double beyond = upper ? value - bound : bound - value;
   return std::isfinite(bound) && beyond >= -kRounding * std::abs(bound);
+}
+
+/// Whether bounds hold the unknown to a percent of itself: whoever sets such ones has chosen the value, as a reconstruction does its gain.
+bool hold(double lower, double upper) {
+  constexpr double kRoom = 0.01;
+  return upper - lower <= kRoom * std::max(std::abs(lower), std::abs(upper));
 }
 
 }  // namespace
@@ -27,8 +34,10 @@ std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vec
     for (const bool upper : {false, true}) {
       AtBound at{block.name, upper, 0, 0, block.count, {}};
       for (int i = 0; i < block.count; ++i) {
-        const double bound = (upper ? parameters.upper() : parameters.lower())[block.begin + i];
-        if (!reaches(theta[block.begin + i], bound, upper)) continue;
+        const std::size_t index = block.begin + i;
+        const double bound = (upper ? parameters.upper() : parameters.lower())[index];
+        if (hold(parameters.lower()[index], parameters.upper()[index])) continue;
+        if (!reaches(theta[index], bound, upper)) continue;
         if (at.count++ == 0) at.bound = bound;
         if (at.first.size() < kMostIndices) at.first.push_back(i);
       }

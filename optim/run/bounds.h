@@ -19,7 +19,8 @@ struct AtBound {
 /// Whether unknown i lies on its lower or upper bound. A mean of values that all did counts, though it may have been rounded off it.
 bool is_at_bound(const Parameters& parameters, const std::vector<double>& theta, std::size_t i);
 
-/// In the order of the parameters, lower bounds first.
+/// In the order of the parameters, lower bounds first. Without unknowns whose bounds are within a percent of each other: these were chosen, and
+/// are no surprise.
 std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vector<double>& theta);
 
 /// A line for each, indented by two blanks: `gain ended at its lower bound 0.01`.

@@ -106,6 +106,18 @@ TEST_F(Report, BoundsOfManyUnknownsAreCounted) {
             "    upper: {bound: 1, count: 1, first: [1]}\n");
 }
 
+/// Bounds that leave no room are a choice.
+TEST_F(Report, UnknownsThatAreHeldAreNotAtBounds) {
+  for (const double room : {0.009, 0.011}) {
+    ParameterSpec held = albedo("wall", {0.5}, {});
+    held.lower = {0.5};
+    held.upper = {0.5 / (1 - room)};
+    const Parameters parameters(scene_, {held});
+    EXPECT_EQ(find_at_bounds(parameters, held.lower).size(), room < 0.01 ? 0u : 1u);
+    EXPECT_EQ(find_at_bounds(parameters, held.upper).size(), room < 0.01 ? 0u : 1u);
+  }
+}
+
 TEST_F(Report, SummaryHasErrorsAndCost) {
   const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
   state_.theta = {0.6875, 0.375};
