@@ -18,8 +18,8 @@ constexpr int kCellLines = 2;  // voxels from vertex to vertex
 /// Voxels on either side of the brightest that count as the same surface: a depth resolution.
 constexpr int kSameSurface = 4;
 constexpr int kRoundings = 6;  // of borders, by the weights 1, 2, 1 each: steps of a grid are gone after that
-constexpr double kRounded =
-    0.25;  // how far borders move by that, diagonals of a cell: a part of one cell keeps half its width
+/// How far borders move by that, diagonals of a cell: a part of one cell keeps half its width.
+constexpr double kRounded = 0.25;
 constexpr double kSteepestJoint = 2;  // depth over distance, as of the first surface
 /// Standard deviation of the weights that albedos are averaged with, resolutions. With 1.4 voxels in place of it, twice as much where points
 /// are few, the blob under 8 x 8 spots ends at a silhouette of 0.862 and p = 2e-31, with this at 0.906 and 0.007.

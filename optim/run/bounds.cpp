@@ -15,9 +15,9 @@ bool reaches(double value, double bound, bool upper) {
   return std::isfinite(bound) && beyond >= -kRounding * std::abs(bound);
 }
 
-/// Whether bounds hold the unknown to a percent of itself: whoever sets such ones has chosen the value, as a reconstruction does its gain.
+/// Whether bounds hold the unknown to a 400th of itself: whoever sets such ones has chosen the value. That of the gain of reconstructions is a 500th.
 bool hold(double lower, double upper) {
-  constexpr double kRoom = 0.01;
+  constexpr double kRoom = 0.0025;
   return upper - lower <= kRoom * std::max(std::abs(lower), std::abs(upper));
 }
 

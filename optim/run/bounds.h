@@ -19,7 +19,7 @@ struct AtBound {
 /// Whether unknown i lies on its lower or upper bound. A mean of values that all did counts, though it may have been rounded off it.
 bool is_at_bound(const Parameters& parameters, const std::vector<double>& theta, std::size_t i);
 
-/// In the order of the parameters, lower bounds first. Without unknowns whose bounds are within a percent of each other: these were chosen, and
+/// In the order of the parameters, lower bounds first. Without unknowns whose bounds are within 0.25 % of each other: these were chosen, and
 /// are no surprise.
 std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vector<double>& theta);
 

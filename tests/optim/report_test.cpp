@@ -108,13 +108,13 @@ TEST_F(Report, BoundsOfManyUnknownsAreCounted) {
 
 /// Bounds that leave no room are a choice.
 TEST_F(Report, UnknownsThatAreHeldAreNotAtBounds) {
-  for (const double room : {0.009, 0.011}) {
+  for (const double room : {0.0024, 0.0026}) {
     ParameterSpec held = albedo("wall", {0.5}, {});
     held.lower = {0.5};
     held.upper = {0.5 / (1 - room)};
     const Parameters parameters(scene_, {held});
-    EXPECT_EQ(find_at_bounds(parameters, held.lower).size(), room < 0.01 ? 0u : 1u);
-    EXPECT_EQ(find_at_bounds(parameters, held.upper).size(), room < 0.01 ? 0u : 1u);
+    EXPECT_EQ(find_at_bounds(parameters, held.lower).size(), room < 0.0025 ? 0u : 1u);
+    EXPECT_EQ(find_at_bounds(parameters, held.upper).size(), room < 0.0025 ? 0u : 1u);
   }
 }
 
