@@ -68,13 +68,18 @@ void TangentSink::splat(int column, int pixel, int gate, const Rgb& value, doubl
 }
 
 void AdjointSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
+  for (std::size_t a = 0; a < adjoints_.size(); ++a) add(a, pixel, value, length, use);
+}
+
+void AdjointSink::add(std::size_t which, int pixel, const Rgb& value, double length, GateWeights use) {
+  const GatedImage& adjoint = adjoints_[which];
   // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
   Rgb weight;
   double slope_weight = 0;
-  if (adjoint_.channels == 1) {
+  if (adjoint.channels == 1) {
     double values[GateSet::kRun] = {}, slopes[GateSet::kRun] = {};
     gates_.for_each_run(length, [&](const GateSet::Run& run) {
-      const double* a = &adjoint_.data[adjoint_.index(pixel, run.first)];
+      const double* a = &adjoint.data[adjoint.index(pixel, run.first)];
       const auto accumulate = [&](int count) {
         for (int k = 0; k < count; ++k) {
           values[k] += a[k] * run.value[k];
@@ -92,33 +97,39 @@ void AdjointSink::add(int pixel, const Rgb& value, double length, GateWeights us
     slope_weight = std::accumulate(slopes, std::end(slopes), 0.0) * value.r;
   } else {
     gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-      const double* a = &adjoint_.data[adjoint_.index(pixel, g)];
-      for (int c = 0; c < adjoint_.channels; ++c) {
+      const double* a = &adjoint.data[adjoint.index(pixel, g)];
+      for (int c = 0; c < adjoint.channels; ++c) {
         weight[c] += a[c] * w * value[c];
         slope_weight += a[c] * slope * value[c];
       }
     });
   }
-  scatter(weight * use.value, slope_weight * use.slope);
+  scatter(which, weight * use.value, slope_weight * use.slope);
 }
 
 void AdjointSink::add_length_rate(int pixel, int gate, const Rgb& value) {
-  const double* a = &adjoint_.data[adjoint_.index(pixel, gate)];
-  double slope_weight = 0;
-  for (int c = 0; c < adjoint_.channels; ++c) slope_weight += a[c] * value[c];
-  scatter({}, slope_weight);
+  for (std::size_t which = 0; which < adjoints_.size(); ++which) {
+    const GatedImage& adjoint = adjoints_[which];
+    const double* a = &adjoint.data[adjoint.index(pixel, gate)];
+    double slope_weight = 0;
+    for (int c = 0; c < adjoint.channels; ++c) slope_weight += a[c] * value[c];
+    scatter(which, {}, slope_weight);
+  }
 }
 
-void AdjointSink::scatter(const Rgb& weight, double slope_weight) {
+void AdjointSink::scatter(std::size_t adjoint, const Rgb& weight, double slope_weight) {
+  const auto add = [&](int dof, double value) {
+    gradient_.add(static_cast<std::size_t>(dof) * adjoints_.size() + adjoint, value);
+  };
   const double sum = weight.r + weight.g + weight.b;
   if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
   for (const VertexGradient& v : differential_->vertices)
     for (int axis = 0; axis < 3; ++axis)
       if (const int dof = layout_.vertex(v.vertex, axis); basis_.differentiates(dof))
-        gradient_.add(dof, (v.channel < 0 ? sum : weight[v.channel]) * v.log_f[axis] + slope_weight * v.length[axis]);
+        add(dof, (v.channel < 0 ? sum : weight[v.channel]) * v.log_f[axis] + slope_weight * v.length[axis]);
   for (const ScalarGradient& s : differential_->scalars)
     if (basis_.differentiates(s.dof))
-      gradient_.add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
+      add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
 }
 
 }  // namespace isochron

@@ -2,7 +2,7 @@
 // density, per channel, without the gate), its length, and its local differential.
 //   PrimalSink    gated images;
 //   TangentSink   derivative images, one per column of the basis (one column: a tangent; all: the Jacobian);
-//   AdjointSink   gradient over the degrees of freedom, weighted by dLoss/dImage.
+//   AdjointSink   gradients over the degrees of freedom, weighted by dLoss/dImage of one loss or several.
 // Breakdowns (breakdown_sinks.h) and the learning pass of the guiding (GuideSink) have sinks of their own.
 #pragma once
 #include <span>
@@ -109,10 +109,11 @@ class TangentSink final : public Sink {
 
 class AdjointSink final : public Sink {
  public:
-  /// `adjoint` is dLoss/dImage; `gradient` gets the degrees of freedom that the basis moves.
-  AdjointSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, const GatedImage& adjoint,
-              SparseSum& gradient)
-      : gates_(gates), layout_(layout), basis_(basis), adjoint_(adjoint), gradient_(gradient) {}
+  /// `adjoints` are dLoss/dImage of one loss or several, images of one shape. `gradient`, [degree of freedom][adjoint], gets those that the
+  /// basis moves.
+  AdjointSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis,
+              std::span<const GatedImage> adjoints, SparseSum& gradient)
+      : gates_(gates), layout_(layout), basis_(basis), adjoints_(adjoints), gradient_(gradient) {}
 
   bool differential() const override { return true; }
   void bind(const LocalDifferential& differential) override { differential_ = &differential; }
@@ -120,12 +121,13 @@ class AdjointSink final : public Sink {
   void add_length_rate(int pixel, int gate, const Rgb& value) override;
 
  private:
-  void scatter(const Rgb& weight, double slope_weight);
+  void add(std::size_t adjoint, int pixel, const Rgb& value, double length, GateWeights use);
+  void scatter(std::size_t adjoint, const Rgb& weight, double slope_weight);
 
   const GateSet& gates_;
   const DofLayout layout_;
   const TangentBasis& basis_;
-  const GatedImage& adjoint_;
+  const std::span<const GatedImage> adjoints_;
   SparseSum& gradient_;
   const LocalDifferential* differential_ = nullptr;
 };

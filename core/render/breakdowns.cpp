@@ -1,5 +1,4 @@
 // What light and gradient are made of: by bounces, gates, shapes and techniques.
-#include <cmath>
 #include <stdexcept>
 
 #include "core/films/breakdown_sinks.h"
@@ -64,22 +63,14 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
   sum.by_technique.assign(kTechniques * columns, 0.0);
   if (!impl.has(term) || columns == 0) return sum;
   impl.prepare(term);
-  // Gates are picked by what they count for in any of the adjoints.
   std::vector<double> interleaved(entries * count);
-  GatedImage largest = adjoints[0];
-  for (std::size_t i = 0; i < entries; ++i) {
-    double squares = 0;
-    for (std::size_t j = 0; j < count; ++j) {
-      const double a = interleaved[i * count + j] = adjoints[j].data[i];
-      squares += a * a;
-    }
-    largest.data[i] = std::sqrt(squares);
-  }
-  const GatePick pick(impl.gates, largest, impl.draws_lengths(term));
+  for (std::size_t i = 0; i < entries; ++i)
+    for (std::size_t j = 0; j < count; ++j) interleaved[i * count + j] = adjoints[j].data[i];
+  const GatePick pick(impl.gates, adjoints, impl.draws_lengths(term));
   const int partitions = impl.partitions_for(range, sum.by_bounces.size() + sum.by_gate.size() + sum.by_shape.size());
   const Sum all = impl.sum_of<Sum>(pass_kind(term), partitions, [&](int partition) {
     Sum own = sum;
-    GradientBreakdownSink sink(impl.scene, impl.gates, *impl.basis, largest.channels, interleaved, own);
+    GradientBreakdownSink sink(impl.scene, impl.gates, *impl.basis, adjoints[0].channels, interleaved, own);
     impl.run_term(term, {stream, range}, {partition, partitions}, pick, sink);
     return own;
   });

@@ -144,30 +144,44 @@ std::vector<ReplicatedImage> Renderer::derive_replicates(Term term, const Stream
 
 void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
                             std::vector<double>& dof_gradient, std::vector<std::vector<double>>* parts) const {
+  add_gradients(term, {&adjoint, 1}, stream, range, {&dof_gradient, 1}, parts);
+}
+
+void Renderer::add_gradients(Term term, std::span<const GatedImage> adjoints, const Stream& stream, SampleRange range,
+                             std::vector<std::vector<double>>& dof_gradients) const {
+  add_gradients(term, adjoints, stream, range, dof_gradients, nullptr);
+}
+
+void Renderer::add_gradients(Term term, std::span<const GatedImage> adjoints, const Stream& stream, SampleRange range,
+                             std::span<std::vector<double>> dof_gradients,
+                             std::vector<std::vector<double>>* parts) const {
   if (!impl_->basis) throw std::logic_error("add_gradient: the renderer was made without a tangent basis");
   const TangentBasis& basis = *impl_->basis;
   if (parts) parts->assign(kGradientParts, std::vector<double>(basis.columns, 0.0));
-  if (term == Term::interior) impl_->add_background_gradient(adjoint, dof_gradient, parts);
+  const std::size_t count = adjoints.size(), dofs = dof_gradients[0].size();
+  for (std::size_t a = 0; a < count && term == Term::interior; ++a)
+    impl_->add_background_gradient(adjoints[a], dof_gradients[a], a == 0 ? parts : nullptr);
   if (!impl_->has(term)) return;
   impl_->prepare(term);
   const PassTimes::Timed timed(impl_->times(), pass_kind(term));
-  const GatePick pick(impl_->gates, adjoint, impl_->draws_lengths(term));
+  const GatePick pick(impl_->gates, adjoints, impl_->draws_lengths(term));
   const int partitions = impl_->partitions_for(range, basis.entries.size());  // at least as many as are touched
   std::vector<std::vector<double>> by_partition(parts ? partitions : 0, std::vector<double>(basis.columns, 0.0));
   SharedPartitions shared(partitions, impl_->partition_costs(pass_kind(term), partitions));
   const auto sum = sum_of_partitions<SparseSum>(shared, [&](int partition) {
-    SparseSum own(dof_gradient.size());
-    AdjointSink sink(impl_->gates, impl_->scene.layout, basis, adjoint, own);
+    SparseSum own(dofs * count);
+    AdjointSink sink(impl_->gates, impl_->scene.layout, basis, adjoints, own);
     impl_->run_term(term, {stream, range}, {partition, partitions}, pick, sink);
     if (parts)
-      own.for_each(0, dof_gradient.size(), [&](std::size_t dof, double value) {
-        for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
+      own.for_each(0, dofs * count, [&](std::size_t i, double value) {
+        const std::size_t dof = i / count;
+        for (int e = basis.row_begin[dof]; i % count == 0 && e < basis.row_begin[dof + 1]; ++e)
           by_partition[partition][basis.entries[e].column] += basis.entries[e].coefficient * value;
       });
     return own;
   });
   if (parts) all_gather_parts(shared.parts, by_partition);
-  sum.for_each(0, dof_gradient.size(), [&](std::size_t dof, double value) { dof_gradient[dof] += value; });
+  sum.for_each(0, dofs * count, [&](std::size_t i, double value) { dof_gradients[i % count][i / count] += value; });
   // Whatever the number of partitions, each part is of the same pixels, see part_of.
   const int pixels = impl_->scene.pixels();
   for (int i = 0; i < static_cast<int>(by_partition.size()); ++i)

@@ -7,8 +7,8 @@
 
 namespace isochron {
 
-GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths) : gates_(gates) {
-  const int count = gates.size(), pixels = adjoint.pixels();
+GatePick::GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths) : gates_(gates) {
+  const int count = gates.size(), pixels = adjoints[0].pixels();
   if (lengths) below_.assign(static_cast<std::size_t>(pixels + 1) * (count + 1), 0.0);
   // Makes probabilities of weights; returns their sum.
   const auto accumulate = [&](double* p) {
@@ -27,7 +27,8 @@ GatePick::GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths
       if (!lengths) alone.assign(count + 1, 0.0);
       double* p = lengths ? &below_[row(pixel)] : alone.data();
       for (int g = 0; g < count; ++g) {
-        for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
+        for (const GatedImage& adjoint : adjoints)
+          for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
         of_chunk[chunk][g + 1] += p[g + 1];
       }
       rate_[pixel] = accumulate(p);

@@ -4,6 +4,7 @@
 // samples in proportion to that sum over their gates.
 #pragma once
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "core/gates/gate.h"
@@ -19,7 +20,10 @@ class GatePick {
   /// Every gate alike. `gates` must outlive this.
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
   /// `lengths`: whether lengths are drawn. Without, only rate() may be called, and no table of the size of an image is made.
-  GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths = true);
+  /// Several adjoints, images of one shape, count with the sum of their magnitudes.
+  GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths = true);
+  GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths = true)
+      : GatePick(gates, std::span(&adjoint, 1), lengths) {}
   /// Of the tables that draw lengths, in bytes.
   static double table_bytes(int pixels, int gates) { return sizeof(double) * (pixels + 1.0) * (gates + 1.0); }
 

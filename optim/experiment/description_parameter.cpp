@@ -235,8 +235,8 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.value(
         "skirt", field::non_negative(spec.remesh.skirt),
         "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, as "
-        "bodies do that turn out of sight there. Dropped after a level if the data were explained as well without; 0: "
-        "not",
+        "bodies do that turn out of sight there. Dropped after half as many levels if the data were explained as well "
+        "without; 0: not",
         {.unit = "scene units", .unset = spec.remesh.skirt == 0});
   };
   keys.map("remesh", remesh,

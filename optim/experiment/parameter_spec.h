@@ -1,5 +1,6 @@
 // Parameters: what an experiment says of each, and the names of their types.
 #pragma once
+#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
@@ -45,6 +46,9 @@ struct RemeshSpec {
 
   /// After which level borders get their strips: half of the coarse ones.
   int skirt_after() const { return (coarse_levels + 1) / 2; }
+  /// The last level before they are kept or dropped: half as many as came before have them, at least one, and a further one follows.
+  /// With one alone the strips of a rabbit, which explain its counts better from the second on, were dropped.
+  int skirt_until() const { return skirt > 0 ? std::min(skirt_after() + (skirt_after() + 1) / 2, levels - 1) : 0; }
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "core/base/parallel.h"
 
 namespace isochron {
 namespace {
@@ -70,23 +73,33 @@ SampleRange half_of(int samples, int half) {
   return {half * count, (half + 1) * count};
 }
 
-std::vector<double> probe_readings(const Problem& problem, const std::vector<double>& theta,
-                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
-                                   const Poll& poll) {
-  GatedImage signs = problem.blank();
-  for (std::size_t i = 0; i < signs.data.size(); ++i) {
-    Rng rng(problem.stream(Pass::probe, iteration), i, static_cast<std::uint32_t>(probe));
-    signs.data[i] = std::copysign(std::sqrt(weights[i]), rng.uniform() - 0.5);
+std::vector<std::vector<double>> probe_readings(const Problem& problem, const std::vector<double>& theta,
+                                                const std::vector<double>& weights, std::uint32_t iteration,
+                                                Probes probes, const Poll& poll) {
+  std::vector<std::vector<double>> products;
+  for (int done = 0; done < probes.count; done += kImagesTogether) {
+    std::vector<GatedImage> signs(std::min(kImagesTogether, probes.count - done), problem.blank());
+    parallel(static_cast<int>(signs.size()), [&](int k) {
+      const auto probe = static_cast<std::uint32_t>(probes.first + done + k);
+      std::vector<double>& values = signs[k].data;
+      for (std::size_t i = 0; i < values.size(); ++i) {
+        Rng rng(problem.stream(Pass::probe, iteration), i, probe);
+        values[i] = std::copysign(std::sqrt(weights[i]), rng.uniform() - 0.5);
+      }
+    });
+    for (std::vector<double>& product : problem.transpose_apply(theta, signs, iteration, poll))
+      products.push_back(std::move(product));
   }
-  return problem.transpose_apply(theta, signs, iteration, poll);
+  return products;
 }
 
-std::vector<double> probe_diagonal(const Problem& problem, const std::vector<double>& theta,
-                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
-                                   const Poll& poll) {
-  std::vector<double> diagonal = probe_readings(problem, theta, weights, iteration, probe, poll);
-  for (double& d : diagonal) d *= d;
-  return diagonal;
+std::vector<std::vector<double>> probe_diagonals(const Problem& problem, const std::vector<double>& theta,
+                                                 const std::vector<double>& weights, std::uint32_t iteration,
+                                                 Probes probes, const Poll& poll) {
+  std::vector<std::vector<double>> diagonals = probe_readings(problem, theta, weights, iteration, probes, poll);
+  for (std::vector<double>& diagonal : diagonals)
+    for (double& d : diagonal) d *= d;
+  return diagonals;
 }
 
 TangentBasis combinations_of(const TangentBasis& basis, const std::vector<std::vector<double>>& coefficients) {

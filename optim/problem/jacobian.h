@@ -23,16 +23,19 @@ JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>
 /// Half `half` (0 or 1) of so many samples, as above.
 SampleRange half_of(int samples, int half);
 
-/// J' W^(1/2) z with a random sign z for each reading, others for each `probe`: a gradient as the noise of readings makes it, with
-/// the covariance J'WJ.
-std::vector<double> probe_readings(const Problem& problem, const std::vector<double>& theta,
-                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
-                                   const Poll& poll);
+/// Images that share their paths as they are multiplied by J'; all are in memory.
+inline constexpr int kImagesTogether = 4;
 
-/// An estimate of the diagonal of J'WJ: see Objective::probe_curvature(), without a penalty's part.
-std::vector<double> probe_diagonal(const Problem& problem, const std::vector<double>& theta,
-                                   const std::vector<double>& weights, std::uint32_t iteration, int probe,
-                                   const Poll& poll);
+/// J' W^(1/2) z with a random sign z for each reading, others for each probe: gradients as the noise of readings makes them, with
+/// the covariance J'WJ. All are from the same samples of the iteration.
+std::vector<std::vector<double>> probe_readings(const Problem& problem, const std::vector<double>& theta,
+                                                const std::vector<double>& weights, std::uint32_t iteration,
+                                                Probes probes, const Poll& poll);
+
+/// Estimates of the diagonal of J'WJ: see Objective::probe_curvature(), without a penalty's part.
+std::vector<std::vector<double>> probe_diagonals(const Problem& problem, const std::vector<double>& theta,
+                                                 const std::vector<double>& weights, std::uint32_t iteration,
+                                                 Probes probes, const Poll& poll);
 
 /// A basis whose columns are combinations of those of another.
 TangentBasis combinations_of(const TangentBasis& basis, const std::vector<std::vector<double>>& coefficients);

@@ -152,7 +152,10 @@ std::vector<MemoryUse> run_memory(const Problem& problem) {
     parts.push_back({"images of work partitions",
                      partial_bytes(problem, std::max(experiment.samples.primal, experiment.target.samples))});
   const OptimizerMethod method = experiment.optimizer.method;
-  if (method == OptimizerMethod::quasi_newton) parts.push_back({"images of a line search", 3 * image});
+  if (method == OptimizerMethod::quasi_newton) {
+    parts.push_back({"images of a line search", 3 * image});
+    parts.push_back({"images of probes", kImagesTogether * image});
+  }
   if (method != OptimizerMethod::levenberg_marquardt) {
     const Camera& camera = problem.scene().camera;
     if (draws_lengths(problem))

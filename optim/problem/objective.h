@@ -29,6 +29,11 @@ struct Coupling {
   double curvature;
 };
 
+/// Several random draws, of which each has a number.
+struct Probes {
+  int first = 0, count = 1;
+};
+
 /// A loss whose estimates depend only on theta and `iteration`: equal iterations share their random numbers,
 /// so that differences between points of one iteration are far less noisy than the loss.
 class Objective {
@@ -43,11 +48,12 @@ class Objective {
   virtual Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
   /// The same with curvatures.
   virtual Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
-  /// An estimate, >= 0, of the diagonal of the Gauss-Newton matrix J'WJ at theta: (J' W^(1/2) z)^2 with a random sign z for each
-  /// reading, others for each `probe`, and W from the image of `now`, which is evaluate(theta, iteration). Noise of the Jacobian
-  /// J makes it too large, on average; otherwise it has no bias. Costs about as much as a gradient.
-  virtual std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
-                                              const Evaluation& now, int probe) const = 0;
+  /// Estimates, >= 0, of the diagonal of the Gauss-Newton matrix J'WJ at theta: (J' W^(1/2) z)^2 with a random sign z for each
+  /// reading, others for each probe, and W from the image of `now`, which is evaluate(theta, iteration). Noise of the Jacobian
+  /// J makes it too large, on average; otherwise it has no bias. One costs about as much as a gradient, those
+  /// that share a call less.
+  virtual std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                           const Evaluation& now, Probes probes) const = 0;
   /// What is known of the loss's second derivative beside its diagonal: the entries of a quadratic penalty. A pair of unknowns may
   /// come several times, and its entries add up.
   virtual std::vector<Coupling> couplings() const { return {}; }

@@ -91,8 +91,8 @@ Evaluation OwnLossObjective::linearise(const std::vector<double>&, std::uint32_t
   throw std::logic_error("a loss of one's own has no curvature");
 }
 
-std::vector<double> OwnLossObjective::probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
-                                                      int) const {
+std::vector<std::vector<double>> OwnLossObjective::probe_curvature(const std::vector<double>&, std::uint32_t,
+                                                                   const Evaluation&, Probes) const {
   throw std::logic_error("a loss of one's own has no curvature");
 }
 

@@ -35,8 +35,8 @@ class OwnLossObjective : public RenderedObjective {
   Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
   /// Not for such losses: throw std::logic_error.
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
-  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
-                                      int probe) const override;
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                   const Evaluation& now, Probes probes) const override;
 
  private:
   ImageLoss unbiased(const SplitImage& image) const;

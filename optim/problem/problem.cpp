@@ -341,33 +341,36 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   return result;
 }
 
-std::vector<double> Problem::transpose_apply(const std::vector<double>& theta, const GatedImage& image,
-                                             std::uint32_t iteration, const Poll& poll) const {
+std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<double>& theta,
+                                                          std::span<const GatedImage> images, std::uint32_t iteration,
+                                                          const Poll& poll) const {
   const SampleSpec& samples = experiment_.samples;
   const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
   const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
   ProgressStage stage("differentiating", differences ? parameters_->size() : static_cast<int>(terms));
+  std::vector<std::vector<double>> products(images.size());
   if (differences) {
-    std::vector<double> product;
     for (int i = 0; i < parameters_->size(); ++i) {
-      product.push_back(inner_product(
-          image, finite_difference(theta, i, stream(Pass::finite_difference, iteration), {0, samples.primal})));
+      const GatedImage difference =
+          finite_difference(theta, i, stream(Pass::finite_difference, iteration), {0, samples.primal});
+      for (std::size_t k = 0; k < images.size(); ++k) products[k].push_back(inner_product(images[k], difference));
       stage.advance();
       poll();
     }
-    return product;
+    return products;
   }
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);
   const Renderer renderer = this->renderer(scene, estimator(samples.visibility), &basis);
-  std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
+  std::vector<std::vector<double>> dof_gradients(images.size(), std::vector<double>(DofLayout(scene).size(), 0.0));
   for (Term term : kTerms) {
     if (samples.term(term) == 0) continue;
-    renderer.add_gradient(term, image, stream(pass_of(term), iteration), {0, samples.term(term)}, dof_gradient);
+    renderer.add_gradients(term, images, stream(pass_of(term), iteration), {0, samples.term(term)}, dof_gradients);
     stage.advance();
     poll();
   }
-  return basis.transpose_apply(dof_gradient);
+  for (std::size_t k = 0; k < images.size(); ++k) products[k] = basis.transpose_apply(dof_gradients[k]);
+  return products;
 }
 
 GatedImage Problem::finite_difference(const std::vector<double>& theta, int component, const Stream& stream,

@@ -5,8 +5,10 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "core/base/progress.h"
@@ -153,10 +155,14 @@ class Problem {
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                       const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
 
-  /// Product of the transposed Jacobian of the images at theta, as `evaluate` samples it, with an image. theta must be one
-  /// that can_render() accepts.
+  /// Products of the transposed Jacobian of the images at theta, as `evaluate` samples it, with images, which share its samples. theta must
+  /// be one that can_render() accepts.
+  std::vector<std::vector<double>> transpose_apply(const std::vector<double>& theta, std::span<const GatedImage> images,
+                                                   std::uint32_t iteration, const Poll& poll) const;
   std::vector<double> transpose_apply(const std::vector<double>& theta, const GatedImage& image,
-                                      std::uint32_t iteration, const Poll& poll) const;
+                                      std::uint32_t iteration, const Poll& poll) const {
+    return std::move(transpose_apply(theta, {&image, 1}, iteration, poll)[0]);
+  }
 
   /// Central difference of the images along one unknown with common random numbers. Where theta +- step
   /// leaves the bounds, the difference is taken between the bound and the other side.

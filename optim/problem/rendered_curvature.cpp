@@ -1,5 +1,6 @@
 #include "optim/problem/rendered_curvature.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "optim/problem/conjugate_gradients.h"
@@ -55,10 +56,9 @@ std::vector<std::vector<double>> RenderedCurvature::gradients() const {
 
 std::vector<double> RenderedCurvature::diagonal() const {
   std::vector<double> mean(theta_.size(), 0.0);
-  for (int probe = 0; probe < kProbes; ++probe) {
-    const std::vector<double> found = probe_diagonal(problem_, theta_, weights_, kProductsIteration, probe, poll_);
+  for (const std::vector<double>& found :
+       probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbes}, poll_))
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbes;
-  }
   for (const PenaltyScale& scale : {smoothing_, priors_}) problem_.penalty().add_diagonal(scale, mean);
   return mean;
 }
@@ -111,13 +111,11 @@ std::vector<double> RenderedCurvature::penalty_product(PenaltyScale scale, const
 
 std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
   const PenaltyScale scale{smoothing_.slopes, priors_.priors};
-  std::vector<std::vector<double>> gradients;
-  for (int k = 0; k < count; ++k) {
-    const int probe = kProbes + k;
-    gradients.push_back(probe_readings(problem_, theta_, weights_, kProductsIteration, probe, poll_));
+  std::vector<std::vector<double>> gradients =
+      probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, poll_);
+  for (int k = 0; k < count; ++k)
     problem_.penalty().add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration),
-                                 static_cast<std::uint32_t>(probe), gradients.back());
-  }
+                                 static_cast<std::uint32_t>(kProbes + k), gradients[k]);
   const std::vector<double> at_first = diagonal(), &low = problem_.parameters().lower(),
                             &high = problem_.parameters().upper();
   std::vector<std::size_t> free;
@@ -136,23 +134,30 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
       render_jacobian(problem_, theta_, combinations_of(basis_, vectors), kProductsIteration, poll_);
   const Renderer renderer = problem_.renderer(scene_, problem_.estimator(samples.visibility), &basis_);
   std::vector<std::vector<double>> products;
-  GatedImage image = problem_.blank();
-  for (std::size_t v = 0; v < vectors.size(); ++v) {
-    std::vector<double> dof_gradient(DofLayout(scene_).size(), 0.0);
+  std::vector<GatedImage> images(std::min<std::size_t>(kImagesTogether, vectors.size()), problem_.blank());
+  while (products.size() < vectors.size()) {
+    const std::size_t done = products.size();
+    images.resize(std::min(images.size(), vectors.size() - done));
+    std::vector<std::vector<double>> dof_gradients(images.size(), std::vector<double>(DofLayout(scene_).size(), 0.0));
     for (const int half : {0, 1}) {  // what one half of the samples sees, by the other's transpose
-      const double* column = forward.half[1 - half].data() + v * forward.residuals;
-      for (std::size_t i = 0; i < image.data.size(); ++i) image.data[i] = weights_[i] * column[i] / 2;
+      for (std::size_t k = 0; k < images.size(); ++k) {
+        const double* column = forward.half[1 - half].data() + (done + k) * forward.residuals;
+        for (std::size_t i = 0; i < weights_.size(); ++i) images[k].data[i] = weights_[i] * column[i] / 2;
+      }
       for (const Term term : kTerms) {
         if (samples.term(term) == 0) continue;
-        renderer.add_gradient(term, image, problem_.stream(pass_of(term), kProductsIteration),
-                              half_of(samples.term(term), half), dof_gradient);
+        renderer.add_gradients(term, images, problem_.stream(pass_of(term), kProductsIteration),
+                               half_of(samples.term(term), half), dof_gradients);
       }
       poll_();
     }
-    products.push_back(basis_.transpose_apply(dof_gradient));
-    for (const PenaltyScale& scale : {smoothing_, priors_}) {
-      const std::vector<double> penalty = penalty_product(scale, vectors[v]);
-      for (std::size_t i = 0; i < penalty.size(); ++i) products.back()[i] += penalty[i];
+    for (const std::vector<double>& dof_gradient : dof_gradients) {
+      const std::vector<double>& vector = vectors[products.size()];
+      products.push_back(basis_.transpose_apply(dof_gradient));
+      for (const PenaltyScale& scale : {smoothing_, priors_}) {
+        const std::vector<double> penalty = penalty_product(scale, vector);
+        for (std::size_t i = 0; i < penalty.size(); ++i) products.back()[i] += penalty[i];
+      }
     }
   }
   return products;

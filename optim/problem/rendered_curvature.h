@@ -19,8 +19,8 @@ class RenderedCurvature : public CurvatureProducts {
   /// Over the combinations of unknowns that `columns` hold, from other random numbers than the products. Not for finite
   /// differences.
   Curvatures within(const std::vector<std::vector<double>>& columns) const override;
-  /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient for each vector and
-  /// one more. Not for finite differences.
+  /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient and
+  /// another for every kImagesTogether vectors. Not for finite differences.
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
   /// Some of the loss, penalty included, each from random numbers of its own; 0 for unknowns that a bound keeps from following
   /// it.

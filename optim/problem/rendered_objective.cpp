@@ -68,12 +68,14 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
   return result;
 }
 
-std::vector<double> RenderedObjective::probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
-                                                       const Evaluation& now, int probe) const {
-  std::vector<double> diagonal = probe_diagonal(
-      problem_, theta, curvature_weights(now.image, target_, problem_.reading_loss(target_)), iteration, probe, poll_);
-  problem_.penalty().add_diagonal(problem_.penalty_scale(target_), diagonal);
-  return diagonal;
+std::vector<std::vector<double>> RenderedObjective::probe_curvature(const std::vector<double>& theta,
+                                                                    std::uint32_t iteration, const Evaluation& now,
+                                                                    Probes probes) const {
+  std::vector<std::vector<double>> diagonals = probe_diagonals(
+      problem_, theta, curvature_weights(now.image, target_, problem_.reading_loss(target_)), iteration, probes, poll_);
+  for (std::vector<double>& diagonal : diagonals)
+    problem_.penalty().add_diagonal(problem_.penalty_scale(target_), diagonal);
+  return diagonals;
 }
 
 std::vector<Coupling> RenderedObjective::couplings() const {

@@ -28,8 +28,8 @@ class RenderedObjective : public Objective {
   Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
   /// See jacobian.h.
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
-  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
-                                      int probe) const override;
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                   const Evaluation& now, Probes probes) const override;
   std::vector<Coupling> couplings() const override;
 
  protected:

@@ -35,7 +35,7 @@ struct Level {
   long long iterations = 0;
   double loss = 0, seconds = 0;
   std::string status;
-  std::string skirt;  ///< it began with: kept or dropped; empty where it had none, or no level has followed
+  std::string skirt;  ///< that it tried: kept or dropped; empty where it had none, or no level has followed
 };
 
 /// Of the first level, 1, what the experiment says, or else what the mesh has; of those after the coarse ones half of the one before.
@@ -106,9 +106,9 @@ class Levels {
     write_exr(file("target.exr"), problem.make_target(poll), exr_notes(experiment_.gates));
   }
 
-  bool begins_with_skirt(int level) const {
+  bool tries_skirt(int level) const {
     const RemeshSpec& remesh = remeshed_.remesh;
-    return remesh.skirt > 0 && level - 1 == remesh.skirt_after() && level < remesh.levels;
+    return level > remesh.skirt_after() && level <= remesh.skirt_until();
   }
 
   /// The level that a further one begins with: the one before, but for strips behind borders without which the data were explained
@@ -117,7 +117,9 @@ class Levels {
     const auto loss = [this](int of) {
       return number_or_nan(open_yaml(folder(of) + "/summary.yaml").map().require("loss_final"));
     };
-    return begins_with_skirt(level - 1) && !(loss(level - 1) < loss(level - 2)) ? level - 2 : level - 1;
+    const int without = remeshed_.remesh.skirt_after();
+    const bool tried = tries_skirt(level - 1) && !tries_skirt(level);
+    return tried && !(loss(level - 1) < loss(without)) ? without : level - 1;
   }
 
   /// Makes the level's folder.
@@ -135,7 +137,7 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      if (begins_with_skirt(level))
+      if (tries_skirt(level) && !tries_skirt(level - 1))
         surface = with_skirt(*surface, remeshed_.remesh.skirt, edge_length, former.scene().camera.position);
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
@@ -191,7 +193,9 @@ class Levels {
   /// Brings what the level has to DIR, the summary last. `more`: it may not be the last.
   void publish(int level, bool more) {
     levels_.push_back(found_level(level));
-    if (begins_with_skirt(level - 1)) levels_[level - 2].skirt = former_of(level) == level - 1 ? "kept" : "dropped";
+    if (tries_skirt(level - 1) && !tries_skirt(level))
+      for (int tried = remeshed_.remesh.skirt_after(); tried < level - 1; ++tried)
+        levels_[tried].skirt = former_of(level) == level - 1 ? "kept" : "dropped";
     const std::string from = folder(level);
     if (status_ != RunStatus::interrupted) {
       if (level == 1) copy(from, {"initial.exr"}, "initial_");

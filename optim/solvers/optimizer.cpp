@@ -31,11 +31,12 @@ class ScaledObjective : public Objective {
   Evaluation linearise(const std::vector<double>& u, std::uint32_t iteration) const override {
     return scaled(objective_.linearise(to_theta(u), iteration));
   }
-  std::vector<double> probe_curvature(const std::vector<double>& u, std::uint32_t iteration, const Evaluation& now,
-                                      int probe) const override {
-    std::vector<double> diagonal = objective_.probe_curvature(to_theta(u), iteration, now, probe);
-    for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] *= scales_[i] * scales_[i];
-    return diagonal;
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>& u, std::uint32_t iteration,
+                                                   const Evaluation& now, Probes probes) const override {
+    std::vector<std::vector<double>> diagonals = objective_.probe_curvature(to_theta(u), iteration, now, probes);
+    for (std::vector<double>& diagonal : diagonals)
+      for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] *= scales_[i] * scales_[i];
+    return diagonals;
   }
   std::vector<Coupling> couplings() const override {
     std::vector<Coupling> result = objective_.couplings();

@@ -91,10 +91,9 @@ class QuasiNewton : public Optimizer {
 
   void update_diagonal(const Objective& objective, const Evaluation& now, const Vector& theta,
                        std::uint32_t iteration) {
-    const int count = diagonal_.empty() ? kFirstProbes : 1;
+    const Probes probes{.count = diagonal_.empty() ? kFirstProbes : 1};
     diagonal_.resize(theta.size(), 0.0);
-    for (int probe = 0; probe < count; ++probe) {
-      const Vector found = objective.probe_curvature(theta, iteration, now, probe);
+    for (const Vector& found : objective.probe_curvature(theta, iteration, now, probes)) {
       if (!std::all_of(found.begin(), found.end(), [](double d) { return std::isfinite(d); })) continue;
       probes_ = std::min(probes_ + 1, kMostProbes);
       for (std::size_t i = 0; i < found.size(); ++i) diagonal_[i] += (found[i] - diagonal_[i]) / probes_;

@@ -153,7 +153,7 @@ void BM_AdjointScatter(benchmark::State& state) {
   GatedImage adjoint(scene.camera.width, scene.camera.height, gates.size(), 1);
   std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
   SparseSum gradient(static_cast<std::size_t>(four.prepared.layout.size()));
-  AdjointSink sink(gates, four.prepared.layout, basis, adjoint, gradient);
+  AdjointSink sink(gates, four.prepared.layout, basis, {&adjoint, 1}, gradient);
   std::size_t i = 0;
   for (auto _ : state) {
     sink.bind(differentials[i]);

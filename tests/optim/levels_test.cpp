@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <set>
+#include <sstream>
+#include <string>
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
@@ -230,14 +232,25 @@ TEST_F(LevelsTest, VerticesAtOnePlaceAreOne) {
   }
 }
 
-/// After one of two coarse levels: the second begins with strips behind the borders, and the third goes on with them or with the
-/// first. Nothing moves but by remeshing, which rounds the bend at a border: that makes a flat sheet more like a hill, and less like itself.
+/// After one of two coarse levels the second begins with strips behind the borders; after three of five the fourth, and the fifth keeps them.
+/// The last goes on with them or from the level before. Nothing moves but by remeshing, which rounds the bend at a border: that makes a
+/// flat sheet more like a hill, and less like itself.
 TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
-  for (const std::string target : {"hill", "flat"}) {
+  struct Case {
+    std::string target;
+    int coarse, before, tried;
+  };
+  for (const auto& [target, coarse, before, tried] :
+       {Case{"hill", 2, 1, 1}, Case{"flat", 2, 1, 1}, Case{"hill", 5, 3, 2}, Case{"flat", 5, 3, 2}}) {
+    SCOPED_TRACE(target + " " + std::to_string(coarse));
     const Problem problem(load_experiment(this->experiment(target, "target: 0", "{samples: 256}")));
     write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
-    Experiment experiment = load_experiment(this->experiment(
-        "flat", "remesh: {levels: 3, coarse_levels: 2, edge_length: 0.4, skirt: 0.6}", "{images: target.exr}"));
+    const int last = coarse + 1;
+    Experiment experiment = load_experiment(this->experiment("flat",
+                                                             "remesh: {levels: " + std::to_string(last) +
+                                                                 ", coarse_levels: " + std::to_string(coarse) +
+                                                                 ", edge_length: 0.4, skirt: 0.6}",
+                                                             "{images: target.exr}"));
     experiment.optimizer.iterations = 0;
     EXPECT_EQ(start_run(experiment, options()), RunStatus::iterations_reached);
     const auto depth = [&](int level) {
@@ -246,16 +259,21 @@ TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
       return -least;
     };
     const double corner = 0.6 * 3 / std::sqrt(9 + 2);  // where the way from the camera is the least steep
-    EXPECT_EQ(depth(1), 0);
-    EXPECT_GE(depth(2), corner - 1e-6);
-    EXPECT_LT(depth(2), 0.6);
-    EXPECT_EQ(depth(3) > 0, target == "hill");
-    const std::string summary = folder_.read("out/summary.yaml");
-    const std::size_t second = summary.find("\n  - ", summary.find("levels:\n") + 10),
-                      third = summary.find('\n', second + 1);
-    EXPECT_TRUE(summary.substr(0, third).ends_with(target == "hill" ? ", skirt: kept}" : ", skirt: dropped}"))
-        << summary;
-    EXPECT_EQ(summary.find("skirt", third), std::string::npos);
+    EXPECT_EQ(depth(before), 0);
+    EXPECT_GE(depth(before + 1), corner - 1e-6);
+    EXPECT_LT(depth(before + 1), 0.6);
+    EXPECT_GT(depth(before + tried), 0);
+    EXPECT_EQ(depth(last) > 0, target == "hill");
+    std::istringstream summary(folder_.read("out/summary.yaml"));
+    int level = 0;
+    for (std::string line; std::getline(summary, line);) {
+      if (!line.starts_with("  - {edge_length")) continue;
+      ++level;
+      const std::string said = target == "hill" ? ", skirt: kept}" : ", skirt: dropped}";
+      EXPECT_EQ(line.ends_with(said), level > before && level <= before + tried) << line;
+      EXPECT_EQ(line.find("skirt") != std::string::npos, line.ends_with(said)) << line;
+    }
+    EXPECT_EQ(level, last);
   }
 }
 

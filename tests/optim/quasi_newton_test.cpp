@@ -50,17 +50,19 @@ class Bumps : public Objective {
     return result;
   }
   Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
-  std::vector<double> probe_curvature(const std::vector<double>&, std::uint32_t iteration, const Evaluation& now,
-                                      int probe) const override {
-    ++probes;
-    std::vector<double> signs = curvature_weights(now.image, target_, kLoss);
-    for (int i = 0; i < kReadings; ++i) {
-      Rng rng({31, iteration, 2}, static_cast<std::uint64_t>(i), static_cast<std::uint32_t>(probe));
-      signs[i] = std::copysign(std::sqrt(signs[i]), rng.uniform() - 0.5);
-    }
-    std::vector<double> diagonal = transpose_apply(signs);
-    for (double& d : diagonal) d *= d;
-    return diagonal;
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>&, std::uint32_t iteration,
+                                                   const Evaluation& now, Probes range) const override {
+    return of_each(range, [&](int probe) {
+      ++probes;
+      std::vector<double> signs = curvature_weights(now.image, target_, kLoss);
+      for (int i = 0; i < kReadings; ++i) {
+        Rng rng({31, iteration, 2}, static_cast<std::uint64_t>(i), static_cast<std::uint32_t>(probe));
+        signs[i] = std::copysign(std::sqrt(signs[i]), rng.uniform() - 0.5);
+      }
+      std::vector<double> diagonal = transpose_apply(signs);
+      for (double& d : diagonal) d *= d;
+      return diagonal;
+    });
   }
   /// The largest slope that can still be followed, per standard deviation of its unknown alone; 1 / sqrt(kReadings) would be
   /// one of them.
@@ -202,9 +204,11 @@ TEST(QuasiNewton, WhatNothingDependsOnStays) {
       at.gradient[0] = 0;
       return at;
     }
-    std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
-                                        const Evaluation& now, int probe) const override {
-      return {0, ExponentialFit::probe_curvature(theta, iteration, now, probe)[1]};
+    std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                     const Evaluation& now, Probes probes) const override {
+      auto found = ExponentialFit::probe_curvature(theta, iteration, now, probes);
+      for (std::vector<double>& diagonal : found) diagonal[0] = 0;
+      return found;
     }
   } fit;
   const auto optimizer = make_optimizer({.method = OptimizerMethod::quasi_newton}, Preconditioner());
@@ -238,11 +242,11 @@ class TiedChain : public Objective {
     return at;
   }
   Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
-  std::vector<double> probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
-                                      int) const override {
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
+                                                   Probes probes) const override {
     std::vector<double> diagonal(kLinks);
     for (int i = 0; i < kLinks; ++i) diagonal[i] = data(i) + kTie * ((i > 0) + (i + 1 < kLinks));
-    return diagonal;
+    return of_each(probes, [&](int) { return diagonal; });
   }
   std::vector<Coupling> couplings() const override {
     std::vector<Coupling> ties;

@@ -154,8 +154,8 @@ TEST_F(Rendered, ProbesAreTheDiagonalOfTheCurvature) {
         }
       }
       ReplicateStatistics statistics;
-      for (int probe = 0; probe < (single ? 4 : 600); ++probe)
-        statistics.add(objective.probe_curvature(theta, 3, now, probe), 1);
+      for (const std::vector<double>& each : objective.probe_curvature(theta, 3, now, {.count = single ? 4 : 600}))
+        statistics.add(each, 1);
       const Statistics found = statistics.result();
       for (int i : {0, 1}) {
         const double error = found.standard_error[i];

@@ -35,8 +35,8 @@ class NoisyQuadratic : public Objective {
     return result;
   }
   Evaluation linearise(const std::vector<double>&, std::uint32_t) const override { throw std::logic_error("unused"); }
-  std::vector<double> probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
-                                      int) const override {
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>&, std::uint32_t, const Evaluation&,
+                                                   Probes) const override {
     throw std::logic_error("unused");
   }
 };

@@ -99,11 +99,12 @@ class InOtherUnits : public Objective {
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override {
     return converted(fit_.linearise(own(theta), iteration));
   }
-  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation& now,
-                                      int probe) const override {
-    std::vector<double> diagonal = fit_.probe_curvature(own(theta), iteration, now, probe);
-    for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] /= unit_[i] * unit_[i];
-    return diagonal;
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                   const Evaluation& now, Probes probes) const override {
+    auto found = fit_.probe_curvature(own(theta), iteration, now, probes);
+    for (std::vector<double>& diagonal : found)
+      for (std::size_t i = 0; i < diagonal.size(); ++i) diagonal[i] /= unit_[i] * unit_[i];
+    return found;
   }
 
  private:
@@ -166,11 +167,12 @@ TEST_P(Solvers, DoNotDependOnTheUnits) {
         for (double& x : *v) x *= 0x1p-100;
       return result;
     }
-    std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
-                                        const Evaluation& now, int probe) const override {
-      std::vector<double> diagonal = ExponentialFit::probe_curvature(theta, iteration, now, probe);
-      for (double& d : diagonal) d *= 0x1p-100;
-      return diagonal;
+    std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                     const Evaluation& now, Probes probes) const override {
+      auto found = ExponentialFit::probe_curvature(theta, iteration, now, probes);
+      for (std::vector<double>& diagonal : found)
+        for (double& d : diagonal) d *= 0x1p-100;
+      return found;
     }
   } scaled;
   scaled.inject = [](auto&, double loss) { return 0x1p-100 * loss; };

@@ -3,11 +3,20 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <vector>
 
 #include "core/base/random.h"
 #include "optim/problem/objective.h"
 
 namespace isochron {
+
+/// What `probe` makes of each number.
+template <class F>
+std::vector<std::vector<double>> of_each(Probes probes, F&& probe) {
+  std::vector<std::vector<double>> found;
+  for (int k = 0; k < probes.count; ++k) found.push_back(probe(probes.first + k));
+  return found;
+}
 
 /// Fit of a exp(-b x) to its values at a = 2, b = 0.7 on 60 points x, as noisy as asked: theta = (a, b). The
 /// same noise for the same iteration; independent noise for residuals and each half of the Jacobian.
@@ -62,16 +71,18 @@ class ExponentialFit : public Objective {
     return result;
   }
 
-  std::vector<double> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration, const Evaluation&,
-                                      int probe) const override {
-    double sum[2] = {0, 0};
-    for (int k = 0; k < kPoints; ++k) {
-      Rng rng({5, iteration, 2}, k, probe);
-      const double sign = rng.uniform() < 0.5 ? -1 : 1, x = point(k);
-      sum[0] += sign * std::exp(-theta[1] * x) * std::sqrt(2.0 / kPoints);
-      sum[1] -= sign * theta[0] * x * std::exp(-theta[1] * x) * std::sqrt(2.0 / kPoints);
-    }
-    return {sum[0] * sum[0], sum[1] * sum[1]};
+  std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,
+                                                   const Evaluation&, Probes probes) const override {
+    return of_each(probes, [&](int probe) -> std::vector<double> {
+      double sum[2] = {0, 0};
+      for (int k = 0; k < kPoints; ++k) {
+        Rng rng({5, iteration, 2}, k, probe);
+        const double sign = rng.uniform() < 0.5 ? -1 : 1, x = point(k);
+        sum[0] += sign * std::exp(-theta[1] * x) * std::sqrt(2.0 / kPoints);
+        sum[1] -= sign * theta[0] * x * std::exp(-theta[1] * x) * std::sqrt(2.0 / kPoints);
+      }
+      return {sum[0] * sum[0], sum[1] * sum[1]};
+    });
   }
 
   static double normal(Rng& rng) {

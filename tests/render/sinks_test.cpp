@@ -87,28 +87,34 @@ TEST_P(Sinks, AdjointIsTheTransposeOfTheJacobian) {
       const std::vector<GatedImage> images = renderer.derive(term, stream, range);
       ASSERT_EQ(images.size(), motions.size());
       ASSERT_EQ(images[0].channels, GetParam() ? 1 : 3);
-      const GatedImage adjoint = random_adjoint(images[0], 99);
-      std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
-      renderer.add_gradient(term, adjoint, stream, range, dof_gradient);
-      const std::vector<double> gradient = basis.transpose_apply(dof_gradient);
-      std::vector<double> magnitude(dof_gradient);
-      for (double& g : magnitude) g = std::abs(g);
+      const std::vector<GatedImage> adjoints = {random_adjoint(images[0], 99), random_adjoint(images[0], 98),
+                                                random_adjoint(images[0], 97)};
+      std::vector<std::vector<double>> dof_gradients(3, std::vector<double>(DofLayout(scene).size(), 0.0));
+      renderer.add_gradients(term, adjoints, stream, range, dof_gradients);
+      std::vector<double> alone(dof_gradients[0].size(), 0.0);
+      renderer.add_gradient(term, adjoints[1], stream, range, alone);
+      EXPECT_EQ(alone, dof_gradients[1]);
       TangentBasis absolute = basis;
       for (auto& e : absolute.entries) e.coefficient = std::abs(e.coefficient);
-      const std::vector<double> scales = absolute.transpose_apply(magnitude);
-      for (std::size_t c = 0; c < motions.size(); ++c) {
-        double sum = 0, scale = scales[c];
-        for (std::size_t i = 0; i < adjoint.data.size(); ++i) {
-          sum += adjoint.data[i] * images[c].data[i];
-          scale += std::abs(adjoint.data[i] * images[c].data[i]);
+      for (std::size_t a = 0; a < adjoints.size(); ++a) {
+        const std::vector<double> gradient = basis.transpose_apply(dof_gradients[a]);
+        std::vector<double> magnitude(dof_gradients[a]);
+        for (double& g : magnitude) g = std::abs(g);
+        const std::vector<double> scales = absolute.transpose_apply(magnitude);
+        for (std::size_t c = 0; c < motions.size(); ++c) {
+          double sum = 0, scale = scales[c];
+          for (std::size_t i = 0; i < images[c].data.size(); ++i) {
+            sum += adjoints[a].data[i] * images[c].data[i];
+            scale += std::abs(adjoints[a].data[i] * images[c].data[i]);
+          }
+          EXPECT_NEAR(sum, gradient[c], 1e-11 * scale) << "column " << c << ", adjoint " << a;
+          const bool geometry = c < 4;
+          const bool expected = term == Term::interior
+                                    ? true
+                                    : geometry && (term == Term::visibility ||
+                                                   (s.shape.kind() != GateKind::gaussian && !s.shape.is_steady()));
+          EXPECT_EQ(scale > 0, expected) << "column " << c;
         }
-        EXPECT_NEAR(sum, gradient[c], 1e-11 * scale) << "column " << c;
-        const bool geometry = c < 4;
-        const bool expected = term == Term::interior
-                                  ? true
-                                  : geometry && (term == Term::visibility ||
-                                                 (s.shape.kind() != GateKind::gaussian && !s.shape.is_steady()));
-        EXPECT_EQ(scale > 0, expected) << "column " << c;
       }
     }
   }
