@@ -150,10 +150,12 @@ void BM_AdjointScatter(benchmark::State& state) {
   for (std::size_t i = 0; i < four.paths.size(); ++i)
     differentiate_path(four.prepared, 0, four.paths[i].data(), 4, false, differentials[i]);
   const TangentBasis basis = all_vertices(scene);
-  GatedImage adjoint(scene.camera.width, scene.camera.height, gates.size(), 1);
-  std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
-  SparseSum gradient(static_cast<std::size_t>(four.prepared.layout.size()));
-  AdjointSink sink(gates, four.prepared.layout, basis, {&adjoint, 1}, gradient);
+  std::vector<GatedImage> adjoints(state.range(1),
+                                   GatedImage(scene.camera.width, scene.camera.height, gates.size(), 1));
+  for (GatedImage& adjoint : adjoints) std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
+  const std::size_t sums = adjoints.size() * static_cast<std::size_t>(four.prepared.layout.size());
+  SparseSum gradient(sums);
+  AdjointSink sink(gates, four.prepared.layout, basis, adjoints, gradient);
   std::size_t i = 0;
   for (auto _ : state) {
     sink.bind(differentials[i]);
@@ -162,10 +164,10 @@ void BM_AdjointScatter(benchmark::State& state) {
     i = (i + 1) % four.paths.size();
   }
   double sum = 0;
-  gradient.for_each(0, static_cast<std::size_t>(four.prepared.layout.size()), [&](std::size_t, double x) { sum += x; });
+  gradient.for_each(0, sums, [&](std::size_t, double x) { sum += x; });
   benchmark::DoNotOptimize(sum);
 }
-BENCHMARK(BM_AdjointScatter)->ArgName("large")->Arg(0)->Arg(1);
+BENCHMARK(BM_AdjointScatter)->ArgNames({"large", "adjoints"})->ArgsProduct({{0, 1}, {1, 4}});
 
 /// Values of all gates at a random length; the argument is their number.
 void BM_Gates(benchmark::State& state) {
