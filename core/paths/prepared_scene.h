@@ -78,6 +78,15 @@ class PreparedScene {
 
   bool captures() const { return scene.capture.has_value(); }
   int pixels() const { return camera.pixels(); }
+  bool leaves_out(int pixel) const {
+    return captures() && !scene.capture->left_out.empty() && scene.capture->left_out[pixel];
+  }
+  /// That have samples.
+  double share_of_pixels() const {
+    if (!captures() || scene.capture->left_out.empty()) return 1;
+    const std::vector<char>& left_out = scene.capture->left_out;
+    return static_cast<double>(std::count(left_out.begin(), left_out.end(), 0)) / static_cast<double>(left_out.size());
+  }
   /// x0 of the paths of a pixel.
   SurfacePoint sensor_point(int pixel) const {
     if (!captures()) return {camera.position, {}, -1};

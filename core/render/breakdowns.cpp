@@ -66,7 +66,7 @@ GradientBreakdown Renderer::gradient_breakdown(Term term, std::span<const GatedI
   std::vector<double> interleaved(entries * count);
   for (std::size_t i = 0; i < entries; ++i)
     for (std::size_t j = 0; j < count; ++j) interleaved[i * count + j] = adjoints[j].data[i];
-  const GatePick pick(impl.gates, adjoints, impl.draws_lengths(term));
+  const GatePick pick(impl.gates, adjoints, impl.draws_lengths(term), impl.scene.share_of_pixels());
   const int partitions = impl.partitions_for(range, sum.by_bounces.size() + sum.by_gate.size() + sum.by_shape.size());
   const Sum all = impl.sum_of<Sum>(pass_kind(term), partitions, [&](int partition) {
     Sum own = sum;

@@ -177,6 +177,7 @@ void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pas
   std::vector<PointSet> of_image;
   for (const TechniqueUse& use : uses) of_image.push_back(points.of_image(use.technique));
   for_each_pixel(partition, pixels, [&](int pixel) {
+    if (scene.leaves_out(pixel)) return;
     for (std::size_t i = 0; i < uses.size(); ++i) {
       const TechniqueUse& use = uses[i];
       const double rate = use.in_pixel ? use.rate * worker.pick.rate(pixel) : use.rate;

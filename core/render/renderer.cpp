@@ -164,7 +164,7 @@ void Renderer::add_gradients(Term term, std::span<const GatedImage> adjoints, co
   if (!impl_->has(term)) return;
   impl_->prepare(term);
   const PassTimes::Timed timed(impl_->times(), pass_kind(term));
-  const GatePick pick(impl_->gates, adjoints, impl_->draws_lengths(term));
+  const GatePick pick(impl_->gates, adjoints, impl_->draws_lengths(term), impl_->scene.share_of_pixels());
   const int partitions = impl_->partitions_for(range, basis.entries.size());  // at least as many as are touched
   std::vector<std::vector<double>> by_partition(parts ? partitions : 0, std::vector<double>(basis.columns, 0.0));
   SharedPartitions shared(partitions, impl_->partition_costs(pass_kind(term), partitions));

@@ -7,7 +7,8 @@
 
 namespace isochron {
 
-GatePick::GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths) : gates_(gates) {
+GatePick::GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths, double mean_rate)
+    : gates_(gates) {
   const int count = gates.size(), pixels = adjoints[0].pixels();
   if (lengths) below_.assign(static_cast<std::size_t>(pixels + 1) * (count + 1), 0.0);
   // Makes probabilities of weights; returns their sum.
@@ -40,7 +41,7 @@ GatePick::GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, b
   const double all = accumulate(of_image.data());
   if (lengths) std::copy(of_image.begin(), of_image.end(), below_.begin() + static_cast<std::ptrdiff_t>(row(kImage)));
   if (all > 0)
-    for (double& rate : rate_) rate *= pixels / all;
+    for (double& rate : rate_) rate *= mean_rate * pixels / all;
 }
 
 int GatePick::sample_row(int pixel, double& u) const {

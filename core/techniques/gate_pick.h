@@ -20,8 +20,9 @@ class GatePick {
   /// Every gate alike. `gates` must outlive this.
   explicit GatePick(const GateSet& gates) : gates_(gates) {}
   /// `lengths`: whether lengths are drawn. Without, only rate() may be called, and no table of the size of an image is made.
-  /// Several adjoints, images of one shape, count with the sum of their magnitudes.
-  GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths = true);
+  /// Several adjoints, images of one shape, count with the sum of their magnitudes. `mean_rate`: of rate(), the share of the pixels that
+  /// have samples.
+  GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths = true, double mean_rate = 1);
   GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths = true)
       : GatePick(gates, std::span(&adjoint, 1), lengths) {}
   /// Of the tables that draw lengths, in bytes.

@@ -232,6 +232,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
         "even size",
         {.unset = spec.remesh.coarse_levels == 1});
+    inner.value("coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
+                "the coarse levels, but not the last one, are fitted to so many of a capture's histograms, spread evenly; 0: to all",
+                {.unset = spec.remesh.coarse_histograms == 0});
     inner.value(
         "skirt", field::non_negative(spec.remesh.skirt),
         "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, as "

@@ -72,6 +72,7 @@ struct TargetSpec {
   /// Gates whose centre lies outside are not used, in scene units; [-infinity, infinity]: all are.
   std::array<double, 2> window{-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
   std::string mask;  ///< absolute path of a .npy file [columns, rows]: pixels with a zero are not used; empty: all are
+  int histograms = 0;  ///< of a capture, so many of the pixels left are used, spread evenly; 0: all are
   /// Whether it is read from a file; else it is rendered at the target values.
   bool measured() const { return !images.empty() || !capture.empty(); }
   bool windowed() const { return std::isfinite(window[0]) || std::isfinite(window[1]); }

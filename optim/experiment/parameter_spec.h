@@ -44,6 +44,12 @@ struct RemeshSpec {
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
   double skirt = 0;        ///< length of the strips behind borders, scene units, see with_skirt; 0: none
 
+  int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
+
+  /// Whether level `level` has coarse_histograms. Never the last one, and strips are judged by the same ones as the surface without.
+  bool spares_histograms(int level) const {
+    return coarse_histograms > 0 && level < levels && level <= std::max(coarse_levels, skirt_until());
+  }
   /// After which level borders get their strips: half of the coarse ones.
   int skirt_after() const { return (coarse_levels + 1) / 2; }
   /// The last level before they are kept or dropped: half as many as came before have them, at least one, and a further one follows.

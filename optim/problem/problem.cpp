@@ -103,6 +103,7 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       caster_update_(caster_update(experiment_, scene_)),
       cache_(std::make_unique<SceneCache>(scene_, caster_update_)),
       evaluations_(std::max(1, experiment_.optimizer.iterations)) {
+  if (experiment_.target.histograms > 0) leave_out_histograms();
   if (scene_.capture && experiment_.estimator.light.value_or(0) > 0)
     experiment_.estimator_keys.at("light").fail("paths of captures have no light subpaths", "allowed here: 0");
   if (const double unit = experiment_.gates.scene_unit_m;
@@ -158,6 +159,22 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
   if (stacked.empty() && parameters_->target_known())
     stacked = stacked_warning(parameters_->apply(parameters_->target()));
   if (!stacked.empty()) warning(experiment_.scene + ": " + stacked);
+}
+
+void Problem::leave_out_histograms() {
+  if (!scene_.capture)
+    throw InputError(experiment_.file + ": target.histograms: belongs to captures; a camera's pixels are all used");
+  const int pixels = scene_.camera.width * scene_.camera.height;
+  const auto used = [&] {
+    int count = 0;
+    for (int p = 0; p < pixels; ++p) count += readings_.uses_pixel(p);
+    return count;
+  };
+  const int before = used();
+  choose_pixels(readings_, pixels, experiment_.target.histograms);
+  share_of_histograms_ = static_cast<double>(used()) / before;
+  scene_.capture->left_out.resize(pixels);
+  for (int p = 0; p < pixels; ++p) scene_.capture->left_out[p] = !readings_.uses_pixel(p);
 }
 
 bool Problem::leaves_out_jumps() const {

@@ -138,6 +138,8 @@ class Problem {
 
   /// Which of a target's readings count.
   const Readings& readings() const { return readings_; }
+  /// That `target.histograms` leaves of those that count without it.
+  double share_of_histograms() const { return share_of_histograms_; }
   /// Throws InputError, which begins with `what`, where the loss has no use for a target.
   void require_usable(const GatedImage& target, const std::string& what) const;
 
@@ -173,6 +175,9 @@ class Problem {
   bool leaves_out_jumps() const;
 
  private:
+  /// As `target.histograms` says, in the readings and in the scene.
+  void leave_out_histograms();
+
   /// Renders `samples` in parts: use(image, samples, index of the part of so many).
   template <class F>
   void render_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
@@ -194,6 +199,7 @@ class Problem {
   std::optional<GatedImage> counts_;  ///< of the target's file; reading them may set the gates' bins
   GateSet gates_;
   Readings readings_;
+  double share_of_histograms_ = 1;
   std::unique_ptr<Parameters> parameters_;
   CasterUpdate caster_update_;
   std::unique_ptr<SceneCache> cache_;

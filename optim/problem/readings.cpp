@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
@@ -57,6 +58,20 @@ Readings make_readings(const Experiment& experiment, const GateSet& gates, int w
       throw InputError(target.mask + ": leaves no pixel (at least one entry other than zero)");
   }
   return readings;
+}
+
+void choose_pixels(Readings& readings, int pixels, int count) {
+  std::vector<int> used;
+  for (int p = 0; p < pixels; ++p)
+    if (readings.uses_pixel(p)) used.push_back(p);
+  if (std::ssize(used) <= count) return;
+  readings.pixel.assign(pixels, 0);
+  // One of each run of neighbours, at places within these that fill the plane evenly where rows have many runs.
+  for (int i = 0; i < count; ++i) {
+    const double within = i * std::numbers::phi - std::floor(i * std::numbers::phi);
+    const auto chosen = static_cast<std::size_t>((i + within) / count * static_cast<double>(used.size()));
+    readings.pixel[used[std::min(chosen, used.size() - 1)]] = 1;
+  }
 }
 
 void require_counts(const GatedImage& target, const Readings& readings, const std::string& what) {

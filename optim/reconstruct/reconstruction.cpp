@@ -52,7 +52,7 @@ parameters:
     direction: free
     initial: 0
     smoothing: {{bending: {bending}, slopes: {motion:.4g}, evidence: true}}
-    remesh: {{levels: {levels}, coarse_levels: {coarse}, edge_length: {edge:.4g}, skirt: {skirt:.4g}}}
+    remesh: {{levels: {levels}, coarse_levels: {coarse}, coarse_histograms: 512, edge_length: {edge:.4g}, skirt: {skirt:.4g}}}
   - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo
     shape: surface

@@ -127,6 +127,7 @@ class Levels {
     Experiment next = experiment_;
     if (!next.target.measured()) next.target.images = file("target.exr");
     next.seed = seed_of(level, experiment_.seed);
+    if (remeshed_.remesh.spares_histograms(level)) next.target.histograms = remeshed_.remesh.coarse_histograms;
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
@@ -142,19 +143,24 @@ class Levels {
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
-      if (level > remeshed_.remesh.coarse_levels) follow_evidence(former, theta, before, next.parameters);
+      if (level > remeshed_.remesh.coarse_levels) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
   }
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
-                       std::vector<ParameterSpec>& next) const {
+                       bool more_histograms, std::vector<ParameterSpec>& next) const {
     if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
     const ProgressStage stage("weighing the smoothing", 1);
+    // Weights of slopes are for a mean over readings.
+    const double readings = more_histograms ? former.share_of_histograms() : 1;
     const std::vector<double> factors = evidence_factors(former, former.read_target(folder + "/target.exr"), theta);
     for (std::size_t i = 0; i < next.size(); ++i)
-      (next[i].bending > 0 ? next[i].bending : next[i].slopes) *= factors[i];
+      if (next[i].bending > 0)
+        next[i].bending *= factors[i];
+      else
+        next[i].slopes *= factors[i] * readings;
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {
