@@ -89,7 +89,8 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
              "NumPy array (.npy) [columns, rows] of the pixels; pixels with a zero are not used",
              {.unset = target.mask.empty(), .otherwise = "all are"});
   keys.value("histograms", field::integer(target.histograms, 0, std::numeric_limits<int>::max()),
-             "of a capture: so many are used, spread evenly over it, and others are not rendered, which saves time; 0: all are",
+             "of a capture: so many are used, spread evenly over it, and others are not rendered, which saves time; 0: "
+             "all are",
              {.unset = target.histograms == 0});
 }
 
@@ -183,6 +184,12 @@ void describe(Keys& keys, LossSpec& loss) {
 void check_remesh(const ParameterSpec& remeshed, const std::vector<ParameterSpec>& all) {
   if (remeshed.selection.kind != Selection::Kind::all)
     remeshed.fail("selection", "is of vertices that remeshing replaces", "leave it out");
+  const auto is_albedo = [&](const ParameterSpec& other) {
+    return other.type == ParameterType::texture && other.shape == remeshed.shape;
+  };
+  if (remeshed.remesh.outline > 0 && std::none_of(all.begin(), all.end(), is_albedo))
+    remeshed.fail("remesh", fmt::format("outline: '{}' has no albedos by vertex", remeshed.shape),
+                  "a parameter of type albedo with `per: vertex`");
   for (const ParameterSpec& other : all) {
     if (&other == &remeshed) continue;
     if (other.remesh.levels > 0) other.fail("remesh", "another parameter has it already", "one of them");

@@ -232,8 +232,23 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
         "even size",
         {.unset = spec.remesh.coarse_levels == 1});
+    const auto outline = [&spec](Keys& keys_of_outline) {
+      keys_of_outline.value(
+          "albedo", field::number(spec.remesh.outline, {.low = 0, .high = 1, .low_open = true, .high_open = true}),
+          "share of the mean albedo of each part, by what light comes from, below which there is no surface",
+          {.required = true});
+      keys_of_outline.value("slopes", field::non_negative(spec.remesh.outline_slopes),
+                            "weight of the albedos' slopes in that level, in place of their own `smoothing`",
+                            {.unit = "mean square of the target"});
+    };
+    inner.map("outline", outline,
+              "the first level leaves the shape's albedos by vertex free to become dark; the surface ends where they "
+              "are, so that gaps open "
+              "and webs tear",
+              {.unset = spec.remesh.outline == 0});
     inner.value("coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
-                "the coarse levels, but not the last one, are fitted to so many of a capture's histograms, spread evenly; 0: to all",
+                "the coarse levels, but not the last one, are fitted to so many of a capture's histograms, spread "
+                "evenly; 0: to all",
                 {.unset = spec.remesh.coarse_histograms == 0});
     inner.value(
         "skirt", field::non_negative(spec.remesh.skirt),

@@ -42,7 +42,11 @@ struct RemeshSpec {
   int levels = 0;          ///< 0: the mesh stays as it is
   int coarse_levels = 1;   ///< so many have the first one's edge length, at most all
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
-  double skirt = 0;        ///< length of the strips behind borders, scene units, see with_skirt; 0: none
+  /// Of albedos by vertex: the surface ends where the first level finds less than this share of their mean (within_outline). 0: where it is.
+  double outline = 0;
+  double outline_slopes =
+      0;             ///< weight of their slopes in that level, as of ParameterSpec::slopes: they have to vary there
+  double skirt = 0;  ///< length of the strips behind borders, scene units, see with_skirt; 0: none
 
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
 
@@ -50,8 +54,8 @@ struct RemeshSpec {
   bool spares_histograms(int level) const {
     return coarse_histograms > 0 && level < levels && level <= std::max(coarse_levels, skirt_until());
   }
-  /// After which level borders get their strips: half of the coarse ones.
-  int skirt_after() const { return (coarse_levels + 1) / 2; }
+  /// After which level borders get their strips: half of the coarse ones. Not the first where that has other albedos, which explain more.
+  int skirt_after() const { return std::max((coarse_levels + 1) / 2, outline > 0 ? 2 : 1); }
   /// The last level before they are kept or dropped: half as many as came before have them, at least one, and a further one follows.
   /// With one alone the strips of a rabbit, which explain its counts better from the second on, were dropped.
   int skirt_until() const { return skirt > 0 ? std::min(skirt_after() + (skirt_after() + 1) / 2, levels - 1) : 0; }

@@ -29,6 +29,11 @@ constexpr double kSkirt = 1.5;
 /// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos, a quarter on average, across
 /// the surface.
 constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.015;
+/// Expected change of the first level's albedos from vertex to vertex: half of what they are on average, so that both dark and bright
+/// neighbours are likely.
+constexpr double kOutlineChange = 0.5 * 0.25;
+/// See kCoarseLevels.
+constexpr int kCoarseHistograms = 512;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;
@@ -105,6 +110,7 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
   settings.skirt = kSkirt * settings.edge_length;
   settings.levels = settings.coarse_levels = kCoarseLevels;
+  settings.coarse_histograms = kCoarseHistograms;
   for (double edge = settings.edge_length / 2;
        edge > std::numbers::sqrt2 / 4 * resolution && vertices_of(area, edge) <= kMostVertices; edge /= 2)
     ++settings.levels;
@@ -133,7 +139,8 @@ TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const 
     all.most += response->upper();
   }
   const double margin = std::max(8 * depth_resolution, 0.25 * (all.most - all.least));
-  return {all.least - margin, all.most + margin, all.least - 0.25 * margin};
+  // A start is known to a resolution, which counts on the way there and back.
+  return {all.least - margin, all.most + margin, all.least - 4 * depth_resolution};
 }
 
 void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
@@ -156,6 +163,8 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
   settings.motion = unit / (kMotionSlope * kMotionSlope);
   const double slope = kAlbedoChange / std::sqrt(area);
   settings.albedo = unit / (slope * slope);
+  const double change = kOutlineChange / settings.edge_length;
+  settings.outline_slopes = unit / (change * change);
 }
 
 }  // namespace isochron

@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/base/constants.h"
 #include "core/base/error.h"
 #include "core/base/progress.h"
 #include "core/base/ranks.h"
@@ -55,6 +56,9 @@ void write_surface(const std::string& file, const Mesh& mesh) {
   const Scene scene = scene_of(mesh);
   write_file_atomically(file, to_ply(scene, scene.shapes[0]));
 }
+
+/// Of a part or a hole that the outline makes, in squares of the edges: three vertices have more, one or two mean nothing.
+constexpr double kLeastPart = 2;
 
 /// A number, or null where it is none.
 double number_or_nan(const YamlValue& value) {
@@ -138,15 +142,31 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
+      const double outline = remeshed_.remesh.outline;
+      if (level == 2 && outline > 0)
+        surface =
+            within_outline(*surface, former.experiment().parameters, outline, kLeastPart * edge_length * edge_length);
       if (tries_skirt(level) && !tries_skirt(level - 1))
         surface = with_skirt(*surface, remeshed_.remesh.skirt, edge_length, former.scene().camera.position);
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
+      const bool follows = level > remeshed_.remesh.coarse_levels;
+      if (level == 2) restore_slopes(next.parameters, follows);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
-      if (level > remeshed_.remesh.coarse_levels) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
+      if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
+    if (level == 1 && remeshed_.remesh.outline > 0)
+      for (ParameterSpec& spec : next.parameters)
+        if (spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
+          spec.slopes = remeshed_.remesh.outline_slopes;
     on_first_rank([&] { write_level(level, next, surface); });
+  }
+
+  /// The weights that the first level may have had others in place of. Evidence is a factor to the ones that it was found with.
+  void restore_slopes(std::vector<ParameterSpec>& next, bool evidence_follows) const {
+    for (std::size_t i = 0; i < next.size(); ++i)
+      if (!evidence_follows || !next[i].evidence) next[i].slopes = experiment_.parameters[i].slopes;
   }
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
@@ -291,6 +311,8 @@ class Levels {
 void require_levels(const Problem& problem) {
   const ParameterSpec* remeshed = remeshed_parameter(problem.experiment());
   if (!remeshed) return;
+  if (remeshed->remesh.coarse_histograms > 0 && !problem.scene().capture)
+    remeshed->fail("remesh", "coarse_histograms: belongs to captures; a camera's pixels are all used", "0");
   const Mesh loaded = mesh_of(problem.scene(), remeshed->shape);
   try {
     require_remeshable(loaded, edge_length_of(remeshed->remesh.levels, remeshed->remesh, loaded));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "optim/remesh/outline.h"
 #include "optim/remesh/remesh.h"
 #include "optim/remesh/skirt.h"
 
@@ -44,6 +45,12 @@ LevelSurface cleaned(const LevelSurface& surface) {
   }
   result.mesh.file_vertices.reset();
   return result;
+}
+
+LevelSurface carried_over(const LevelSurface& old, const Remeshed& made_of_it) {
+  LevelSurface next{made_of_it.mesh, old.fields};
+  for (SurfaceField& field : next.fields) field.values = carry_over(made_of_it, old.mesh, field.values, field.columns);
+  return next;
 }
 
 }  // namespace
@@ -100,6 +107,33 @@ LevelSurface found_surface(const Problem& problem, const std::vector<double>& th
   return surface;
 }
 
+LevelSurface within_outline(const LevelSurface& surface, const std::vector<ParameterSpec>& parameters, double share,
+                            double least_area) {
+  const auto is_albedo = [&](const SurfaceField& field) {
+    return parameters[field.parameter].type == ParameterType::texture && field.quantity == std::string("initial");
+  };
+  const auto column = [](const SurfaceField& field, int k) {
+    std::vector<double> values;
+    for (std::size_t i = k; i < field.values.size(); i += field.columns) values.push_back(field.values[i]);
+    return values;
+  };
+  std::vector<double> albedo(surface.mesh.positions.size(), 0.0);
+  for (const SurfaceField& field : surface.fields)
+    for (int k = 0; is_albedo(field) && k < field.columns; ++k) {
+      const std::vector<double> own = column(field, k);
+      for (std::size_t v = 0; v < albedo.size(); ++v) albedo[v] += own[v];
+    }
+  const Remeshed left = within_outline(surface.mesh, albedo, share, least_area);
+  if (left.mesh.faces.empty()) return surface;
+  LevelSurface result = carried_over(surface, left);
+  for (SurfaceField& field : result.fields)
+    for (int k = 0; is_albedo(field) && k < field.columns; ++k) {
+      const std::vector<double> typical = typical_albedos(result.mesh, column(field, k));
+      for (std::size_t v = 0; v < typical.size(); ++v) field.values[v * field.columns + k] = typical[v];
+    }
+  return result;
+}
+
 LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_length, const Vec3& eye) {
   const Skirted skirted = with_skirt(surface.mesh, length, edge_length, eye);
   LevelSurface result{skirted.mesh, surface.fields};
@@ -111,10 +145,7 @@ LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_
 
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {
   const LevelSurface old = cleaned(surface);
-  Remeshed result = remesh(old.mesh, edge_length);
-  LevelSurface next{result.mesh, old.fields};
-  for (SurfaceField& field : next.fields) field.values = carry_over(result, old.mesh, field.values, field.columns);
-  return next;
+  return carried_over(old, remesh(old.mesh, edge_length));
 }
 
 std::vector<ParameterSpec> next_parameters(const Problem& problem, const std::vector<double>& theta,

@@ -34,6 +34,11 @@ struct LevelSurface {
 /// The surface of `remeshed` at theta, and all that the next level takes from its vertices.
 LevelSurface found_surface(const Problem& problem, const std::vector<double>& theta, const ParameterSpec& remeshed);
 
+/// What is left of it within the outline that its albedos show (within_outline), with the typical albedo of each part; all of it where they
+/// show none.
+LevelSurface within_outline(const LevelSurface& surface, const std::vector<ParameterSpec>& parameters, double share,
+                            double least_area);
+
 /// The same with strips of that length behind its borders (with_skirt), which have the borders' values.
 LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_length, const Vec3& eye);
 

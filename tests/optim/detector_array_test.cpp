@@ -170,6 +170,49 @@ TEST_F(DetectorArray, BinsOfTheFileEndWithTheWindow) {
   EXPECT_THROW(Problem(load_experiment(file, {"gates={kind: bins}", "target.window=[8, 9]"})), InputError);
 }
 
+// Those chosen have the bits of all, and others no samples: the loss is that of the chosen ones, the gradient its slope, and the work falls
+// with their number. Common random numbers: images of the same paths, shifted.
+TEST_F(DetectorArray, SomeHistogramsAreUsed) {
+  const std::string parameters = "  - {name: gain, type: gain, initial: 5000, target: 8000}\n";
+  write_counts(parameters, 0);
+  const std::string file = experiment("{capture: counts.h5}", parameters, "{method: quasi_newton}");
+  const Problem whole(load_experiment(file)), some(load_experiment(file, {"target.histograms=7"}));
+  const Problem precise(load_experiment(
+      file, {"target.histograms=7", "samples.primal=16384", "samples.interior=16384", "samples.path_length=16384"}));
+  const GatedImage counts = whole.make_target(kGoOn);
+  EXPECT_EQ(some.readings().count(counts), 7 * 80);
+  EXPECT_NEAR(some.share_of_histograms(), 7.0 / 30, 1e-12);
+  const std::vector<double> theta = some.parameters().initial();
+  const GatedImage all = whole.render(theta, whole.stream(Pass::primal), {0, 64}),
+                   few = some.render(theta, some.stream(Pass::primal), {0, 64});
+  double light = 0;
+  for (int p = 0; p < 30; ++p)
+    for (int g = 0; g < 80; ++g) {
+      EXPECT_EQ(few.at(p, g), some.readings().uses_pixel(p) ? all.at(p, g) : 0) << p << " " << g;
+      light += few.at(p, g);
+    }
+  EXPECT_GT(light, 0);
+  const long long before = some.rays();
+  some.evaluate(theta, counts, 0, kGoOn);
+  const long long of_some = some.rays() - before, none = whole.rays();
+  whole.evaluate(theta, counts, 0, kGoOn);
+  EXPECT_NEAR(static_cast<double>(of_some) / (whole.rays() - none), 7.0 / 30, 0.05);
+  const Evaluation now = precise.evaluate(theta, counts, 0, kGoOn);
+  for (const int unknown : {0, 1}) {
+    const double step = unknown == 0 ? 1e-3 : 5;
+    std::vector<double> above = theta, below = theta;
+    above[unknown] += step;
+    below[unknown] -= step;
+    const double slope =
+        (precise.evaluate(above, counts, 0, kGoOn).loss - precise.evaluate(below, counts, 0, kGoOn).loss) / (2 * step);
+    EXPECT_NEAR(now.gradient[unknown] / slope, 1, 0.1) << unknown;
+  }
+  for (const char* count : {"30", "31", "0"}) {
+    const Problem same(load_experiment(file, {std::string("target.histograms=") + count}));
+    EXPECT_EQ(same.readings().count(counts), 30 * 80) << count;
+  }
+}
+
 // Without dark bins to begin at, levenberg_marquardt and quasi_newton end with z at 6e4 and the gain at its bound.
 TEST_F(DetectorArray, AHotPointThrowsNoFitOff) {
   const std::string parameters =

@@ -277,6 +277,36 @@ TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
   }
 }
 
+/// A sheet of twice the size: its first level becomes dark where the target has none, and the second has the size of the target.
+TEST_F(LevelsTest, TheOutlineIsWhereAlbedosBecomeDark) {
+  folder_.write("small.obj", "v -0.5 -1 0\nv 0.5 -1 0\nv 0.5 1 0\nv -0.5 1 0\nf 1 2 3\nf 1 3 4\n");
+  folder_.write("small.yaml", [&] {
+    std::string text = folder_.read("flat.yaml");
+    return text.replace(text.find("flat.obj"), 8, "small.obj");
+  }());
+  const Problem problem(load_experiment(experiment("small", "target: 0", "{samples: 256}")));
+  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  const std::string albedo =
+      "  - {name: paint, type: albedo, per: vertex, shape: hill, initial: 0.4, smoothing: {slopes: 10}}\n";
+  const auto of = [&](const std::string& outline) {
+    return load_experiment(experiment("flat", "remesh: {levels: 2, coarse_levels: 2, edge_length: 0.25" + outline + "}",
+                                      "{images: target.exr}", albedo));
+  };
+  start_run(of(""), options());
+  EXPECT_GT(surface_area(read_mesh(folder_.file("out/levels/2/geometry/initial_hill.ply"))), 3.9);
+  start_run(of(", outline: {albedo: 0.5, slopes: 1e-6}"), options());
+  const Mesh second = read_mesh(folder_.file("out/levels/2/geometry/initial_hill.ply"));
+  EXPECT_NEAR(surface_area(second), 2, 0.3);
+  for (const Vec3& p : second.positions) EXPECT_LT(std::abs(p.x), 0.75);
+  const auto slopes = [&](int level) {
+    return load_experiment(folder_.file("out/levels/" + std::to_string(level) + "/experiment.yaml"))
+        .parameters[1]
+        .slopes;
+  };
+  EXPECT_EQ(slopes(1), 1e-6);
+  EXPECT_EQ(slopes(2), 10);
+}
+
 TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   const auto of = [&](const std::string& remesh, const std::string& more = "") {
     return refusal(experiment("flat", remesh + ", target: 0", "{samples: 4}", more));
@@ -290,6 +320,10 @@ TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   says(of("remesh: {levels: 3, coarse_levels: 0}"), "remesh.coarse_levels");
   says(of("remesh: {levels: 2, size: 3}"), "remesh.size");
   says(of("remesh: {levels: 2, skirt: -1}"), "remesh.skirt");
+  says(of("remesh: {levels: 2, outline: {slopes: 1}}"), "remesh.outline.albedo");
+  says(of("remesh: {levels: 2, outline: {albedo: 1.5}}"), "remesh.outline.albedo");
+  says(of("remesh: {levels: 2, outline: {albedo: 0.5}}"), "outline: 'hill' has no albedos by vertex");
+  says(of("remesh: {levels: 2, coarse_histograms: 100}"), "belongs to captures");
   says(of("remesh: {levels: 2}, selection: [0, 1]"), "selection: is of vertices that remeshing replaces");
   says(of("remesh: {levels: 12, edge_length: 0.01}"), "triangles");
   says(

@@ -1,0 +1,149 @@
+#include "optim/remesh/outline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+namespace isochron {
+namespace {
+
+/// Of an edge: cuts are no closer to its ends, or triangles would be thinner than remeshing can mend.
+constexpr double kNearestCut = 0.05;
+
+/// Vertices that hang together, as a number for each vertex.
+class Parts {
+ public:
+  explicit Parts(std::size_t vertices) : of_(vertices) { std::iota(of_.begin(), of_.end(), 0); }
+  int of(int v) {
+    while (of_[v] != v) v = of_[v] = of_[of_[v]];
+    return v;
+  }
+  void join(int a, int b) { of_[of(a)] = of(b); }
+
+ private:
+  std::vector<int> of_;
+};
+
+/// A third of the faces about each vertex.
+std::vector<double> areas_of(const Mesh& mesh) {
+  std::vector<double> area(mesh.positions.size(), 0.0);
+  for (const auto& [a, b, c] : mesh.faces) {
+    const std::vector<Vec3>& p = mesh.positions;
+    const double third = length(cross(p[b] - p[a], p[c] - p[a])) / 6;
+    for (const int v : {a, b, c}) area[v] += third;
+  }
+  return area;
+}
+
+/// Regions of vertices on the `inner` side that have less than that area change sides.
+void drop_small(const Mesh& mesh, const std::vector<double>& area, double least_area, bool inner,
+                std::vector<double>& above) {
+  const auto here = [&](int v) { return (above[v] >= 0) == inner; };
+  Parts parts(above.size());
+  for (const auto& face : mesh.faces)
+    for (int k = 0; k < 3; ++k)
+      if (here(face[k]) && here(face[(k + 1) % 3])) parts.join(face[k], face[(k + 1) % 3]);
+  std::vector<double> sums(above.size(), 0.0);
+  for (int v = 0; v < std::ssize(above); ++v) sums[parts.of(v)] += area[v];
+  for (int v = 0; v < std::ssize(above); ++v)
+    if (here(v) && sums[parts.of(v)] < least_area) above[v] = -above[v];
+}
+
+/// What is left of triangles where a function is at least 0, linear along their edges.
+class Cut {
+ public:
+  Cut(const Mesh& mesh, const std::vector<double>& above) : mesh_(mesh), above_(above) {}
+
+  Remeshed left() {
+    for (face_ = 0; face_ < std::ssize(mesh_.faces); ++face_) add_face();
+    return std::move(result_);
+  }
+
+ private:
+  bool inside(int corner) const { return above_[mesh_.faces[face_][corner]] >= 0; }
+
+  void add_face() {
+    const int count = inside(0) + inside(1) + inside(2);
+    if (count == 0) return;
+    if (count == 3) {
+      result_.mesh.faces.push_back({vertex(0), vertex(1), vertex(2)});
+      return;
+    }
+    int alone = 0;  // the corner on a side of its own
+    while (inside(alone) != (count == 1)) ++alone;
+    const int next = (alone + 1) % 3, last = (alone + 2) % 3, first_cut = cut(alone, next), last_cut = cut(last, alone);
+    if (count == 1) {
+      result_.mesh.faces.push_back({vertex(alone), first_cut, last_cut});
+    } else {
+      const int a = vertex(next), b = vertex(last);
+      result_.mesh.faces.push_back({first_cut, a, b});
+      result_.mesh.faces.push_back({first_cut, b, last_cut});
+    }
+  }
+
+  int vertex(int corner) {
+    const int v = mesh_.faces[face_][corner];
+    std::array<double, 3> weights{0, 0, 0};
+    weights[corner] = 1;
+    return numbered({v, v}, weights);
+  }
+
+  int cut(int from, int to) {
+    const int a = mesh_.faces[face_][from], b = mesh_.faces[face_][to];
+    const double place = std::clamp(above_[a] / (above_[a] - above_[b]), kNearestCut, 1 - kNearestCut);
+    std::array<double, 3> weights{0, 0, 0};
+    weights[from] = 1 - place;
+    weights[to] = place;
+    return numbered(std::minmax(a, b), weights);
+  }
+
+  int numbered(const std::pair<int, int>& place, const std::array<double, 3>& weights) {
+    const auto [entry, is_new] = numbers_.emplace(place, static_cast<int>(result_.mesh.positions.size()));
+    if (is_new) {
+      Vec3 p{0, 0, 0};
+      for (int k = 0; k < 3; ++k) p = p + weights[k] * mesh_.positions[mesh_.faces[face_][k]];
+      result_.mesh.positions.push_back(p);
+      result_.origins.push_back({face_, weights, p});
+    }
+    return entry->second;
+  }
+
+  const Mesh& mesh_;
+  const std::vector<double>& above_;
+  Remeshed result_;
+  std::map<std::pair<int, int>, int> numbers_;
+  int face_ = 0;
+};
+
+}  // namespace
+
+std::vector<double> typical_albedos(const Mesh& mesh, const std::vector<double>& albedo) {
+  const std::vector<double> area = areas_of(mesh);
+  Parts parts(albedo.size());
+  for (const auto& face : mesh.faces)
+    for (int k = 0; k < 3; ++k) parts.join(face[k], face[(k + 1) % 3]);
+  std::vector<double> sums(albedo.size(), 0.0), squares(albedo.size(), 0.0), typical(albedo.size());
+  for (int v = 0; v < std::ssize(albedo); ++v) {
+    sums[parts.of(v)] += area[v] * albedo[v];
+    squares[parts.of(v)] += area[v] * albedo[v] * albedo[v];
+  }
+  for (int v = 0; v < std::ssize(albedo); ++v) {
+    const int part = parts.of(v);
+    typical[v] = sums[part] > 0 ? squares[part] / sums[part] : 0;
+  }
+  return typical;
+}
+
+Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area) {
+  const std::vector<double> area = areas_of(mesh), typical = typical_albedos(mesh, albedo);
+  std::vector<double> above(albedo.size());
+  for (std::size_t v = 0; v < above.size(); ++v) above[v] = albedo[v] - share * typical[v];
+  drop_small(mesh, area, least_area, false, above);
+  drop_small(mesh, area, least_area, true, above);
+  return Cut(mesh, above).left();
+}
+
+}  // namespace isochron

@@ -1,0 +1,100 @@
+// Where surfaces end by the albedos on them. Closed forms, no random numbers.
+#include "optim/remesh/outline.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+namespace isochron {
+namespace {
+
+/// The square from `corner` to `corner` + 1 of so many cells each way, in `mesh`.
+void add_square(Mesh& mesh, const Vec3& corner, int cells) {
+  const int before = static_cast<int>(mesh.positions.size());
+  for (int y = 0; y <= cells; ++y)
+    for (int x = 0; x <= cells; ++x)
+      mesh.positions.push_back(corner + Vec3{double{1} * x / cells, double{1} * y / cells, 0});
+  const auto at = [&](int x, int y) { return before + y * (cells + 1) + x; };
+  for (int y = 0; y < cells; ++y)
+    for (int x = 0; x < cells; ++x) {
+      mesh.faces.push_back({at(x, y), at(x + 1, y), at(x + 1, y + 1)});
+      mesh.faces.push_back({at(x, y), at(x + 1, y + 1), at(x, y + 1)});
+    }
+}
+
+std::vector<double> painted(const Mesh& mesh, const std::function<double(const Vec3&)>& albedo) {
+  std::vector<double> values;
+  for (const Vec3& p : mesh.positions) values.push_back(albedo(p));
+  return values;
+}
+
+/// Area of what is left; its triangles are manifold, and face as those of the mesh did.
+double area_left(const Remeshed& left) {
+  double area = 0;
+  for (const auto& [a, b, c] : left.mesh.faces) {
+    const std::vector<Vec3>& p = left.mesh.positions;
+    const Vec3 twice = cross(p[b] - p[a], p[c] - p[a]);
+    EXPECT_GT(twice.z, 0);
+    area += twice.z / 2;
+  }
+  if (!left.mesh.faces.empty()) {
+    EXPECT_NO_THROW(require_remeshable(left.mesh, 0.1));
+  }
+  return area;
+}
+
+/// Light of albedos x comes from one of 2/3 on average; 0.6 of that is at x = 0.4, between two vertices.
+TEST(Outline, EndsWhereTheAlbedoIsThatShareOfTheTypicalOne) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 31);
+  const std::vector<double> albedo = painted(mesh, [](const Vec3& p) { return p.x; });
+  for (const double typical : typical_albedos(mesh, albedo)) EXPECT_NEAR(typical, 2.0 / 3, 0.001);
+  const Remeshed left = within_outline(mesh, albedo, 0.6, 0);
+  EXPECT_NEAR(area_left(left), 0.6, 0.001);
+  const std::vector<double> values = carry_over(left, mesh, albedo);
+  ASSERT_EQ(values.size(), left.mesh.positions.size());
+  for (std::size_t v = 0; v < values.size(); ++v) {
+    EXPECT_NEAR(values[v], left.mesh.positions[v].x, 1e-12);
+    EXPECT_GT(values[v], 0.398);
+  }
+}
+
+TEST(Outline, PartsHaveTypicalAlbedosOfTheirOwn) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 8);
+  add_square(mesh, {3, 0, 0}, 8);
+  const Remeshed left = within_outline(mesh, painted(mesh, [](const Vec3& p) { return p.x < 2 ? 0.9 : 0.1; }), 0.5, 0);
+  EXPECT_NEAR(area_left(left), 2, 1e-9);
+}
+
+/// A dark web, three vertices wide, tears halfway to the bright ones beside it. A dark spot and a bright one beyond, each as
+/// large as a cell, stay and go.
+TEST(Outline, WebsTearButSpecksDoNot) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 40);
+  const auto web = [](const Vec3& p) { return std::abs(p.x - 0.5) < 0.04 ? 0.0 : 0.5; };
+  const auto specked = [&](const Vec3& p) {
+    if (length(p - Vec3{0.25, 0.5, 0}) < 0.01) return 0.0;
+    return length(p - Vec3{0.5, 0.5, 0}) < 0.01 ? 0.5 : web(p);
+  };
+  const double cell = 1.0 / 1600;
+  const Remeshed torn = within_outline(mesh, painted(mesh, web), 0.5, 2 * cell),
+                 same = within_outline(mesh, painted(mesh, specked), 0.5, 2 * cell),
+                 pierced = within_outline(mesh, painted(mesh, specked), 0.5, 0);
+  EXPECT_NEAR(area_left(torn), 0.925, 1e-9);
+  EXPECT_EQ(same.mesh.faces, torn.mesh.faces);
+  EXPECT_NE(pierced.mesh.faces.size(), torn.mesh.faces.size());
+  area_left(pierced);
+}
+
+TEST(Outline, NothingIsLeftOfSpecksAlone) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 4);
+  const std::vector<double> even(mesh.positions.size(), 0.3);
+  EXPECT_NEAR(area_left(within_outline(mesh, even, 0.5, 0.5)), 1, 1e-12);
+  EXPECT_TRUE(within_outline(mesh, even, 0.5, 2).mesh.faces.empty());
+}
+
+}  // namespace
+}  // namespace isochron
