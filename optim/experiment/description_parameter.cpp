@@ -247,7 +247,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
               "and webs tear",
               {.unset = spec.remesh.outline == 0});
     inner.value("coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
-                "the coarse levels, but not the last one, are fitted to so many of a capture's histograms, spread "
+                "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
                 "evenly; 0: to all",
                 {.unset = spec.remesh.coarse_histograms == 0});
     inner.value(

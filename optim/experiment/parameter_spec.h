@@ -50,9 +50,10 @@ struct RemeshSpec {
 
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
 
-  /// Whether level `level` has coarse_histograms. Never the last one, and strips are judged by the same ones as the surface without.
+  /// Whether level `level` has coarse_histograms: not the last coarse one, which evidence is taken from, and not the last of all; strips are
+  /// judged by the same ones as the surface without.
   bool spares_histograms(int level) const {
-    return coarse_histograms > 0 && level < levels && level <= std::max(coarse_levels, skirt_until());
+    return coarse_histograms > 0 && level < levels && level < std::max(coarse_levels, skirt_until() + 1);
   }
   /// After which level borders get their strips: half of the coarse ones. Not the first where that has other albedos, which explain more.
   int skirt_after() const { return std::max((coarse_levels + 1) / 2, outline > 0 ? 2 : 1); }

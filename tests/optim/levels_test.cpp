@@ -43,12 +43,18 @@ double flat(double, double) {
   return 0;
 }
 
+/// Turns away towards its borders.
+double pillow(double x, double y) {
+  return -0.3 * std::pow(std::max(std::abs(x), std::abs(y)), 8);
+}
+
 class LevelsTest : public testing::Test {
  protected:
   LevelsTest() {
     folder_.write("flat.obj", sheet(4, flat));
     folder_.write("hill.obj", sheet(40, hill));
-    for (const std::string name : {"flat", "hill"})
+    folder_.write("pillow.obj", sheet(40, pillow));
+    for (const std::string name : {"flat", "hill", "pillow"})
       folder_.write(name + ".yaml",
                     "camera: {position: [0, 0, 3], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [16, 16]}\n"
                     "materials: {paint: {type: diffuse, albedo: 0.5}}\n"
@@ -234,14 +240,14 @@ TEST_F(LevelsTest, VerticesAtOnePlaceAreOne) {
 
 /// After one of two coarse levels the second begins with strips behind the borders; after three of five the fourth, and the fifth keeps them.
 /// The last goes on with them or from the level before. Nothing moves but by remeshing, which rounds the bend at a border: that makes a
-/// flat sheet more like a hill, and less like itself.
+/// flat sheet more like a pillow, and less like itself.
 TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
   struct Case {
     std::string target;
     int coarse, before, tried;
   };
   for (const auto& [target, coarse, before, tried] :
-       {Case{"hill", 2, 1, 1}, Case{"flat", 2, 1, 1}, Case{"hill", 5, 3, 2}, Case{"flat", 5, 3, 2}}) {
+       {Case{"pillow", 2, 1, 1}, Case{"flat", 2, 1, 1}, Case{"pillow", 5, 3, 2}, Case{"flat", 5, 3, 2}}) {
     SCOPED_TRACE(target + " " + std::to_string(coarse));
     const Problem problem(load_experiment(this->experiment(target, "target: 0", "{samples: 256}")));
     write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
@@ -263,13 +269,13 @@ TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
     EXPECT_GE(depth(before + 1), corner - 1e-6);
     EXPECT_LT(depth(before + 1), 0.6);
     EXPECT_GT(depth(before + tried), 0);
-    EXPECT_EQ(depth(last) > 0, target == "hill");
+    EXPECT_EQ(depth(last) > 0, target == "pillow");
     std::istringstream summary(folder_.read("out/summary.yaml"));
     int level = 0;
     for (std::string line; std::getline(summary, line);) {
       if (!line.starts_with("  - {edge_length")) continue;
       ++level;
-      const std::string said = target == "hill" ? ", skirt: kept}" : ", skirt: dropped}";
+      const std::string said = target == "pillow" ? ", skirt: kept}" : ", skirt: dropped}";
       EXPECT_EQ(line.ends_with(said), level > before && level <= before + tried) << line;
       EXPECT_EQ(line.find("skirt") != std::string::npos, line.ends_with(said)) << line;
     }
