@@ -106,7 +106,8 @@ TEST(Experiment, EveryErrorNamesItsPlaceAndWhatIsAllowed) {
       {"samples: 64,", "samples: 0,", "8:19: target.samples: 0 is out of range (an integer from 1 to 1073741824)"},
       {"{samples: 64, seed: 7}", "{images: gone.exr}", "8:18: target.images: there is no file 'gone.exr'"},
       {"{samples: 64, seed: 7}", "{images: scene.yaml, seed: 7}",
-       "8:30: target.seed: belongs to rendered targets, not to images (allowed: images, window, mask)"},
+       "8:30: target.seed: belongs to rendered targets, not to images (allowed: images, window, mask, "
+       "histograms)"},
       {"primal: 16", "primal: 0", "9:19: samples.primal: 0 is out of range"},
       {"interior: 16", "interior: -2", "9:33: samples.interior: -2 is out of range"},
       {"path_length", "pathlength", "9:53: samples.pathlength: is not a known key, did you mean 'path_length'?"},
