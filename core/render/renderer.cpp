@@ -109,7 +109,7 @@ ReplicatedImage Renderer::render_replicates(const Stream& stream, const std::vec
         PrimalSink sink(impl_->gates, films[0]);
         impl_->run_images(pass, partition, sink);
       },
-      [&](int, int pixel) { return impl_->background_of(pixel).first; });
+      [&](int, int pixel) { return impl_->scene.leaves_out(pixel) ? 0 : impl_->background_of(pixel).first; });
   return std::move(images[0]);
 }
 
@@ -134,7 +134,7 @@ std::vector<ReplicatedImage> Renderer::derive_replicates(Term term, const Stream
       },
       [&](int column, int pixel) {
         double sum = 0;
-        if (term != Term::interior) return sum;
+        if (term != Term::interior || impl_->scene.leaves_out(pixel)) return sum;
         const int dof = impl_->background_of(pixel).second;
         for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
           if (basis.entries[e].column == column) sum += basis.entries[e].coefficient;

@@ -61,10 +61,11 @@ struct Renderer::Impl : Passes {
     const int i = detector.background_of(scene.scene.capture, pixel);
     return {detector.background[i], scene.layout.background(i)};
   }
-  /// f(pixel, background of the pixel, its degree of freedom)
+  /// f(pixel, background of the pixel, its degree of freedom), but for pixels that are left out.
   template <class F>
   void for_each_background(F&& f) const {
     for (int pixel = 0; pixel < scene.pixels(); ++pixel) {
+      if (scene.leaves_out(pixel)) continue;
       const auto [value, dof] = background_of(pixel);
       f(pixel, value, dof);
     }

@@ -44,12 +44,12 @@ struct RemeshSpec {
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
   /// Of albedos by vertex: the surface ends where the first level finds less than this share of their mean (within_outline). 0: where it is.
   double outline = 0;
-  double outline_slopes =
-      0;             ///< weight of their slopes in that level, as of ParameterSpec::slopes: they have to vary there
-  double skirt = 0;  ///< length of the strips behind borders, scene units, see with_skirt; 0: none
+  double outline_slopes = 0;  ///< weight of their slopes in that level, in place of ParameterSpec::slopes
+  double skirt = 0;           ///< length of the strips behind borders, scene units, see with_skirt; 0: none
 
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
 
+  bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
   /// Whether level `level` has coarse_histograms: not the last coarse one, which evidence is taken from, and not the last of all; strips are
   /// judged by the same ones as the surface without.
   bool spares_histograms(int level) const {

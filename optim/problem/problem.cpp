@@ -165,14 +165,7 @@ void Problem::leave_out_histograms() {
   if (!scene_.capture)
     throw InputError(experiment_.file + ": target.histograms: belongs to captures; a camera's pixels are all used");
   const int pixels = scene_.camera.width * scene_.camera.height;
-  const auto used = [&] {
-    int count = 0;
-    for (int p = 0; p < pixels; ++p) count += readings_.uses_pixel(p);
-    return count;
-  };
-  const int before = used();
-  choose_pixels(readings_, pixels, experiment_.target.histograms);
-  share_of_histograms_ = static_cast<double>(used()) / before;
+  share_of_histograms_ = choose_pixels(readings_, pixels, experiment_.target.histograms);
   scene_.capture->left_out.resize(pixels);
   for (int p = 0; p < pixels; ++p) scene_.capture->left_out[p] = !readings_.uses_pixel(p);
 }

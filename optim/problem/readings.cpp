@@ -60,18 +60,20 @@ Readings make_readings(const Experiment& experiment, const GateSet& gates, int w
   return readings;
 }
 
-void choose_pixels(Readings& readings, int pixels, int count) {
+double choose_pixels(Readings& readings, int pixels, int count) {
   std::vector<int> used;
   for (int p = 0; p < pixels; ++p)
     if (readings.uses_pixel(p)) used.push_back(p);
-  if (std::ssize(used) <= count) return;
+  if (std::ssize(used) <= count) return 1;
   readings.pixel.assign(pixels, 0);
   // One of each run of neighbours, at places within these that fill the plane evenly where rows have many runs.
+  const auto first_of = [&](int run) { return used.size() * static_cast<std::size_t>(run) / count; };
   for (int i = 0; i < count; ++i) {
     const double within = i * std::numbers::phi - std::floor(i * std::numbers::phi);
-    const auto chosen = static_cast<std::size_t>((i + within) / count * static_cast<double>(used.size()));
-    readings.pixel[used[std::min(chosen, used.size() - 1)]] = 1;
+    const std::size_t first = first_of(i), length = first_of(i + 1) - first;
+    readings.pixel[used[first + static_cast<std::size_t>(within * static_cast<double>(length))]] = 1;
   }
+  return static_cast<double>(count) / static_cast<double>(used.size());
 }
 
 void require_counts(const GatedImage& target, const Readings& readings, const std::string& what) {

@@ -38,8 +38,8 @@ void parallel_pixels(const GatedImage& image, const std::function<void(int)>& f)
 /// to each of which the mask applies. Throws InputError where they do not fit or leave nothing.
 Readings make_readings(const Experiment& experiment, const GateSet& gates, int width, int height, int spots = 1);
 
-/// Leaves so many of the pixels that count, of `pixels` in all, spread evenly over them; all where there are no more.
-void choose_pixels(Readings& readings, int pixels, int count);
+/// Leaves so many of the pixels that count, of `pixels` in all, spread evenly over them; all where there are no more. Returns the share left.
+double choose_pixels(Readings& readings, int pixels, int count);
 
 /// Throws InputError, which begins with `what`, where a reading that counts is no count: negative or not finite.
 void require_counts(const GatedImage& target, const Readings& readings, const std::string& what);

@@ -24,7 +24,7 @@ struct FitSettings {
   double bending = 3;  ///< first weight: three nats per unit of curvature (a sphere has 50, the border of a disc 11)
   int coarse_histograms = 0;      ///< that coarse levels are fitted to; 0: all
   double motion = 0, albedo = 0;  ///< weights of slopes
-  double outline_share = 0.35;    ///< of the albedo that light comes from: the first level ends its surface below
+  double outline_share = 0.35;    ///< of the typical albedo, below which the surface ends (optim/README.md, Outlines)
   double outline_slopes = 0;      ///< weight of the albedos' slopes there
   double gain = 1;
   bool background_per_point = false;

@@ -21,7 +21,7 @@ constexpr int kRoundings = 6;  // of borders, by the weights 1, 2, 1 each: steps
 /// How far borders move by that, diagonals of a cell: a part of one cell keeps half its width.
 constexpr double kRounded = 0.25;
 /// Depth over distance. Webs that this makes tear later, by their albedo; what is cut here does not grow together. With 2 the base of an ear of
-/// the rabbit was cut off, and its silhouette missed 0.07 of it in place of 0.05.
+/// the rabbit was cut off, and its silhouette missed 0.07 of it in place of 0.06.
 constexpr double kSteepestJoint = 4;
 /// Standard deviation of the weights that albedos are averaged with, resolutions. With 1.4 voxels in place of it, twice as much where points
 /// are few, the blob under 8 x 8 spots ends at a silhouette of 0.862 and p = 2e-31, with this at 0.906 and 0.007.

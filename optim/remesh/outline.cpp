@@ -4,28 +4,15 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
+
+#include "core/base/disjoint_sets.h"
 
 namespace isochron {
 namespace {
 
 /// Of an edge: cuts are no closer to its ends, or triangles would be thinner than remeshing can mend.
 constexpr double kNearestCut = 0.05;
-
-/// Vertices that hang together, as a number for each vertex.
-class Parts {
- public:
-  explicit Parts(std::size_t vertices) : of_(vertices) { std::iota(of_.begin(), of_.end(), 0); }
-  int of(int v) {
-    while (of_[v] != v) v = of_[v] = of_[of_[v]];
-    return v;
-  }
-  void join(int a, int b) { of_[of(a)] = of(b); }
-
- private:
-  std::vector<int> of_;
-};
 
 /// A third of the faces about each vertex.
 std::vector<double> areas_of(const Mesh& mesh) {
@@ -38,18 +25,25 @@ std::vector<double> areas_of(const Mesh& mesh) {
   return area;
 }
 
+/// Vertices that edges join, of those edges whose ends are `together`.
+template <class F>
+DisjointSets joined(const Mesh& mesh, F&& together) {
+  DisjointSets sets(mesh.positions.size());
+  for (const auto& face : mesh.faces)
+    for (int k = 0; k < 3; ++k)
+      if (together(face[k], face[(k + 1) % 3])) sets.join(face[k], face[(k + 1) % 3]);
+  return sets;
+}
+
 /// Regions of vertices on the `inner` side that have less than that area change sides.
 void drop_small(const Mesh& mesh, const std::vector<double>& area, double least_area, bool inner,
                 std::vector<double>& above) {
   const auto here = [&](int v) { return (above[v] >= 0) == inner; };
-  Parts parts(above.size());
-  for (const auto& face : mesh.faces)
-    for (int k = 0; k < 3; ++k)
-      if (here(face[k]) && here(face[(k + 1) % 3])) parts.join(face[k], face[(k + 1) % 3]);
+  DisjointSets parts = joined(mesh, [&](int a, int b) { return here(a) && here(b); });
   std::vector<double> sums(above.size(), 0.0);
-  for (int v = 0; v < std::ssize(above); ++v) sums[parts.of(v)] += area[v];
+  for (int v = 0; v < std::ssize(above); ++v) sums[parts.root(v)] += area[v];
   for (int v = 0; v < std::ssize(above); ++v)
-    if (here(v) && sums[parts.of(v)] < least_area) above[v] = -above[v];
+    if (here(v) && sums[parts.root(v)] < least_area) above[v] = -above[v];
 }
 
 /// What is left of triangles where a function is at least 0, linear along their edges.
@@ -122,16 +116,14 @@ class Cut {
 
 std::vector<double> typical_albedos(const Mesh& mesh, const std::vector<double>& albedo) {
   const std::vector<double> area = areas_of(mesh);
-  Parts parts(albedo.size());
-  for (const auto& face : mesh.faces)
-    for (int k = 0; k < 3; ++k) parts.join(face[k], face[(k + 1) % 3]);
+  DisjointSets parts = joined(mesh, [](int, int) { return true; });
   std::vector<double> sums(albedo.size(), 0.0), squares(albedo.size(), 0.0), typical(albedo.size());
   for (int v = 0; v < std::ssize(albedo); ++v) {
-    sums[parts.of(v)] += area[v] * albedo[v];
-    squares[parts.of(v)] += area[v] * albedo[v] * albedo[v];
+    sums[parts.root(v)] += area[v] * albedo[v];
+    squares[parts.root(v)] += area[v] * albedo[v] * albedo[v];
   }
   for (int v = 0; v < std::ssize(albedo); ++v) {
-    const int part = parts.of(v);
+    const int part = parts.root(v);
     typical[v] = sums[part] > 0 ? squares[part] / sums[part] : 0;
   }
   return typical;

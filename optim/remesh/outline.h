@@ -13,9 +13,9 @@ namespace isochron {
 /// Of each vertex, the albedo that light of its connected part comes from on average: the mean over the area, weighted by itself.
 std::vector<double> typical_albedos(const Mesh& mesh, const std::vector<double>& albedo);
 
-/// What is left of a mesh where an albedo, linear over its triangles, is at least `share` (in (0, 1)) of the typical one. What would be a hole or a part of less than `least_area`
-/// (>= 0) stays or goes. `mesh` is an oriented manifold with an albedo of at least 0 for each vertex, and so is the result, which has no
-/// face where all parts are that small.
+/// What is left of a mesh where an albedo, linear over its triangles, is at least `share` (in (0, 1)) of the typical one. What would be
+/// a hole of less than `least_area` (>= 0) stays, a part of less goes. `mesh` is an oriented manifold with an albedo of at least 0 for each
+/// vertex. The result is one, too; it has no face where all parts are that small.
 Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area);
 
 }  // namespace isochron

@@ -100,15 +100,18 @@ class Levels {
   std::string folder(int level) const { return fmt::format("{}/levels/{}", folder_, level); }
   std::string file(const char* name) const { return folder_ + "/" + name; }
 
+  Poll poll() const {
+    return [this] {
+      if (options_.stop && options_.stop()) throw Interrupted{};
+    };
+  }
+
   void write_target() const {
     if (file_exists(file("target.exr"))) return;
     const Problem problem(experiment_);
-    const auto poll = [this] {
-      if (options_.stop && options_.stop()) throw Interrupted{};
-    };
     const Parameters& parameters = problem.parameters();
     GeometryFiles(folder_, experiment_.output, parameters).write("target", parameters.target());
-    write_exr(file("target.exr"), problem.make_target(poll), exr_notes(experiment_.gates));
+    write_exr(file("target.exr"), problem.make_target(poll()), exr_notes(experiment_.gates));
   }
 
   bool tries_skirt(int level) const {
@@ -138,12 +141,9 @@ class Levels {
     const Problem problem(experiment);
     const std::vector<double> theta = final_values(folder(level) + "/summary.yaml", problem.parameters());
     if (!problem.can_render(theta)) return std::nan("");
-    const auto poll = [this] {
-      if (options_.stop && options_.stop()) throw Interrupted{};
-    };
     const SplitImage image = problem.render_halves_in_parts(theta, problem.estimator(), problem.stream(Pass::primal),
-                                                            experiment.samples.primal, "weighing the strips", poll);
-    return problem.loss(image, problem.make_target(poll), theta).value;
+                                                            experiment.samples.primal, "weighing the strips", poll());
+    return problem.loss(image, problem.make_target(poll()), theta).value;
   }
 
   /// Makes the level's folder.
@@ -162,28 +162,27 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      const double outline = remeshed_.remesh.outline;
-      if (level == 2 && outline > 0)
-        surface =
-            within_outline(*surface, former.experiment().parameters, outline, kLeastPart * edge_length * edge_length);
+      if (remeshed_.remesh.finds_outline(level - 1))
+        surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,
+                                 kLeastPart * edge_length * edge_length);
       if (tries_skirt(level) && !tries_skirt(level - 1))
         surface = with_skirt(*surface, remeshed_.remesh.skirt, edge_length, former.scene().camera.position);
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       const bool follows = level > remeshed_.remesh.coarse_levels;
-      if (level == 2) restore_slopes(next.parameters, follows);
+      if (remeshed_.remesh.finds_outline(level - 1)) restore_slopes(next.parameters, follows);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
       if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
-    if (level == 1 && remeshed_.remesh.outline > 0)
+    if (remeshed_.remesh.finds_outline(level))
       for (ParameterSpec& spec : next.parameters)
         if (spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
           spec.slopes = remeshed_.remesh.outline_slopes;
     on_first_rank([&] { write_level(level, next, surface); });
   }
 
-  /// The weights that the first level may have had others in place of. Evidence is a factor to the ones that it was found with.
+  /// The weights that the first level had others in place of. Evidence is a factor to the ones that it was found with.
   void restore_slopes(std::vector<ParameterSpec>& next, bool evidence_follows) const {
     for (std::size_t i = 0; i < next.size(); ++i)
       if (!evidence_follows || !next[i].evidence) next[i].slopes = experiment_.parameters[i].slopes;

@@ -173,7 +173,9 @@ TEST_F(DetectorArray, BinsOfTheFileEndWithTheWindow) {
 // Those chosen have the bits of all, and others no samples: the loss is that of the chosen ones, the gradient its slope, and the work falls
 // with their number. Common random numbers: images of the same paths, shifted.
 TEST_F(DetectorArray, SomeHistogramsAreUsed) {
-  const std::string parameters = "  - {name: gain, type: gain, initial: 5000, target: 8000}\n";
+  const std::string parameters =
+      "  - {name: gain, type: gain, initial: 5000, target: 8000}\n"
+      "  - {name: b, type: background, initial: 0.5, target: 0.3}\n";
   write_counts(parameters, 0);
   const std::string file = experiment("{capture: counts.h5}", parameters, "{method: quasi_newton}");
   const Problem whole(load_experiment(file)), some(load_experiment(file, {"target.histograms=7"}));
@@ -198,14 +200,19 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
   whole.evaluate(theta, counts, 0, kGoOn);
   EXPECT_NEAR(static_cast<double>(of_some) / (whole.rays() - none), 7.0 / 30, 0.05);
   const Evaluation now = precise.evaluate(theta, counts, 0, kGoOn);
-  for (const int unknown : {0, 1}) {
-    const double step = unknown == 0 ? 1e-3 : 5;
+  for (const int unknown : {0, 1, 2}) {
+    const double step = unknown == 0 ? 1e-3 : unknown == 1 ? 5 : 0.01;
     std::vector<double> above = theta, below = theta;
     above[unknown] += step;
     below[unknown] -= step;
     const double slope =
         (precise.evaluate(above, counts, 0, kGoOn).loss - precise.evaluate(below, counts, 0, kGoOn).loss) / (2 * step);
     EXPECT_NEAR(now.gradient[unknown] / slope, 1, 0.1) << unknown;
+  }
+  for (const int count : {1, 20, 29}) {
+    const Problem fewer(load_experiment(file, {"target.histograms=" + std::to_string(count)}));
+    EXPECT_EQ(fewer.readings().count(counts), count * 80);
+    EXPECT_NEAR(fewer.share_of_histograms(), count / 30.0, 1e-12);
   }
   for (const char* count : {"30", "31", "0"}) {
     const Problem same(load_experiment(file, {std::string("target.histograms=") + count}));

@@ -304,13 +304,15 @@ TEST_F(LevelsTest, TheOutlineIsWhereAlbedosBecomeDark) {
   const Mesh second = read_mesh(folder_.file("out/levels/2/geometry/initial_hill.ply"));
   EXPECT_NEAR(surface_area(second), 2, 0.3);
   for (const Vec3& p : second.positions) EXPECT_LT(std::abs(p.x), 0.75);
-  const auto slopes = [&](int level) {
-    return load_experiment(folder_.file("out/levels/" + std::to_string(level) + "/experiment.yaml"))
-        .parameters[1]
-        .slopes;
+  const auto paint = [&](int level) {
+    return load_experiment(folder_.file("out/levels/" + std::to_string(level) + "/experiment.yaml")).parameters[1];
   };
-  EXPECT_EQ(slopes(1), 1e-6);
-  EXPECT_EQ(slopes(2), 10);
+  EXPECT_EQ(paint(1).slopes, 1e-6);
+  EXPECT_EQ(paint(2).slopes, 10);
+  const std::vector<double> even = paint(2).initial;
+  ASSERT_EQ(even.size(), second.positions.size());
+  for (const double each : even) EXPECT_NEAR(each, even[0], 1e-9);
+  EXPECT_NEAR(even[0], 0.5, 0.05);
 }
 
 TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {

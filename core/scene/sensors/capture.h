@@ -28,7 +28,7 @@ struct Capture {
     Vec3 laser, sensor;
   };
   std::optional<Origin> origin;
-  std::vector<char> left_out;        ///< of each pixel, whether no sample starts there; empty: all have samples
+  std::vector<char> left_out;        ///< of each pixel, whether no sample starts there, and it is black; empty: none
   std::vector<std::string> assumed;  ///< lines of what the file of the geometry lacks and what is taken in its place
 
   bool confocal() const { return spots.empty(); }

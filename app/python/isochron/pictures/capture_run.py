@@ -112,6 +112,8 @@ class CaptureRun:
                 raise PlotError(f"{path}: cannot be read: {error}") from error
             if self.used_points.shape != self.points.shape[:2] or not self.used_points.any():
                 raise PlotError(f"{path}: does not fit the sensor points, or leaves none")
+        if target.get("histograms"):  # others are not rendered, and black
+            self.used_points &= self.fit.any(axis=0)
         if target.get("window"):
             first, last = numbers(target["window"]) * self.scene_unit
             centres = (self.lengths[1:] + self.lengths[:-1]) / 2
