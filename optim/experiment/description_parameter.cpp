@@ -250,6 +250,20 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
                 "evenly; 0: to all",
                 {.unset = spec.remesh.coarse_histograms == 0});
+    const auto adam = [&spec](Keys& keys_of_adam) {
+      keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
+                         "of each such level", {.required = true});
+      keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate), "see `optimizer`",
+                         {.required = true, .unit = "the parameter's `scale`"});
+      keys_of_adam.value("slopes", field::non_negative(spec.remesh.adam_slopes),
+                         "weight of the offsets' slopes in these levels, in place of their own `smoothing`",
+                         {.unit = "mean square of the target"});
+    };
+    inner.map(
+        "adam", adam,
+        "coarse levels are fitted by adam, with steps that shrink towards the end of each, so that borders go all of "
+        "their way. The first (with `outline` two) and the last are not",
+        {.unset = spec.remesh.adam_iterations == 0});
     inner.value(
         "skirt", field::non_negative(spec.remesh.skirt),
         "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, as "

@@ -48,12 +48,18 @@ struct RemeshSpec {
   double skirt = 0;           ///< length of the strips behind borders, scene units, see with_skirt; 0: none
 
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
+  int adam_iterations = 0;    ///< of levels that adam fits, see steps_by_adam; 0: none
+  double adam_rate = 0;       ///< their OptimizerSpec::learning_rate
+  double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 
   bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
-  /// Whether level `level` has coarse_histograms: not the last coarse one, which evidence is taken from, and not the last of all; strips are
-  /// judged by the same ones as the surface without.
-  bool spares_histograms(int level) const {
-    return coarse_histograms > 0 && level < levels && level < std::max(coarse_levels, skirt_until() + 1);
+  /// Whether level `level` comes before the last coarse one, which evidence is taken from, and before the last of all.
+  bool comes_early(int level) const { return level < levels && level < std::max(coarse_levels, skirt_until() + 1); }
+  bool spares_histograms(int level) const { return coarse_histograms > 0 && comes_early(level); }
+  /// The others are the experiment's optimiser's, the first with all of its smoothing among them: what is far off, as a typical albedo
+  /// is, is out of reach for adam's steps, which would shrink the surface instead.
+  bool steps_by_adam(int level) const {
+    return adam_iterations > 0 && comes_early(level) && level > (finds_outline(1) ? 2 : 1);
   }
   /// After which level borders get their strips: half of the coarse ones. Not the first where that has other albedos, which explain more.
   int skirt_after() const { return std::max((coarse_levels + 1) / 2, outline > 0 ? 2 : 1); }

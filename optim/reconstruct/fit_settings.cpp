@@ -13,28 +13,31 @@
 namespace isochron {
 namespace {
 
-/// Of a level, per histogram. The rabbit of scenes/rabbit, 4096 histograms, takes 344 s of a processor for eight levels with 512 samples,
-/// nearly all of which grows with them.
-constexpr double kLevelSamplesPerSecond = 56000;
+/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in seven levels, has 512 for 300 s. It takes some 220 s.
+constexpr double kLevelSamplesPerSecond = 49000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// Borders move by a part of their way in each level, as slopes hold offsets to its start. Silhouettes of the rabbit after one to seven, the
-/// fifth of which has skirts: 0.861, 0.860, 0.871, 0.868, 0.897, 0.899, 0.900, where p is 0.8 at the end. With three and twice the samples
-/// 0.864, 0.870, 0.893, p = 1e-4. Metrics of more vertices take longer than rendering.
-constexpr int kCoarseLevels = 7;
+/// The first finds the outline and the second the albedo; three of adam move borders; the last has all histograms. Silhouettes of the rabbit
+/// after each: 0.81, 0.82, 0.88, 0.91, 0.92, 0.91 (optim/README.md, Borders).
+constexpr int kCoarseLevels = 6;
+/// Of each such level, and its largest step in edge lengths. From 0.85, one level of 150 comes to 0.90 with steps of 0.022, to 0.91 with 0.044 and 0.088,
+/// where more that is not there is left.
+constexpr int kAdamIterations = 120;
+constexpr double kAdamRate = 0.044;
+/// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
 constexpr double kCoarseVertices = 500;
-/// In lateral resolutions. The rabbit's median, 80 % and silhouette with it 0.85 / 2.8 mm and 0.90, without 1.05 / 3.3 mm and 0.87.
-constexpr double kSkirt = 1.5;
 /// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos, a quarter on average, across
 /// the surface.
 constexpr double kMotionSlope = 0.0625, kAlbedoChange = 0.015;
+/// Expected change of offsets over the distance where adam moves borders: triangles fold where it is one.
+constexpr double kFreeSlope = 0.5;
 /// Expected change of the first level's albedos from vertex to vertex: half of what they are on average, so that both dark and bright
 /// neighbours are likely.
 constexpr double kOutlineChange = 0.5 * 0.25;
 /// Of an image in the coarse levels, and at least that many histograms (optim/README.md, Histograms). A quarter of these samples left 8 x 8
 /// spots a hole where there is none: silhouette 0.870 in place of 0.894.
-constexpr int kCoarseHistograms = 512, kCoarseSamples = 512 * 512;
+constexpr int kCoarseHistograms = 1024, kCoarseSamples = 1024 * 512;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;
@@ -109,8 +112,9 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   FitSettings settings;
   const double area = surface_area(start);
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
-  settings.skirt = kSkirt * settings.edge_length;
   settings.levels = settings.coarse_levels = kCoarseLevels;
+  settings.adam_iterations = kAdamIterations;
+  settings.adam_rate = kAdamRate;
   for (double edge = settings.edge_length / 2;
        edge > std::numbers::sqrt2 / 4 * resolution && vertices_of(area, edge) <= kMostVertices; edge /= 2)
     ++settings.levels;
@@ -162,6 +166,7 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
   const double area = surface_area(start), edges = 3 * vertices_of(area, settings.edge_length);
   const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings));
   settings.motion = unit / (kMotionSlope * kMotionSlope);
+  settings.adam_motion = unit / (kFreeSlope * kFreeSlope);
   const double slope = kAlbedoChange / std::sqrt(area);
   settings.albedo = unit / (slope * slope);
   const double change = kOutlineChange / settings.edge_length;

@@ -19,10 +19,12 @@ struct TimeWindow {
 struct FitSettings {
   int samples = 16;  ///< of images, per histogram
   int levels = 1, coarse_levels = 1;
-  double edge_length = 1;  ///< of the first level
-  double skirt = 0;        ///< behind borders: most are where a body turns out of sight
-  double bending = 3;  ///< first weight: three nats per unit of curvature (a sphere has 50, the border of a disc 11)
-  int coarse_histograms = 0;      ///< that coarse levels are fitted to; 0: all
+  double edge_length = 1;     ///< of the first level
+  double bending = 1;         ///< first weight: a nat per unit of curvature (a sphere has 50, the border of a disc 11)
+  int coarse_histograms = 0;  ///< that coarse levels are fitted to; 0: all
+  int adam_iterations = 1;    ///< of these levels, and the largest step in edge lengths (optim/README.md, Borders)
+  double adam_rate = 1;
+  double adam_motion = 0;         ///< weight of the offsets' slopes there
   double motion = 0, albedo = 0;  ///< weights of slopes
   double outline_share = 0.35;    ///< of the typical albedo, below which the surface ends (optim/README.md, Outlines)
   double outline_slopes = 0;      ///< weight of the albedos' slopes there

@@ -51,16 +51,18 @@ parameters:
     shape: surface
     direction: free
     initial: 0
+    scale: {edge:.4g}   # so that steps of adam are shares of the edges
     smoothing: {{bending: {bending}, slopes: {motion:.4g}, evidence: true}}
-    remesh: {{levels: {levels}, coarse_levels: {coarse}, coarse_histograms: {histograms}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}, skirt: {skirt:.4g}}}
+    remesh: {{levels: {levels}, coarse_levels: {coarse}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
   - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo
     shape: surface
     per: vertex
     initial: 0.25
+    scale: 0.01
     smoothing: {{slopes: {albedo:.4g}, evidence: true}}
   - {{name: gain, type: gain, initial: {gain:.6g}, lower: {low:.6g}, upper: {high:.6g}}}
-  - {{name: background, type: background{per}}}
+  - {{name: background, type: background{per}, scale: 0.01}}
 target:
   capture: {capture}
   window: [{first:.6g}, {last:.6g}]   # light of the surface and some time before and after
@@ -72,10 +74,11 @@ output: {{histogram_samples: {primal}}}
       fmt::arg("name", fs::path(spec.capture).stem().string()), fmt::arg("seed", spec.seed),
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),
       fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("coarse", set.coarse_levels),
-      fmt::arg("histograms", set.coarse_histograms), fmt::arg("share", set.outline_share),
-      fmt::arg("slopes", set.outline_slopes), fmt::arg("edge", set.edge_length), fmt::arg("skirt", set.skirt),
-      fmt::arg("albedo", set.albedo), fmt::arg("gain", set.gain), fmt::arg("low", 0.999 * set.gain),
-      fmt::arg("high", 1.001 * set.gain), fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
+      fmt::arg("histograms", set.coarse_histograms), fmt::arg("steps", set.adam_iterations),
+      fmt::arg("rate", set.adam_rate), fmt::arg("free", set.adam_motion), fmt::arg("share", set.outline_share),
+      fmt::arg("slopes", set.outline_slopes), fmt::arg("edge", set.edge_length), fmt::arg("albedo", set.albedo),
+      fmt::arg("gain", set.gain), fmt::arg("low", 0.999 * set.gain), fmt::arg("high", 1.001 * set.gain),
+      fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
       fmt::arg("capture", quoted_path(spec.capture)), fmt::arg("first", set.window.first),
       fmt::arg("last", set.window.last), fmt::arg("primal", set.samples),
       fmt::arg("interior", std::max(2, set.samples / 2)));

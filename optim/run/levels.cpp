@@ -65,6 +65,19 @@ double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
 }
 
+/// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Iterations count more than
+/// samples of each: half of those of the images.
+void step_by_adam(const RemeshSpec& remesh, Experiment& experiment) {
+  OptimizerSpec& adam = experiment.optimizer;
+  adam = {};
+  adam.method = OptimizerMethod::adam;
+  adam.learning_rate = remesh.adam_rate;
+  adam.iterations = remesh.adam_iterations;
+  adam.stop_window = 0;
+  adam.decay = {.start = remesh.adam_iterations * 6 / 10, .half_life = remesh.adam_iterations / 15.0};
+  experiment.samples.primal = std::max(2, experiment.samples.primal / 2);
+}
+
 class Levels {
  public:
   Levels(const Experiment& experiment, const RunOptions& options,
@@ -152,6 +165,7 @@ class Levels {
     if (!next.target.measured()) next.target.images = file("target.exr");
     next.seed = seed_of(level, experiment_.seed);
     if (remeshed_.remesh.spares_histograms(level)) next.target.histograms = remeshed_.remesh.coarse_histograms;
+    if (remeshed_.remesh.steps_by_adam(level)) step_by_adam(remeshed_.remesh, next);
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
@@ -175,11 +189,20 @@ class Levels {
       if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
+    if (remeshed_.remesh.steps_by_adam(level) || remeshed_.remesh.steps_by_adam(level - 1))
+      free_motion(level, next.parameters);
     if (remeshed_.remesh.finds_outline(level))
       for (ParameterSpec& spec : next.parameters)
         if (spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
           spec.slopes = remeshed_.remesh.outline_slopes;
     on_first_rank([&] { write_level(level, next, surface); });
+  }
+
+  /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back.
+  void free_motion(int level, std::vector<ParameterSpec>& next) const {
+    for (ParameterSpec& spec : next)
+      if (spec.name == remeshed_.name)
+        spec.slopes = remeshed_.remesh.steps_by_adam(level) ? remeshed_.remesh.adam_slopes : remeshed_.slopes;
   }
 
   /// The weights that the first level had others in place of. Evidence is a factor to the ones that it was found with.
