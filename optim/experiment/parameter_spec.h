@@ -95,7 +95,8 @@ struct ParameterSpec {
   double slopes = 0;     ///< weight of the penalty on uneven values, in units of the target's mean square
   RemeshSpec remesh;     ///< of type vertices
   /// Of type vertices, see bending.h; 0: none.
-  double bending = 0;  ///< weight of a prior on curved surfaces
+  double bending = 0;     ///< weight of a prior on curved surfaces
+  double tangential = 0;  ///< and of one on motion of inner vertices within the surface
   /// Of types vertices and texture: each level but the first takes the weights that the data of the one before ask
   /// for, see evidence.h.
   bool evidence = false;

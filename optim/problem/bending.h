@@ -27,4 +27,9 @@ struct LinearForm {
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta);
 
+/// Of each vertex of the field that has triangles all around: how far it is from where it is at theta along two tangents of the surface there,
+/// over the root of a third of the area of its triangles. Such motion changes the mesh and not the surface.
+std::vector<LinearForm> tangential_forms(const Parameters& parameters, const Parameters::VertexField& field,
+                                         const std::vector<double>& theta);
+
 }  // namespace isochron

@@ -198,11 +198,16 @@ class Levels {
     on_first_rank([&] { write_level(level, next, surface); });
   }
 
-  /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back.
+  /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back. Inner vertices
+  /// keep to their normals: of motion within a surface of one albedo the gradient is all noise, which adam would follow until triangles fold.
   void free_motion(int level, std::vector<ParameterSpec>& next) const {
+    constexpr double kHeld = 200;  // a standard deviation of a twentieth of the vertices' distance
+    const bool adam = remeshed_.remesh.steps_by_adam(level), likelihood = experiment_.loss.kind == LossKind::poisson;
     for (ParameterSpec& spec : next)
-      if (spec.name == remeshed_.name)
-        spec.slopes = remeshed_.remesh.steps_by_adam(level) ? remeshed_.remesh.adam_slopes : remeshed_.slopes;
+      if (spec.name == remeshed_.name) {
+        spec.slopes = adam ? remeshed_.remesh.adam_slopes : remeshed_.slopes;
+        spec.tangential = adam && likelihood ? std::max(kHeld, remeshed_.tangential) : remeshed_.tangential;
+      }
   }
 
   /// The weights that the first level had others in place of. Evidence is a factor to the ones that it was found with.

@@ -172,5 +172,32 @@ TEST(Bending, IsThatOfTheSurfaceAsItBegins) {
   EXPECT_NEAR(energy(bending_forms(flat, field, bump), bump) / expected, 1, 1e-9);
 }
 
+/// Squares of the way within the surface over a third of the area of a vertex's triangles; neither borders nor motion along the normal count.
+TEST(Tangential, IsMotionOfInnerVerticesWithinTheSurface) {
+  Mesh mesh = sheet(6, 0.3);
+  for (Vec3& p : mesh.positions) p = {p.x, 0.6 * p.y - 0.8 * p.z, 0.8 * p.y + 0.6 * p.z};  // turned about x
+  const auto plane = surface(mesh, VertexDirection::free);
+  const Parameters& parameters = *plane->parameters;
+  const Parameters::VertexField field = parameters.vertex_field(parameters.blocks()[0]);
+  ASSERT_EQ(field.stride, 3);
+  std::vector<double> area(mesh.positions.size(), 0.0);
+  for (const auto& [a, b, c] : mesh.faces)
+    for (const int v : {a, b, c})
+      area[v] += length(cross(mesh.positions[b] - mesh.positions[a], mesh.positions[c] - mesh.positions[a])) / 6;
+  std::vector<double> theta = parameters.initial();
+  double expected = 0;
+  for (std::size_t i = 0; i < field.vertices.size(); ++i) {
+    const double x = std::cos(3.0 * static_cast<double>(i)), y = 0.5 * std::sin(5.0 * static_cast<double>(i)), z = 2;
+    const Vec3 way{x, 0.6 * y - 0.8 * z, 0.8 * y + 0.6 * z};
+    for (int axis = 0; axis < 3; ++axis) theta[field.begin + 3 * static_cast<int>(i) + axis] += way[axis];
+    const int v = field.vertices[i], row = v / 7, column = v % 7;
+    if (row > 0 && row < 6 && column > 0 && column < 6) expected += (x * x + y * y) / area[v];
+  }
+  const std::vector<LinearForm> forms = tangential_forms(parameters, field, parameters.initial());
+  EXPECT_EQ(forms.size(), 2u * 25u);
+  EXPECT_NEAR(energy(forms, parameters.initial()), 0, 1e-20);
+  EXPECT_NEAR(energy(forms, theta) / expected, 1, 1e-9);
+}
+
 }  // namespace
 }  // namespace isochron

@@ -336,6 +336,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     EXPECT_EQ(one.parameters[0].slopes, adam ? 1e-4 : 0.01);
     EXPECT_EQ(one.samples.primal, adam ? 16 : 32);
     EXPECT_EQ(one.samples.interior, 32);
+    EXPECT_EQ(one.parameters[0].tangential, 0) << "no likelihood";
     if (adam) {
       EXPECT_EQ(one.optimizer.learning_rate, 0.02);
       EXPECT_EQ(one.optimizer.window(), 0);
@@ -344,6 +345,17 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
   }
   YamlMap summary = open_yaml(folder_.file("out/levels/2/summary.yaml")).map();
   EXPECT_LT(summary.require("loss_final").number(), summary.require("loss_initial").number());
+
+  Experiment counts = asked;
+  counts.loss.kind = LossKind::poisson;
+  counts.optimizer.iterations = 0;
+  RunOptions elsewhere = options();
+  elsewhere.folder = folder_.file("counts");
+  start_run(counts, elsewhere);
+  for (const int level : {1, 2, 3, 4}) {
+    const Experiment one = load_experiment(folder_.file("counts/levels/" + std::to_string(level) + "/experiment.yaml"));
+    EXPECT_EQ(one.parameters[0].tangential, level == 2 ? 200 : 0) << level;
+  }
 }
 
 TEST(Remesh, AdamWaitsForAlbedosBehindAnOutline) {
