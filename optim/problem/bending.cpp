@@ -107,50 +107,50 @@ void add_border_curvature(const Forms& forms, int v, const Around& here, double 
   }
 }
 
-const Shape& shape_of(const Scene& scene, const Parameters::VertexField& field) {
-  return *std::find_if(scene.shapes.begin(), scene.shapes.end(),
-                       [&](const Shape& s) { return field.vertices.front() < s.first_vertex + s.vertex_count; });
+/// What `add(forms, vertex, its surroundings, area of the shape, result)` adds for each vertex of the field.
+template <class F>
+std::vector<LinearForm> forms_of_vertices(const Parameters& parameters, const Parameters::VertexField& field,
+                                          const std::vector<double>& theta, F&& add) {
+  std::vector<LinearForm> result;
+  if (field.vertices.empty()) return result;
+  const Forms forms(parameters, field, theta);
+  const std::vector<Shape>& shapes = forms.scene().shapes;
+  const Shape& shape = *std::find_if(shapes.begin(), shapes.end(), [&](const Shape& s) {
+    return field.vertices.front() < s.first_vertex + s.vertex_count;
+  });
+  const std::vector<Around> around = surroundings(forms.scene(), shape);
+  double area = 0;
+  for (const Around& each : around) area += each.area;
+  for (const int v : field.vertices) add(forms, v, around[v - shape.first_vertex], area, result);
+  return result;
 }
 
 }  // namespace
 
-std::vector<LinearForm> tangential_forms(const Parameters& parameters, const Parameters::VertexField& field,
-                                         const std::vector<double>& theta) {
-  std::vector<LinearForm> result;
-  if (field.vertices.empty()) return result;
-  const Forms forms(parameters, field, theta);
-  const Shape& shape = shape_of(forms.scene(), field);
-  const std::vector<Around> around = surroundings(forms.scene(), shape);
-  for (const int v : field.vertices) {
-    const Around& here = around[v - shape.first_vertex];
-    if (!here.along.empty() || !(here.area > 0)) continue;
-    const Frame frame(normalize(here.normal));
-    for (const Vec3& tangent : {frame.s, frame.t}) {
-      LinearForm form = forms.of({{v, 1}}, tangent / std::sqrt(here.area));
-      form.constant -= form.at(theta);
-      if (!form.entries.empty()) result.push_back(std::move(form));
-    }
-  }
-  return result;
-}
-
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta) {
-  std::vector<LinearForm> result;
-  if (field.vertices.empty()) return result;
-  const Forms forms(parameters, field, theta);
-  const Shape& shape = shape_of(forms.scene(), field);
-  const std::vector<Around> around = surroundings(forms.scene(), shape);
-  double area = 0;
-  for (const Around& each : around) area += each.area;
-  for (const int v : field.vertices) {
-    const Around& here = around[v - shape.first_vertex];
-    if (here.along.size() == 2)
-      add_border_curvature(forms, v, here, std::sqrt(area), result);
-    else if (here.along.empty() && here.area > 0)
-      result.push_back(mean_curvature(forms, v, here));
-  }
-  return result;
+  return forms_of_vertices(
+      parameters, field, theta,
+      [](const Forms& forms, int v, const Around& here, double area, std::vector<LinearForm>& result) {
+        if (here.along.size() == 2)
+          add_border_curvature(forms, v, here, std::sqrt(area), result);
+        else if (here.along.empty() && here.area > 0)
+          result.push_back(mean_curvature(forms, v, here));
+      });
+}
+
+std::vector<LinearForm> tangential_forms(const Parameters& parameters, const Parameters::VertexField& field,
+                                         const std::vector<double>& theta) {
+  return forms_of_vertices(parameters, field, theta,
+                           [&](const Forms& forms, int v, const Around& here, double, std::vector<LinearForm>& result) {
+                             if (!here.along.empty() || !(here.area > 0)) return;
+                             const Frame frame(normalize(here.normal));
+                             for (const Vec3& tangent : {frame.s, frame.t}) {
+                               LinearForm form = forms.of({{v, 1}}, tangent / std::sqrt(here.area));
+                               form.constant -= form.at(theta);
+                               if (!form.entries.empty()) result.push_back(std::move(form));
+                             }
+                           });
 }
 
 }  // namespace isochron

@@ -17,12 +17,8 @@ namespace {
 constexpr double kLevelSamplesPerSecond = 49000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// The first finds the outline and the second the albedo; three of adam move borders; the last has all histograms. Silhouettes of the rabbit
-/// after each: 0.81, 0.82, 0.88, 0.91, 0.92, 0.91 (optim/README.md, Borders).
+/// after each: 0.81, 0.84, 0.89, 0.91, 0.91, 0.91 (optim/README.md, Borders).
 constexpr int kCoarseLevels = 6;
-/// Of each such level, and its largest step in edge lengths. From 0.85, one level of 150 comes to 0.90 with steps of 0.022, to 0.91 with 0.044 and 0.088,
-/// where more that is not there is left.
-constexpr int kAdamIterations = 120;
-constexpr double kAdamRate = 0.044;
 /// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
@@ -113,8 +109,6 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   const double area = surface_area(start);
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
   settings.levels = settings.coarse_levels = kCoarseLevels;
-  settings.adam_iterations = kAdamIterations;
-  settings.adam_rate = kAdamRate;
   for (double edge = settings.edge_length / 2;
        edge > std::numbers::sqrt2 / 4 * resolution && vertices_of(area, edge) <= kMostVertices; edge /= 2)
     ++settings.levels;

@@ -150,6 +150,7 @@ class Levels {
   double paired_loss(int level) const {
     Experiment experiment = load_experiment(folder(level) + "/experiment.yaml");
     experiment.seed = experiment_.seed;
+    experiment.samples = experiment_.samples;
     experiment.target.histograms = experiment_.target.histograms;
     const Problem problem(experiment);
     const std::vector<double> theta = final_values(folder(level) + "/summary.yaml", problem.parameters());
@@ -169,6 +170,7 @@ class Levels {
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
+      set_weights(level, false, next.parameters);
     } else {
       const bool first = level == 1;
       const std::string before = first ? "" : folder(former_of(level));
@@ -184,36 +186,34 @@ class Levels {
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       const bool follows = level > remeshed_.remesh.coarse_levels;
-      if (remeshed_.remesh.finds_outline(level - 1)) restore_slopes(next.parameters, follows);
+      set_weights(level, follows, next.parameters);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
       if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
-    if (remeshed_.remesh.steps_by_adam(level) || remeshed_.remesh.steps_by_adam(level - 1))
-      free_motion(level, next.parameters);
-    if (remeshed_.remesh.finds_outline(level))
-      for (ParameterSpec& spec : next.parameters)
-        if (spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
-          spec.slopes = remeshed_.remesh.outline_slopes;
     on_first_rank([&] { write_level(level, next, surface); });
+  }
+
+  /// Weights of a level: those asked for, but where evidence is to be a factor to the ones that it is found with, and what outlines and adam need.
+  void set_weights(int level, bool evidence_follows, std::vector<ParameterSpec>& next) const {
+    const RemeshSpec& remesh = remeshed_.remesh;
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      ParameterSpec& spec = next[i];
+      const bool weighs_slopes = spec.evidence && !(spec.bending > 0);
+      if (!(evidence_follows && weighs_slopes)) spec.slopes = experiment_.parameters[i].slopes;
+      spec.tangential = experiment_.parameters[i].tangential;
+      if (remesh.finds_outline(level) && spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
+        spec.slopes = remesh.outline_slopes;
+      if (remesh.steps_by_adam(level) && spec.name == remeshed_.name) free_borders(spec);
+    }
   }
 
   /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back. Inner vertices
   /// keep to their normals: of motion within a surface of one albedo the gradient is all noise, which adam would follow until triangles fold.
-  void free_motion(int level, std::vector<ParameterSpec>& next) const {
+  void free_borders(ParameterSpec& spec) const {
     constexpr double kHeld = 200;  // a standard deviation of a twentieth of the vertices' distance
-    const bool adam = remeshed_.remesh.steps_by_adam(level), likelihood = experiment_.loss.kind == LossKind::poisson;
-    for (ParameterSpec& spec : next)
-      if (spec.name == remeshed_.name) {
-        spec.slopes = adam ? remeshed_.remesh.adam_slopes : remeshed_.slopes;
-        spec.tangential = adam && likelihood ? std::max(kHeld, remeshed_.tangential) : remeshed_.tangential;
-      }
-  }
-
-  /// The weights that the first level had others in place of. Evidence is a factor to the ones that it was found with.
-  void restore_slopes(std::vector<ParameterSpec>& next, bool evidence_follows) const {
-    for (std::size_t i = 0; i < next.size(); ++i)
-      if (!evidence_follows || !next[i].evidence) next[i].slopes = experiment_.parameters[i].slopes;
+    spec.slopes = remeshed_.remesh.adam_slopes;
+    if (experiment_.loss.kind == LossKind::poisson) spec.tangential = std::max(kHeld, spec.tangential);
   }
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
@@ -361,6 +361,14 @@ void require_levels(const Problem& problem) {
   if (!remeshed) return;
   if (remeshed->remesh.coarse_histograms > 0 && !problem.scene().capture)
     remeshed->fail("remesh", "coarse_histograms: belongs to captures; a camera's pixels are all used", "0");
+  const RemeshSpec& remesh = remeshed->remesh;
+  if (remesh.adam_iterations > 0) {
+    int by_adam = 0;
+    for (int level = 1; level <= remesh.levels; ++level) by_adam += remesh.steps_by_adam(level);
+    if (by_adam == 0)
+      remeshed->fail("remesh", "adam: there is no coarse level for it",
+                     fmt::format("coarse_levels: at least {}", remesh.outline > 0 ? 4 : 3));
+  }
   const Mesh loaded = mesh_of(problem.scene(), remeshed->shape);
   try {
     require_remeshable(loaded, edge_length_of(remeshed->remesh.levels, remeshed->remesh, loaded));

@@ -393,6 +393,8 @@ TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   says(of("remesh: {levels: 2, outline: {albedo: 0.5}}"), "outline: 'hill' has no albedos by vertex");
   says(of("remesh: {levels: 2, adam: {iterations: 5}}"), "remesh.adam.learning_rate");
   says(of("remesh: {levels: 2, adam: {iterations: 0, learning_rate: 0.1}}"), "remesh.adam.iterations");
+  says(of("remesh: {levels: 3, coarse_levels: 2, adam: {iterations: 5, learning_rate: 0.1}}"),
+       "adam: there is no coarse level for it");
   says(of("remesh: {levels: 2, coarse_histograms: 100}"), "belongs to captures");
   says(of("remesh: {levels: 2}, selection: [0, 1]"), "selection: is of vertices that remeshing replaces");
   says(of("remesh: {levels: 12, edge_length: 0.01}"), "triangles");
