@@ -12,6 +12,7 @@
 #include "core/image/capture_file.h"
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
+#include "optim/problem/estimates.h"
 #include "optim/problem/photon_noise.h"
 #include "optim/run/run.h"
 #include "tests/optim/tiny_scene.h"
@@ -218,6 +219,24 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
     const Problem same(load_experiment(file, {std::string("target.histograms=") + count}));
     EXPECT_EQ(same.readings().count(counts), 30 * 80) << count;
   }
+}
+
+// What `render` and `derive` write, by their own sums: with a background, whose derivative is one, nothing but a pixel left out is black.
+TEST_F(DetectorArray, EstimatesAreBlackWhereHistogramsAreLeftOut) {
+  const std::string parameters = "  - {name: b, type: background, initial: 0.5, target: 0.3}\n";
+  write_counts(parameters, 0);
+  const Problem some(load_experiment(experiment("{capture: counts.h5}", parameters, "{method: quasi_newton}"),
+                                     {"target.histograms=7"}));
+  const std::vector<double> theta = some.parameters().initial();
+  const GatedImage image = estimate_image(some, theta, kGoOn).image.to_gated(),
+                   slope = estimate_derivatives(some, theta, 1, 1, kGoOn)[0].images[0].to_gated();
+  for (int p = 0; p < 30; ++p)
+    for (int g = 0; g < 80; ++g) {
+      const bool used = some.readings().uses_pixel(p);
+      EXPECT_EQ(image.at(p, g) >= 0.5, used) << p << " " << g;
+      EXPECT_EQ(image.at(p, g) != 0, used) << p << " " << g;
+      EXPECT_EQ(slope.at(p, g), used) << p << " " << g;
+    }
 }
 
 // Without dark bins to begin at, levenberg_marquardt and quasi_newton end with z at 6e4 and the gain at its bound.
