@@ -248,6 +248,8 @@ class Levels {
     options.folder = folder(level);
     options.errors = level == remeshed_.remesh.levels;
     options.report = [this](const std::string& text) { report_ = text; };
+    // Its losses scatter by design, and what comes of it is told by the levels that follow.
+    if (remeshed_.remesh.steps_by_adam(level)) options.warning = {};
     options.progress = [this, level](Progress progress) {
       progress.level = level;
       progress.levels = remeshed_.remesh.levels;
