@@ -12,6 +12,7 @@ SOURCES = ("CMakeLists.txt", "app/*.cpp", "app/*.h", "core", "optim", "scenes", 
 CHARTED = ("cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa")
 CHART_SECONDS = {"cube": 240, "bunny": 120}  # where the gradient has to stand out of much noise; 60 for the others
 BY_CHANCE = ("cube", "cube_standard")  # runs that noise alone can lead away, so that there are many of them
+BIASED = ("corridor_3bounce", "height_field_steady")  # counterparts that fail with every seed alike
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ def _csv(name):
 
 
 def _reproduce(name):
-    seeds = map(str, range(1, 6 if name in BY_CHANCE else 3))
+    count = 5 if name in BY_CHANCE else 1 if name in BIASED else 2
+    seeds = map(str, range(1, 1 + count))
     return Step((_script("reproduce", name, "--seeds", *seeds),), removed=(_csv(f"reconstructions/{name}"),))
 
 
@@ -56,7 +58,7 @@ STEPS = {
     "boundary": Step((_built("boundary", _csv("boundary"), "64"),)),
     "hidden_share": Step((_built("hidden_share", _csv("hidden_share"), "16"),)),
     "light_share": Step((_built("light_share", _csv("light_share"), "4"),)),
-    "share_trial": Step((_built("share_trial", _csv("share_trial"), "4"),)),
+    "share_trial": Step((_built("share_trial", _csv("share_trial"), "2"),)),
     "capture_cost": Step((_script("capture_cost.py", "measure", _csv("capture_cost")),)),
     "stated_errors": Step((_script("error_coverage.py", "measure", _csv("error_coverage")),)),
     "intervals": Step((_script("interval_coverage.py", "measure", _csv("interval_coverage")),)),
@@ -67,7 +69,7 @@ STEPS = {
 
 def hidden_s():
     """The fit of public data, which are not part of this repository either."""
-    return {"hidden_s": Step((_script("fit_probabilities.py", "measure", "experiments/hidden_s.yaml", _csv("fit_probabilities")),))}
+    return {"hidden_s": Step((_script("fit_probabilities.py", "measure", "experiments/hidden_s.yaml", _csv("fit_probabilities"), "6"),))}
 
 
 def egg(folder):

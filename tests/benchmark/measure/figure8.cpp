@@ -235,7 +235,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "usage: isochron_figure8 FOLDER CSV [EFFORT]\n");
     return 2;
   }
-  const int effort = argc == 4 ? std::max(8, std::atoi(argv[3])) : 40;
+  const int effort = argc == 4 ? std::max(8, std::atoi(argv[3])) : 24;
   Table table(argv[2]);
   for (const char* kind : {"gaussian", "boxcar", "truncated_gaussian"}) measure(kind, argv[1], effort, table);
   return 0;
