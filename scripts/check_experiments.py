@@ -28,7 +28,7 @@ EXPERIMENTS = {
     "cube": (2048, 16),
     "cube_standard": (8192, 16),
     "figure1": (8192, 16),
-    "height_field": (4096, 8),  # with fewer, differences miss the edges of single vertices, and look sure of it
+    "height_field": (4096, 8),  # with fewer, differences miss the edges of single vertices, and state errors that are too small
     "height_field_steady": (4096, 8),
     "sofa": (131072, 6, "shape[8]"),
     "tree": (16384, 16),

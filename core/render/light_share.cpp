@@ -11,10 +11,10 @@ namespace {
 /// samples find what the other does not.
 constexpr std::array kShares = {0.0, 0.2, 0.35, 0.5, 0.65, 0.8};
 constexpr double kLightTrialShare = 0.5;
-/// By how much another share than none must look better, for images and for derivatives: what rays leave out, the differential of
-/// every joint, takes as long again (corridor). Of those that do the least that comes so close to the best is taken, as other terms
-/// of a derivative take their part of the time, too.
-constexpr double kClearlyBetter[] = {0.8, 0.5}, kAsGoodAsTheBest = 1.25;
+/// The cost of a share over that of none must be below this, for images and for derivatives: rays do not count the differential of
+/// every joint, which takes as long again (corridor). The least of those shares within the second ratio of the best is taken, as other
+/// terms of a derivative take time, too.
+constexpr double kMaxCostRatio[] = {0.8, 0.5}, kAsGoodAsTheBest = 1.25;
 
 /// Second moments of what samples find, by kShares.
 struct Moments {
@@ -99,7 +99,7 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
   const auto cost = [&](std::size_t i) {
     return moments.of[i] / (1 - kShares[i]) * ((1 - kShares[i]) * of_standard + kShares[i] * of_light);
   };
-  const double without = kClearlyBetter[column != nullptr] * cost(0);
+  const double without = kMaxCostRatio[column != nullptr] * cost(0);
   double best = without;
   for (std::size_t i = 1; i < kShares.size(); ++i) best = std::min(best, cost(i));
   for (std::size_t i = 1; i < kShares.size(); ++i)

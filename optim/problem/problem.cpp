@@ -193,7 +193,7 @@ std::string Problem::light_that_leaves_the_camera() const {
 }
 
 const EstimatorOptions& Problem::estimator(Purpose purpose) const {
-  auto& known = settled_.estimator[purpose == Purpose::gradients];
+  auto& known = chosen_.estimator[purpose == Purpose::gradients];
   if (!known) {
     EstimatorOptions options = experiment_.estimator;
     const std::vector<double> theta = parameters_->initial();
@@ -214,22 +214,22 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
 }
 
 const EstimatorOptions& Problem::image_estimator() const {
-  if (!settled_.image_estimator) {
+  if (!chosen_.image_estimator) {
     EstimatorOptions options = experiment_.estimator;
     options.mix = measure_mix(parameters_->apply(parameters_->initial()), gates_, options, nullptr, stream(Pass::mix),
                               Purpose::images, {double{1} * experiment_.samples.primal, 0});
-    settled_.image_estimator = options;
+    chosen_.image_estimator = options;
   }
-  return *settled_.image_estimator;
+  return *chosen_.image_estimator;
 }
 
 void Problem::choose(const SampleSpec& samples, std::uint64_t seed, int evaluations) {
-  constexpr std::size_t kMostRemembered = 16;
+  constexpr std::size_t kMostChoices = 16;
   const Choice choice{{samples.primal, samples.interior, samples.visibility, samples.path_length}, seed, evaluations};
   if (choice == choice_) return;
-  if (remembered_.size() >= kMostRemembered) remembered_.clear();
-  remembered_[choice_] = std::move(settled_);
-  settled_ = std::move(remembered_[choice]);
+  if (chosen_before_.size() >= kMostChoices) chosen_before_.clear();
+  chosen_before_[choice_] = std::move(chosen_);
+  chosen_ = std::move(chosen_before_[choice]);
   choice_ = choice;
   experiment_.samples = samples;
   experiment_.seed = seed;

@@ -187,7 +187,7 @@ class Problem {
   std::string light_that_leaves_the_camera() const;
 
   /// What `sampling: auto` has chosen in its trials.
-  struct Settled {
+  struct ChosenEstimators {
     std::array<std::optional<EstimatorOptions>, 2> estimator;  ///< per purpose
     std::optional<EstimatorOptions> image_estimator;
   };
@@ -206,10 +206,10 @@ class Problem {
   Preconditioner preconditioner_;
   QuadraticPenalty penalty_;
   int evaluations_;  ///< of the loss gradient
-  mutable Settled settled_;
+  mutable ChosenEstimators chosen_;
   using Choice = std::tuple<std::array<int, 4>, std::uint64_t, int>;
-  Choice choice_;                         ///< samples, seed and evaluations that settled_ belongs to
-  std::map<Choice, Settled> remembered_;  ///< earlier values of settled_, by choice
+  Choice choice_;                                     ///< samples, seed and evaluations that chosen_ belongs to
+  std::map<Choice, ChosenEstimators> chosen_before_;  ///< earlier values of chosen_, by choice
 };
 
 Pass pass_of(Term term);
