@@ -56,6 +56,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   scene.detector = source.detector;
   scene.lights = source.lights;
   scene.texture = source.texture;
+  if (scene.capture) scene.capture->left_out = source.capture->left_out;
   std::vector<char> moved_shapes(scene.shapes.size(), 0);
   const std::vector<char> moved = move_vertices(source.positions, moved_shapes);
   stacked.update(scene, first ? std::vector<char>(moved_shapes.size(), 1) : moved_shapes, caster.offset());

@@ -89,8 +89,9 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
              "NumPy array (.npy) [columns, rows] of the pixels; pixels with a zero are not used",
              {.unset = target.mask.empty(), .otherwise = "all are"});
   keys.value("histograms", field::integer(target.histograms, 0, std::numeric_limits<int>::max()),
-             "of a capture: so many are used, spread evenly over it, and others are not rendered, which saves time; 0: "
-             "all are",
+             "of a capture: so many are used, spread evenly over it, and others are not rendered, which saves time; "
+             "adam takes others "
+             "in each iteration; 0: all are",
              {.unset = target.histograms == 0});
 }
 

@@ -29,10 +29,10 @@ class PixelSums {
     squared_errors_ += pixel.error * pixel.error;
   }
   double value() const { return value_; }
-  /// Of the sum.
-  double standard_error(double pixels) const {
-    const double scatter = squared_values_ - value_ * value_ / pixels;
-    return std::sqrt(std::max(0.0, std::min(squared_errors_, scatter)));
+  /// Of the sum; of that over all pixels where these are a share of them that was drawn at random.
+  double standard_error(double pixels, double drawn) const {
+    const double scatter = std::max(0.0, squared_values_ - value_ * value_ / pixels);
+    return std::sqrt(std::min(squared_errors_, scatter) + (1 - drawn) * scatter);
   }
 
  private:
@@ -120,7 +120,8 @@ LossEstimate estimate_loss(const SplitImage& image, const GatedImage& target, co
   }
   if (!std::isfinite(loss.value()) || !std::isfinite(squared.value())) return {kUnknown, kUnknown, kUnknown, kUnknown};
   const double n = rho.readings.count(target), pixels = rho.readings.pixels(target);
-  return {loss.value() / n, loss.standard_error(pixels) / n, squared.value() / n, squared.standard_error(pixels) / n};
+  const auto error = [&](const PixelSums& of) { return of.standard_error(pixels, rho.readings.drawn) / n; };
+  return {loss.value() / n, error(loss), squared.value() / n, error(squared)};
 }
 
 GatedImage loss_adjoint(const SplitImage& image, const GatedImage& target, const ReadingLoss& rho) {

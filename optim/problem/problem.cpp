@@ -52,6 +52,17 @@ CasterUpdate caster_update(const Experiment& experiment, const Scene& scene) {
                                                                                : CasterUpdate::rebuild;
 }
 
+int pixels_of(const Scene& scene) {
+  return scene.camera.width * scene.camera.height;
+}
+
+/// Of a capture: no sample starts at pixels that do not count.
+void leave_out_unread(const Readings& readings, Scene& scene) {
+  const int pixels = pixels_of(scene);
+  scene.capture->left_out.resize(pixels);
+  for (int p = 0; p < pixels; ++p) scene.capture->left_out[p] = !readings.uses_pixel(p);
+}
+
 }  // namespace
 
 Pass pass_of(Term term) {
@@ -167,10 +178,20 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
 void Problem::leave_out_histograms() {
   if (!scene_.capture)
     throw InputError(experiment_.file + ": target.histograms: belongs to captures; a camera's pixels are all used");
-  const int pixels = scene_.camera.width * scene_.camera.height;
-  share_of_histograms_ = choose_pixels(readings_, pixels, experiment_.target.histograms);
-  scene_.capture->left_out.resize(pixels);
-  for (int p = 0; p < pixels; ++p) scene_.capture->left_out[p] = !readings_.uses_pixel(p);
+  all_readings_ = readings_;
+  share_of_histograms_ = choose_pixels(readings_, pixels_of(scene_), experiment_.target.histograms);
+  leave_out_unread(readings_, scene_);
+}
+
+bool Problem::redraws_histograms() const {
+  return share_of_histograms_ < 1 && experiment_.optimizer.method == OptimizerMethod::adam &&
+         experiment_.gradient.method == GradientMethod::analytic;
+}
+
+Readings Problem::drawn_readings(std::uint32_t iteration) const {
+  Readings readings = all_readings_;
+  readings.drawn = choose_pixels(readings, pixels_of(scene_), experiment_.target.histograms, iteration);
+  return readings;
 }
 
 bool Problem::leaves_out_jumps() const {
@@ -294,7 +315,12 @@ PenaltyScale Problem::penalty_scale(const GatedImage& target) const {
 }
 
 LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta) const {
-  LossEstimate estimate = estimate_loss(image, target, reading_loss(target));
+  return loss(image, target, theta, reading_loss(target));
+}
+
+LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta,
+                           const ReadingLoss& rho) const {
+  LossEstimate estimate = estimate_loss(image, target, rho);
   if (!penalty_.empty()) estimate.value += penalty_.value(theta, penalty_scale(target));
   return estimate;
 }
@@ -309,8 +335,13 @@ EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) con
 Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
                              const Poll& poll, Share share, std::vector<std::vector<double>>* parts) const {
   const SampleSpec& samples = experiment_.samples;
-  const Scene scene = parameters_->apply(theta);
+  Scene scene = parameters_->apply(theta);
   if (!coordinates_fit(scene)) return no_evaluation(target);
+  ReadingLoss rho = reading_loss(target);
+  if (redraws_histograms()) {
+    rho.readings = drawn_readings(iteration);
+    leave_out_unread(rho.readings, scene);
+  }
   const TangentBasis basis = parameters_->tangent(theta);
   const Renderer renderer = this->renderer(scene, estimator(share.of(samples.visibility).count()), &basis);
   Evaluation result;
@@ -318,8 +349,8 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
   ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
   SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
-  set_loss(loss(image, target, theta), result);
-  const GatedImage adjoint = loss_adjoint(image, target, reading_loss(target));
+  set_loss(loss(image, target, theta, rho), result);
+  const GatedImage adjoint = loss_adjoint(image, target, rho);
   stage.advance();
   result.image = std::move(image.image);
   poll();

@@ -140,6 +140,8 @@ class Problem {
   const Readings& readings() const { return readings_; }
   /// That `target.histograms` leaves of those that count without it.
   double share_of_histograms() const { return share_of_histograms_; }
+  /// Whether `evaluate` takes as many others in each iteration: adam averages over its iterations, so that all histograms count.
+  bool redraws_histograms() const;
   /// Throws InputError, which begins with `what`, where the loss has no use for a target.
   void require_usable(const GatedImage& target, const std::string& what) const;
 
@@ -177,6 +179,10 @@ class Problem {
  private:
   /// As `target.histograms` says, in the readings and in the scene.
   void leave_out_histograms();
+  /// The histograms of an iteration that redraws them.
+  Readings drawn_readings(std::uint32_t iteration) const;
+  LossEstimate loss(const SplitImage& image, const GatedImage& target, const std::vector<double>& theta,
+                    const ReadingLoss& rho) const;
 
   /// Renders `samples` in parts: use(image, samples, index of the part of so many).
   template <class F>
@@ -198,7 +204,7 @@ class Problem {
   Scene scene_;
   std::optional<GatedImage> counts_;  ///< of the target's file; reading them may set the gates' bins
   GateSet gates_;
-  Readings readings_;
+  Readings readings_, all_readings_;  ///< all: with the histograms that are left out
   double share_of_histograms_ = 1;
   std::unique_ptr<Parameters> parameters_;
   CasterUpdate caster_update_;

@@ -60,18 +60,23 @@ Readings make_readings(const Experiment& experiment, const GateSet& gates, int w
   return readings;
 }
 
-double choose_pixels(Readings& readings, int pixels, int count) {
+double choose_pixels(Readings& readings, int pixels, int count, std::uint32_t number) {
   std::vector<int> used;
   for (int p = 0; p < pixels; ++p)
     if (readings.uses_pixel(p)) used.push_back(p);
   if (std::ssize(used) <= count) return 1;
   readings.pixel.assign(pixels, 0);
-  // One of each run of neighbours, at places within these that fill the plane evenly where rows have many runs.
+  const auto fraction = [](double x) { return x - std::floor(x); };
+  // Powers of one over the plastic number, which neither each other nor the golden ratio below keep step with.
+  const double turn = number * 0.7548776662466927, shift = fraction(number * 0.5698402909980532);
+  const auto shifted = static_cast<std::size_t>(shift * static_cast<double>(used.size()));
+  // One of each run of neighbours, at places within these that fill the plane evenly where rows have many runs. Runs may differ in length
+  // by one, so that they begin elsewhere for each number.
   const auto first_of = [&](int run) { return used.size() * static_cast<std::size_t>(run) / count; };
   for (int i = 0; i < count; ++i) {
-    const double within = i * std::numbers::phi - std::floor(i * std::numbers::phi);
     const std::size_t first = first_of(i), length = first_of(i + 1) - first;
-    readings.pixel[used[first + static_cast<std::size_t>(within * static_cast<double>(length))]] = 1;
+    const double within = fraction(i * std::numbers::phi + turn) * static_cast<double>(length);
+    readings.pixel[used[(first + static_cast<std::size_t>(within) + shifted) % used.size()]] = 1;
   }
   return static_cast<double>(count) / static_cast<double>(used.size());
 }

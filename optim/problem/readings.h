@@ -1,6 +1,7 @@
 // Which readings of a target count. A reading is the value of a pixel, gate and channel.
 #pragma once
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 #include <vector>
@@ -14,6 +15,8 @@ namespace isochron {
 /// Those of some pixels under some gates. Everything that is a mean over readings is one over these.
 struct Readings {
   std::vector<char> pixel, gate;  ///< whether they count, one entry each; empty: all do
+  double drawn =
+      1;  ///< share of the pixels that these are, where others are drawn for each estimate of a mean over all
 
   bool uses_pixel(int p) const { return pixel.empty() || pixel[p]; }
   bool uses_gate(int g) const { return gate.empty() || gate[g]; }
@@ -39,7 +42,8 @@ void parallel_pixels(const GatedImage& image, const std::function<void(int)>& f)
 Readings make_readings(const Experiment& experiment, const GateSet& gates, int width, int height, int spots = 1);
 
 /// Leaves so many of the pixels that count, of `pixels` in all, spread evenly over them; all where there are no more. Returns the share left.
-double choose_pixels(Readings& readings, int pixels, int count);
+/// Others for another `number`: over many, each pixel is left equally often.
+double choose_pixels(Readings& readings, int pixels, int count, std::uint32_t number = 0);
 
 /// Throws InputError, which begins with `what`, where a reading that counts is no count: negative or not finite.
 void require_counts(const GatedImage& target, const Readings& readings, const std::string& what);

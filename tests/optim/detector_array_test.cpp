@@ -14,6 +14,7 @@
 #include "optim/problem/dark_bins.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/photon_noise.h"
+#include "optim/problem/statistics.h"
 #include "optim/run/run.h"
 #include "tests/optim/tiny_scene.h"
 
@@ -219,6 +220,58 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
     const Problem same(load_experiment(file, {std::string("target.histograms=") + count}));
     EXPECT_EQ(same.readings().count(counts), 30 * 80) << count;
   }
+}
+
+// Loss and gradient are those of all histograms on average, over as many draws of each; and the stated noise of a loss is that of the draw,
+// too. Four z-tests at 4.5 standard errors.
+TEST_F(DetectorArray, AdamDrawsOtherHistogramsInEachIteration) {
+  const std::string parameters =
+      "  - {name: gain, type: gain, initial: 5000, target: 8000}\n"
+      "  - {name: b, type: background, initial: 0.5, target: 0.3}\n";
+  write_counts(parameters, 0);
+  const std::string file = experiment("{capture: counts.h5}", parameters, "{method: adam}");
+  const Problem whole(load_experiment(file)), some(load_experiment(file, {"target.histograms=7"}));
+  EXPECT_FALSE(whole.redraws_histograms());
+  ASSERT_TRUE(some.redraws_histograms());
+  EXPECT_FALSE(Problem(load_experiment(file, {"target.histograms=7", "gradient.method=finite_difference"}))
+                   .redraws_histograms());
+  const GatedImage counts = whole.make_target(kGoOn);
+  const std::vector<double> theta = some.parameters().initial();
+  constexpr int kIterations = 200;
+  std::vector<int> drawn(30, 0);
+  ReplicateStatistics differences, noises;
+  std::vector<double> scale(4);
+  for (std::uint32_t i = 0; i < kIterations; ++i) {
+    const Evaluation one = some.evaluate(theta, counts, i, kGoOn), other = whole.evaluate(theta, counts, i, kGoOn);
+    int lit = 0;
+    for (int p = 0; p < 30; ++p) {
+      const bool used = one.image.at(p, 0) != 0;
+      lit += used;
+      drawn[p] += used;
+      for (int g = 0; g < 80; ++g) EXPECT_EQ(one.image.at(p, g), used ? other.image.at(p, g) : 0);
+    }
+    EXPECT_EQ(lit, 7);
+    std::vector<double> difference{one.loss - other.loss};
+    scale[0] += other.loss / kIterations;
+    for (const int k : {0, 1, 2}) {
+      difference.push_back(one.gradient[k] - other.gradient[k]);
+      scale[k + 1] += other.gradient[k] / kIterations;
+    }
+    differences.add(difference, 1);
+    noises.add({one.loss_noise * one.loss_noise, other.loss_noise * other.loss_noise}, 1);
+  }
+  for (const int times : drawn) EXPECT_NEAR(times, kIterations * 7 / 30.0, 10);
+  const Statistics found = differences.result();
+  for (const int k : {0, 1, 2, 3}) {
+    EXPECT_LT(std::abs(found.mean[k]), 4.5 * found.standard_error[k]) << k;
+    EXPECT_LT(found.standard_error[k], 0.08 * std::abs(scale[k])) << k;
+  }
+  // Draws are spread evenly, so that their losses scatter less than those at random.
+  const Statistics stated = noises.result();
+  const double scatter = found.standard_error[0] * std::sqrt(kIterations), draws = std::sqrt(stated.mean[0]);
+  EXPECT_GT(draws, 0.9 * scatter);
+  EXPECT_LT(draws, 2 * scatter);
+  EXPECT_GT(scatter, 10 * std::sqrt(stated.mean[1])) << "noise of the paths is no part of the test";
 }
 
 // What `render` and `derive` write, by their own sums: with a background, whose derivative is one, nothing but a pixel left out is black.

@@ -163,5 +163,29 @@ TEST_F(ReadingsOfTiny, RenderedTargetsBecomeCounts) {
   for (double value : counts.data) EXPECT_EQ(value, std::floor(value));
 }
 
+// Runs of 30 pixels for 7 have 4 or 5: equally often all the same.
+TEST(Readings, PixelsAreDrawnEquallyOftenAndSpreadEvenly) {
+  for (const auto& [pixels, count] : {std::pair{30, 7}, {4096, 1024}, {100, 99}, {10, 1}}) {
+    SCOPED_TRACE(std::to_string(count) + " of " + std::to_string(pixels));
+    std::vector<int> drawn(pixels + 2, 0);
+    constexpr std::uint32_t kNumbers = 2000;
+    for (std::uint32_t number = 0; number < kNumbers; ++number) {
+      Readings readings;
+      readings.pixel.assign(pixels + 2, 1);
+      readings.pixel[3] = readings.pixel[5] = 0;
+      EXPECT_DOUBLE_EQ(choose_pixels(readings, pixels + 2, count, number), static_cast<double>(count) / pixels);
+      EXPECT_EQ(std::accumulate(readings.pixel.begin(), readings.pixel.end(), 0), count);
+      for (int p = 0; p < pixels + 2; ++p) drawn[p] += readings.pixel[p];
+      int gap = 0, widest = 0;
+      for (const char each : readings.pixel) widest = std::max(widest, gap = each ? 0 : gap + 1);
+      EXPECT_LE(widest, 2 * (pixels + count - 1) / count + 2);
+    }
+    EXPECT_EQ(drawn[3] + drawn[5], 0);
+    drawn.erase(drawn.begin() + 5);
+    drawn.erase(drawn.begin() + 3);
+    for (const int times : drawn) EXPECT_NEAR(times * pixels / (static_cast<double>(kNumbers) * count), 1, 0.04);
+  }
+}
+
 }  // namespace
 }  // namespace isochron
