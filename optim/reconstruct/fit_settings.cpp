@@ -31,9 +31,8 @@ constexpr double kFreeSlope = 0.5;
 /// Expected change of the first level's albedos from vertex to vertex: half of what they are on average, so that both dark and bright
 /// neighbours are likely.
 constexpr double kOutlineChange = 0.5 * 0.25;
-/// Of an image in the coarse levels, and at least that many histograms (optim/README.md, Histograms). A quarter of these samples left 8 x 8
-/// spots a hole where there is none: silhouette 0.870 in place of 0.894.
-constexpr int kCoarseHistograms = 1024, kCoarseSamples = 1024 * 512;
+/// Of an image in the coarse levels, and at least that many histograms (optim/README.md, Histograms).
+constexpr int kCoarseHistograms = 512, kCoarseSamples = 512 * 512;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;

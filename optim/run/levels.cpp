@@ -65,8 +65,8 @@ double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
 }
 
-/// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Iterations count more than
-/// samples of each: half of those of the images.
+/// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Twice the samples of the
+/// gradient: of few histograms, of which each iteration has others (optim/README.md, Histograms).
 void step_by_adam(const RemeshSpec& remesh, Experiment& experiment) {
   OptimizerSpec& adam = experiment.optimizer;
   adam = {};
@@ -75,7 +75,7 @@ void step_by_adam(const RemeshSpec& remesh, Experiment& experiment) {
   adam.iterations = remesh.adam_iterations;
   adam.stop_window = 0;
   adam.decay = {.start = remesh.adam_iterations * 6 / 10, .half_life = remesh.adam_iterations / 15.0};
-  experiment.samples.primal = std::max(2, experiment.samples.primal / 2);
+  experiment.samples.interior *= 2;
 }
 
 class Levels {

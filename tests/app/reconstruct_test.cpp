@@ -87,9 +87,9 @@ TEST_F(Reconstruct, FindsAPlate) {
     const auto number = [&](const char* key) { return std::stod(text.substr(text.find(key) + std::strlen(key))); };
     return std::pair(number("slopes: "), number("bending: "));
   };
-  EXPECT_EQ(smoothing("1"), smoothing("6"));
-  EXPECT_EQ(smoothing("1").first, smoothing("7").first);
-  EXPECT_NE(smoothing("1").second, smoothing("7").second);
+  EXPECT_EQ(smoothing("1"), smoothing("7"));
+  EXPECT_EQ(smoothing("1").first, smoothing("8").first);
+  EXPECT_NE(smoothing("1").second, smoothing("8").second);
   EXPECT_EQ(run({"run", folder_.file("out/experiment.yaml"), "-o", folder_.file("again"), "--quiet", "--no-plots",
                  "--set", "optimizer.iterations=0"})
                 .status,

@@ -11,8 +11,8 @@
 namespace isochron {
 namespace {
 
-/// Adam fits coarse levels but the first, which knows no scale yet, and the last, of which evidence is taken: with its own weight of slopes and half
-/// of the image's samples. The others are the experiment's.
+/// Adam fits coarse levels but the first, which knows no scale yet, and the last, of which evidence is taken: with its own weight of slopes and twice
+/// the samples of the gradient. The others are the experiment's.
 TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
   write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
@@ -30,8 +30,8 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     EXPECT_EQ(one.optimizer.method, adam ? OptimizerMethod::adam : OptimizerMethod::quasi_newton);
     EXPECT_EQ(one.optimizer.iterations, adam ? 10 : 4);
     EXPECT_EQ(one.parameters[0].slopes, adam ? 1e-4 : 0.01);
-    EXPECT_EQ(one.samples.primal, adam ? 16 : 32);
-    EXPECT_EQ(one.samples.interior, 32);
+    EXPECT_EQ(one.samples.primal, 32);
+    EXPECT_EQ(one.samples.interior, adam ? 64 : 32);
     EXPECT_EQ(one.parameters[0].tangential, 0) << "no likelihood";
     if (adam) {
       EXPECT_EQ(one.optimizer.learning_rate, 0.02);
