@@ -270,12 +270,6 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "coarse levels are fitted by adam, with steps that shrink towards the end of each, so that borders go all of "
         "their way. The first (with `outline` two) and the last are not",
         {.unset = spec.remesh.adam_iterations == 0});
-    inner.value(
-        "skirt", field::non_negative(spec.remesh.skirt),
-        "after half of the coarse levels the surface goes on behind its borders by as much, away from the sensor, as "
-        "bodies do that turn out of sight there. Dropped after half as many levels if the data were explained as well "
-        "without; 0: not",
-        {.unit = "scene units", .unset = spec.remesh.skirt == 0});
   };
   keys.map("remesh", remesh,
            "a run in levels: the surface that a level has found gets finer triangles for the next. One parameter may "

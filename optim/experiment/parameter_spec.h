@@ -45,27 +45,20 @@ struct RemeshSpec {
   /// Of albedos by vertex: the surface ends where the first level finds less than this share of their mean (within_outline). 0: where it is.
   double outline = 0;
   double outline_slopes = 0;  ///< weight of their slopes in that level, in place of ParameterSpec::slopes
-  double skirt = 0;           ///< length of the strips behind borders, scene units, see with_skirt; 0: none
-
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
   int adam_iterations = 0;    ///< of levels that adam fits, see steps_by_adam; 0: none
   double adam_rate = 0;       ///< their OptimizerSpec::learning_rate
   double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 
   bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
-  /// Whether level `level` comes before the last coarse one, which evidence is taken from, and before the last of all.
-  bool comes_early(int level) const { return level < levels && level < std::max(coarse_levels, skirt_until() + 1); }
+  /// Whether level `level` comes before the last coarse one, which evidence is taken from.
+  bool comes_early(int level) const { return level < coarse_levels; }
   bool spares_histograms(int level) const { return coarse_histograms > 0 && comes_early(level); }
   /// The others are the experiment's optimiser's, the first with all of its smoothing among them: what is far off, as a typical albedo
   /// is, is out of reach for adam's steps, which would shrink the surface instead.
   bool steps_by_adam(int level) const {
     return adam_iterations > 0 && comes_early(level) && level > (finds_outline(1) ? 2 : 1);
   }
-  /// After which level borders get their strips: half of the coarse ones. Not the first where that has other albedos, which explain more.
-  int skirt_after() const { return std::max((coarse_levels + 1) / 2, outline > 0 ? 2 : 1); }
-  /// The last level before they are kept or dropped: half as many as came before have them, at least one, and a further one follows.
-  /// With one alone the strips of a rabbit, which explain its counts better from the second on, were dropped.
-  int skirt_until() const { return skirt > 0 ? std::min(skirt_after() + (skirt_after() + 1) / 2, levels - 1) : 0; }
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene

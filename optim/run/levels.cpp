@@ -36,7 +36,6 @@ struct Level {
   long long iterations = 0;
   double loss = 0, seconds = 0;
   std::string status;
-  std::string skirt;  ///< that it tried: kept or dropped; empty where it had none, or no level has followed
 };
 
 /// Of the first level, 1, what the experiment says, or else what the mesh has; of those after the coarse ones half of the one before.
@@ -96,9 +95,8 @@ class Levels {
         const bool ready = file_exists(folder(level) + "/experiment.yaml");
         if (!ready) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
         status_ = run(level);
-        if (status_ != RunStatus::interrupted) judge_skirt(level);
-        const bool can_go_on = status_ != RunStatus::diverged || former_of(level + 1) != level;
-        const bool more = status_ != RunStatus::interrupted && can_go_on && level < remeshed_.remesh.levels;
+        const bool ended = status_ != RunStatus::interrupted && status_ != RunStatus::diverged;
+        const bool more = ended && level < remeshed_.remesh.levels;
         on_first_rank([&] { publish(level, more); });
         if (!more) break;
       }
@@ -127,39 +125,6 @@ class Levels {
     write_exr(file("target.exr"), problem.make_target(poll()), exr_notes(experiment_.gates));
   }
 
-  bool tries_skirt(int level) const {
-    const RemeshSpec& remesh = remeshed_.remesh;
-    return level > remesh.skirt_after() && level <= remesh.skirt_until();
-  }
-
-  /// The level that a further one begins with: the one before, but for strips behind borders without which the data were explained
-  /// as well.
-  int former_of(int level) const {
-    const bool tried = tries_skirt(level - 1) && !tries_skirt(level);
-    return tried && !skirt_helps_ ? remeshed_.remesh.skirt_after() : level - 1;
-  }
-
-  /// After the last level of the trial. Collective, as it renders.
-  void judge_skirt(int level) {
-    if (tries_skirt(level) && !tries_skirt(level + 1))
-      skirt_helps_ = paired_loss(level) < paired_loss(remeshed_.remesh.skirt_after());
-  }
-
-  /// Of what a level has found, on all readings, with the same random numbers for each level: losses of levels are known to some 0.001 where
-  /// these have few histograms, and strips that a rabbit needs change them by as little. NaN where it cannot be rendered.
-  double paired_loss(int level) const {
-    Experiment experiment = load_experiment(folder(level) + "/experiment.yaml");
-    experiment.seed = experiment_.seed;
-    experiment.samples = experiment_.samples;
-    experiment.target.histograms = experiment_.target.histograms;
-    const Problem problem(experiment);
-    const std::vector<double> theta = final_values(folder(level) + "/summary.yaml", problem.parameters());
-    if (!problem.can_render(theta)) return std::nan("");
-    const SplitImage image = problem.render_halves_in_parts(theta, problem.estimator(), problem.stream(Pass::primal),
-                                                            experiment.samples.primal, "weighing the strips", poll());
-    return problem.loss(image, problem.make_target(poll()), theta).value;
-  }
-
   /// Makes the level's folder.
   void prepare(int level, double edge_length) {
     Experiment next = experiment_;
@@ -173,7 +138,7 @@ class Levels {
       set_weights(level, false, next.parameters);
     } else {
       const bool first = level == 1;
-      const std::string before = first ? "" : folder(former_of(level));
+      const std::string before = first ? "" : folder(level - 1);
       const Problem former(first ? experiment_ : load_experiment(before + "/experiment.yaml"));
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
@@ -181,8 +146,6 @@ class Levels {
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,
                                  kLeastPart * edge_length * edge_length);
-      if (tries_skirt(level) && !tries_skirt(level - 1))
-        surface = with_skirt(*surface, remeshed_.remesh.skirt, edge_length, former.scene().camera.position);
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       const bool follows = level > remeshed_.remesh.coarse_levels;
@@ -268,9 +231,6 @@ class Levels {
   /// Brings what the level has to DIR, the summary last. `more`: it may not be the last.
   void publish(int level, bool more) {
     levels_.push_back(found_level(level));
-    if (tries_skirt(level - 1) && !tries_skirt(level))
-      for (int tried = remeshed_.remesh.skirt_after(); tried < level - 1; ++tried)
-        levels_[tried].skirt = former_of(level) == level - 1 ? "kept" : "dropped";
     const std::string from = folder(level);
     if (status_ != RunStatus::interrupted) {
       if (level == 1) copy(from, {"initial.exr"}, "initial_");
@@ -319,17 +279,15 @@ class Levels {
             summary.require("iterations").integer(0, kMostIterations),
             number_or_nan(summary.require("loss_final")),
             summary.require("seconds").number(),
-            summary.require("status").text(),
-            {}};
+            summary.require("status").text()};
   }
 
   std::string levels_yaml() const {
     std::string text = "levels:\n";
     for (const Level& level : levels_)
-      text += fmt::format(
-          "  - {{edge_length: {}, vertices: {}, iterations: {}, loss: {}, seconds: {}, status: {}{}}}\n",
-          level.edge_length, level.vertices, level.iterations, std::isnan(level.loss) ? "null" : exact(level.loss),
-          level.seconds, level.status, level.skirt.empty() ? "" : ", skirt: " + level.skirt);
+      text += fmt::format("  - {{edge_length: {}, vertices: {}, iterations: {}, loss: {}, seconds: {}, status: {}}}\n",
+                          level.edge_length, level.vertices, level.iterations,
+                          std::isnan(level.loss) ? "null" : exact(level.loss), level.seconds, level.status);
     return text;
   }
 
@@ -339,9 +297,8 @@ class Levels {
                                    "vertices", "iterations", "loss", "seconds");
     int number = 0;
     for (const Level& level : levels_)
-      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}{}\n", ++number, level.edge_length,
-                          level.vertices, level.iterations, level.loss, level.seconds,
-                          level.skirt.empty() ? "" : "  skirt " + level.skirt);
+      text += fmt::format("  {:>5}  {:>11.4g}  {:>8}  {:>10}  {:>10.3g}  {:>8.3g}\n", ++number, level.edge_length,
+                          level.vertices, level.iterations, level.loss, level.seconds);
     return text;
   }
 
@@ -351,7 +308,6 @@ class Levels {
   const std::function<RunStatus(const RunOptions&)>& run_level_;
   const std::string folder_;  ///< absolute
   std::vector<Level> levels_;
-  bool skirt_helps_ = false;
   RunStatus status_ = RunStatus::iterations_reached;
   std::string report_;
 };

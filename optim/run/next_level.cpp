@@ -6,7 +6,6 @@
 
 #include "optim/remesh/outline.h"
 #include "optim/remesh/remesh.h"
-#include "optim/remesh/skirt.h"
 
 namespace isochron {
 namespace {
@@ -131,15 +130,6 @@ LevelSurface within_outline(const LevelSurface& surface, const std::vector<Param
       const std::vector<double> typical = typical_albedos(result.mesh, column(field, k));
       for (std::size_t v = 0; v < typical.size(); ++v) field.values[v * field.columns + k] = typical[v];
     }
-  return result;
-}
-
-LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_length, const Vec3& eye) {
-  const Skirted skirted = with_skirt(surface.mesh, length, edge_length, eye);
-  LevelSurface result{skirted.mesh, surface.fields};
-  for (SurfaceField& field : result.fields)
-    for (const int v : skirted.origins)
-      for (int k = 0; k < field.columns; ++k) field.values.push_back(field.values[v * field.columns + k]);
   return result;
 }
 

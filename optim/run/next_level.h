@@ -39,9 +39,6 @@ LevelSurface found_surface(const Problem& problem, const std::vector<double>& th
 LevelSurface within_outline(const LevelSurface& surface, const std::vector<ParameterSpec>& parameters, double share,
                             double least_area);
 
-/// The same with strips of that length behind its borders (with_skirt), which have the borders' values.
-LevelSurface with_skirt(const LevelSurface& surface, double length, double edge_length, const Vec3& eye);
-
 /// The same in triangles of that size. Throws InputError where it is no manifold.
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length);
 

@@ -38,18 +38,12 @@ inline double flat(double, double) {
   return 0;
 }
 
-/// Turns away towards its borders.
-inline double pillow(double x, double y) {
-  return -0.3 * std::pow(std::max(std::abs(x), std::abs(y)), 8);
-}
-
 class LevelsTest : public testing::Test {
  protected:
   LevelsTest() {
     folder_.write("flat.obj", sheet(4, flat));
     folder_.write("hill.obj", sheet(40, hill));
-    folder_.write("pillow.obj", sheet(40, pillow));
-    for (const std::string name : {"flat", "hill", "pillow"})
+    for (const std::string name : {"flat", "hill"})
       folder_.write(name + ".yaml",
                     "camera: {position: [0, 0, 3], look_at: [0, 0, 0], up: [0, 1, 0], fov: 40, resolution: [16, 16]}\n"
                     "materials: {paint: {type: diffuse, albedo: 0.5}}\n"

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <set>
-#include <sstream>
 #include <string>
 
 #include "core/base/constants.h"
@@ -138,51 +137,6 @@ TEST_F(LevelsTest, VerticesAtOnePlaceAreOne) {
   }
 }
 
-/// After one of two coarse levels the second begins with strips behind the borders; after three of five the fourth, and the fifth keeps them.
-/// The last goes on with them or from the level before. Nothing moves but by remeshing, which rounds the bend at a border: that makes a
-/// flat sheet more like a pillow, and less like itself.
-TEST_F(LevelsTest, SkirtsStayIfTheDataAreExplainedBetter) {
-  struct Case {
-    std::string target;
-    int coarse, before, tried;
-  };
-  for (const auto& [target, coarse, before, tried] :
-       {Case{"pillow", 2, 1, 1}, Case{"flat", 2, 1, 1}, Case{"pillow", 5, 3, 2}, Case{"flat", 5, 3, 2}}) {
-    SCOPED_TRACE(target + " " + std::to_string(coarse));
-    const Problem problem(load_experiment(this->experiment(target, "target: 0", "{samples: 256}")));
-    write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
-    const int last = coarse + 1;
-    Experiment experiment = load_experiment(this->experiment("flat",
-                                                             "remesh: {levels: " + std::to_string(last) +
-                                                                 ", coarse_levels: " + std::to_string(coarse) +
-                                                                 ", edge_length: 0.4, skirt: 0.6}",
-                                                             "{images: target.exr}"));
-    experiment.optimizer.iterations = 0;
-    EXPECT_EQ(start_run(experiment, options()), RunStatus::iterations_reached);
-    const auto depth = [&](int level) {
-      double least = 0;
-      for (const Vec3& p : found("out/levels/" + std::to_string(level)).positions) least = std::min(least, p.z);
-      return -least;
-    };
-    const double corner = 0.6 * 3 / std::sqrt(9 + 2);  // where the way from the camera is the least steep
-    EXPECT_EQ(depth(before), 0);
-    EXPECT_GE(depth(before + 1), corner - 1e-6);
-    EXPECT_LT(depth(before + 1), 0.6);
-    EXPECT_GT(depth(before + tried), 0);
-    EXPECT_EQ(depth(last) > 0, target == "pillow");
-    std::istringstream summary(folder_.read("out/summary.yaml"));
-    int level = 0;
-    for (std::string line; std::getline(summary, line);) {
-      if (!line.starts_with("  - {edge_length")) continue;
-      ++level;
-      const std::string said = target == "pillow" ? ", skirt: kept}" : ", skirt: dropped}";
-      EXPECT_EQ(line.ends_with(said), level > before && level <= before + tried) << line;
-      EXPECT_EQ(line.find("skirt") != std::string::npos, line.ends_with(said)) << line;
-    }
-    EXPECT_EQ(level, last);
-  }
-}
-
 /// A sheet of twice the size: its first level becomes dark where the target has none, and the second has the size of the target.
 TEST_F(LevelsTest, TheOutlineIsWhereAlbedosBecomeDark) {
   folder_.write("small.obj", "v -0.5 -1 0\nv 0.5 -1 0\nv 0.5 1 0\nv -0.5 1 0\nf 1 2 3\nf 1 3 4\n");
@@ -227,7 +181,6 @@ TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   says(of("remesh: {edge_length: 0.1}"), "levels");
   says(of("remesh: {levels: 3, coarse_levels: 0}"), "remesh.coarse_levels");
   says(of("remesh: {levels: 2, size: 3}"), "remesh.size");
-  says(of("remesh: {levels: 2, skirt: -1}"), "remesh.skirt");
   says(of("remesh: {levels: 2, outline: {slopes: 1}}"), "remesh.outline.albedo");
   says(of("remesh: {levels: 2, outline: {albedo: 1.5}}"), "remesh.outline.albedo");
   says(of("remesh: {levels: 2, outline: {albedo: 0.5}}"), "outline: 'hill' has no albedos by vertex");

@@ -11,7 +11,6 @@
 #include "core/base/constants.h"
 #include "core/base/error.h"
 #include "core/geometry/mesh_intersections.h"
-#include "optim/remesh/skirt.h"
 #include "tests/seed.h"
 
 namespace isochron {
@@ -257,28 +256,6 @@ TEST(Remesh, NoTwoVerticesComeToOnePlace) {
         least = std::min(least, length(result.mesh.positions[i] - result.mesh.positions[k]));
     EXPECT_GT(least, 1e-8);  // a 2^-20th of an edge is 1e-7
   }
-}
-
-/// Of a sheet's border, and only there; away from a point in front of it.
-TEST(Skirt, GoesOnBehindTheBorder) {
-  const Mesh old = grid(6, 4, false, [](double u, double v) { return Vec3{u, v, 1 + 0.1 * u * v}; });
-  const Vec3 eye{0.5, 0.5, -1};
-  const Skirted result = with_skirt(old, 0.5, 0.2, eye);
-  const std::size_t vertices = old.positions.size(), border = 2 * (6 + 4), rows = 3;  // 2.5, rounded
-  ASSERT_EQ(result.origins.size(), rows * border);
-  ASSERT_EQ(result.mesh.positions.size(), vertices + rows * border);
-  EXPECT_EQ(result.mesh.faces.size(), old.faces.size() + 2 * rows * border);
-  EXPECT_TRUE(std::equal(old.positions.begin(), old.positions.end(), result.mesh.positions.begin(),
-                         [](const Vec3& a, const Vec3& b) { return length(a - b) == 0; }));
-  for (std::size_t i = 0; i < result.origins.size(); ++i) {
-    const Vec3 from = old.positions[result.origins[i]], step = result.mesh.positions[vertices + i] - from;
-    EXPECT_NEAR(length(step), 0.5 * static_cast<double>(i % rows + 1) / rows, 1e-12);
-    EXPECT_NEAR(dot(step, normalize(from - eye)), length(step), 1e-12);
-  }
-  EXPECT_NO_THROW(require_remeshable(result.mesh, 0.2));
-  EXPECT_EQ(euler_characteristic(result.mesh), 1);
-  const Mesh closed = torus(12, 8);
-  EXPECT_TRUE(with_skirt(closed, 0.5, 0.2, eye).origins.empty());
 }
 
 std::string refusal(const Mesh& mesh, double edge_length) {

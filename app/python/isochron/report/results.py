@@ -276,8 +276,6 @@ def levels(run):
     if not run.levels:
         return ""
     keys = ("edge_length", "vertices", "iterations", "loss", "seconds", "status")
-    if any("skirt" in level for level in run.levels):
-        keys += ("skirt",)
 
     def shown(value):
         return number(value) if isinstance(value, float) else "–" if value is None else str(value).replace("_", " ")
