@@ -13,12 +13,12 @@
 namespace isochron {
 namespace {
 
-/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in eight levels, has 512 for 300 s. It takes some 220 s.
-constexpr double kLevelSamplesPerSecond = 56000;
+/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in nine levels, has 512 for 300 s. It takes some 200 s.
+constexpr double kLevelSamplesPerSecond = 63000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// The first finds the outline and the second the albedo; four of adam move borders; the last has all histograms. Silhouettes of the rabbit
-/// after each: 0.81, 0.84, 0.90, 0.91, 0.92, 0.93, 0.93 (optim/README.md, Borders).
-constexpr int kCoarseLevels = 7;
+/// The first finds the outline and the second the albedo; five of adam move borders; the last has all histograms. Silhouettes of a rabbit
+/// after each: 0.81, 0.82, 0.87, 0.89, 0.91, 0.91, 0.91, 0.91 (optim/README.md, Borders).
+constexpr int kCoarseLevels = 8;
 /// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
@@ -32,7 +32,7 @@ constexpr double kFreeSlope = 0.5;
 /// neighbours are likely.
 constexpr double kOutlineChange = 0.5 * 0.25;
 /// Of an image in the coarse levels, and at least that many histograms (optim/README.md, Histograms).
-constexpr int kCoarseHistograms = 512, kCoarseSamples = 512 * 512;
+constexpr int kCoarseHistograms = 1024, kCoarseSamples = 1024 * 512;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;

@@ -64,8 +64,8 @@ double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
 }
 
-/// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Twice the samples of the
-/// gradient: of few histograms, of which each iteration has others (optim/README.md, Histograms).
+/// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Half of the histograms, of
+/// which each iteration has others, with twice the samples of the gradient (optim/README.md, Histograms).
 void step_by_adam(const RemeshSpec& remesh, Experiment& experiment) {
   OptimizerSpec& adam = experiment.optimizer;
   adam = {};
@@ -75,6 +75,7 @@ void step_by_adam(const RemeshSpec& remesh, Experiment& experiment) {
   adam.stop_window = 0;
   adam.decay = {.start = remesh.adam_iterations * 6 / 10, .half_life = remesh.adam_iterations / 15.0};
   experiment.samples.interior *= 2;
+  experiment.target.histograms = (experiment.target.histograms + 1) / 2;
 }
 
 class Levels {

@@ -87,9 +87,17 @@ TEST_F(Reconstruct, FindsAPlate) {
     const auto number = [&](const char* key) { return std::stod(text.substr(text.find(key) + std::strlen(key))); };
     return std::pair(number("slopes: "), number("bending: "));
   };
-  EXPECT_EQ(smoothing("1"), smoothing("7"));
-  EXPECT_EQ(smoothing("1").first, smoothing("8").first);
-  EXPECT_NE(smoothing("1").second, smoothing("8").second);
+  EXPECT_EQ(smoothing("1"), smoothing("8"));
+  EXPECT_EQ(smoothing("1").first, smoothing("9").first);
+  EXPECT_NE(smoothing("1").second, smoothing("9").second);
+  const auto histograms = [&](const char* level) {
+    const std::string text = folder_.read(std::string("out/levels/") + level + "/experiment.yaml");
+    const std::size_t at = text.find("\n  histograms: ");
+    return at == std::string::npos ? 0 : std::stoi(text.substr(at + 15));
+  };
+  EXPECT_GT(histograms("2"), 0);
+  EXPECT_EQ(2 * histograms("3"), histograms("2")) << "by adam";
+  EXPECT_EQ(histograms("8"), 0);
   EXPECT_EQ(run({"run", folder_.file("out/experiment.yaml"), "-o", folder_.file("again"), "--quiet", "--no-plots",
                  "--set", "optimizer.iterations=0"})
                 .status,

@@ -32,6 +32,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     EXPECT_EQ(one.parameters[0].slopes, adam ? 1e-4 : 0.01);
     EXPECT_EQ(one.samples.primal, 32);
     EXPECT_EQ(one.samples.interior, adam ? 64 : 32);
+    EXPECT_EQ(one.target.histograms, 0) << "a camera";
     EXPECT_EQ(one.parameters[0].tangential, 0) << "no likelihood";
     if (adam) {
       EXPECT_EQ(one.optimizer.learning_rate, 0.02);

@@ -57,14 +57,14 @@ TEST(FitSettings, TheWorkOfALevelFallsWithTheirNumber) {
   EXPECT_NEAR(large.samples * large.levels, small.samples * small.levels, 2 * large.levels);
 }
 
-/// 512 of 4096 with 512 samples each; more where each has fewer, so that an image of them has as many.
+/// 1024 of 4096 with 512 samples each; more where each has fewer, so that an image of them has as many.
 TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   const FitSettings usual = settings_for(0.04, 0.0137);
   EXPECT_GT(usual.samples, 500);
-  EXPECT_EQ(usual.coarse_histograms, 512);
+  EXPECT_EQ(usual.coarse_histograms, 1024);
   const FitSettings many = fit_settings({{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}}, {{0, 1, 2}}}, 0.0137, 1 << 16, 300);
   EXPECT_LT(many.samples, 64);
-  EXPECT_NEAR(many.coarse_histograms * many.samples, 512 * 512, 64);
+  EXPECT_NEAR(many.coarse_histograms * many.samples, 1024 * 512, 64);
 }
 
 }  // namespace
