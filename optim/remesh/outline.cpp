@@ -129,6 +129,12 @@ std::vector<double> typical_albedos(const Mesh& mesh, const std::vector<double>&
   return typical;
 }
 
+Remeshed without_small_parts(const Mesh& mesh, double least_area) {
+  std::vector<double> above(mesh.positions.size(), 1.0);
+  drop_small(mesh, areas_of(mesh), least_area, true, above);
+  return Cut(mesh, above).left();
+}
+
 Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area) {
   const std::vector<double> area = areas_of(mesh), typical = typical_albedos(mesh, albedo);
   std::vector<double> above(albedo.size());

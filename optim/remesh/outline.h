@@ -18,4 +18,7 @@ std::vector<double> typical_albedos(const Mesh& mesh, const std::vector<double>&
 /// vertex. The result is one, too; it has no face where all parts are that small.
 Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area);
 
+/// The connected parts of a mesh whose area is at least that; without a face where none is.
+Remeshed without_small_parts(const Mesh& mesh, double least_area);
+
 }  // namespace isochron

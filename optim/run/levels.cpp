@@ -59,6 +59,10 @@ void write_surface(const std::string& file, const Mesh& mesh) {
 /// Of a part or a hole that the outline makes, in squares of the edges: three vertices have more, one or two mean nothing.
 constexpr double kLeastPart = 2;
 
+/// A regular triangle's, likewise: parts that a fit has shrunk below it would become ever smaller, and what is relative to their vertices'
+/// distance ever stiffer.
+constexpr double kTriangle = 0.43;
+
 /// A number, or null where it is none.
 double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
@@ -144,6 +148,7 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
+      if (!first) surface = without_small_parts(*surface, kTriangle * edge_length * edge_length);
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,
                                  kLeastPart * edge_length * edge_length);

@@ -133,6 +133,12 @@ LevelSurface within_outline(const LevelSurface& surface, const std::vector<Param
   return result;
 }
 
+LevelSurface without_small_parts(const LevelSurface& surface, double least_area) {
+  const Remeshed left = without_small_parts(surface.mesh, least_area);
+  const bool any_dropped = left.mesh.positions.size() < surface.mesh.positions.size();
+  return left.mesh.faces.empty() || !any_dropped ? surface : carried_over(surface, left);
+}
+
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {
   const LevelSurface old = cleaned(surface);
   return carried_over(old, remesh(old.mesh, edge_length));

@@ -169,6 +169,25 @@ TEST_F(LevelsTest, TheOutlineIsWhereAlbedosBecomeDark) {
   EXPECT_NEAR(even[0], 0.5, 0.05);
 }
 
+/// A triangle of a thousandth of the edges beside the sheet: of the first level as it was loaded, and of no other.
+TEST_F(LevelsTest, PartsThatShrankToNothingAreLeftOut) {
+  folder_.write("flat.obj", sheet(4, flat) + "v 2 0 0\nv 2.001 0 0\nv 2 0.001 0\nf 26 27 28\n");
+  const std::string albedo = "  - {name: paint, type: albedo, per: vertex, shape: hill, initial: 0.4, target: 0.5}\n";
+  Experiment two =
+      load_experiment(experiment("flat", "remesh: {levels: 2, coarse_levels: 2}, target: 0", "{samples: 4}", albedo));
+  two.optimizer.iterations = 0;
+  start_run(two, options());
+  const auto widest = [&](const std::string& level) {
+    double x = 0;
+    for (const Vec3& p : found("out/levels/" + level).positions) x = std::max(x, p.x);
+    return x;
+  };
+  EXPECT_GT(widest("1"), 2);
+  EXPECT_NEAR(widest("2"), 1, 1e-12);
+  EXPECT_EQ(load_experiment(folder_.file("out/levels/2/experiment.yaml")).parameters[1].initial.size(),
+            found("out/levels/2").positions.size());
+}
+
 TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   const auto of = [&](const std::string& remesh, const std::string& more = "") {
     return refusal(experiment("flat", remesh + ", target: 0", "{samples: 4}", more));

@@ -96,5 +96,17 @@ TEST(Outline, NothingIsLeftOfSpecksAlone) {
   EXPECT_TRUE(within_outline(mesh, even, 0.5, 2).mesh.faces.empty());
 }
 
+TEST(Outline, SmallPartsGo) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 4);
+  add_square(mesh, {5, 0, 0}, 2);
+  for (int v = 25; v < std::ssize(mesh.positions); ++v) mesh.positions[v] = mesh.positions[v] * 0.1;
+  EXPECT_NEAR(area_left(without_small_parts(mesh, 0.0099)), 1.01, 1e-12);
+  const Remeshed left = without_small_parts(mesh, 0.0101);
+  EXPECT_NEAR(area_left(left), 1, 1e-12);
+  EXPECT_EQ(left.mesh.positions.size(), 25u);
+  EXPECT_TRUE(without_small_parts(mesh, 1.01).mesh.faces.empty());
+}
+
 }  // namespace
 }  // namespace isochron
