@@ -90,8 +90,7 @@ void describe(Keys& keys, TargetSpec& target, const ExperimentFolder& folder) {
              {.unset = target.mask.empty(), .otherwise = "all are"});
   keys.value("histograms", field::integer(target.histograms, 0, std::numeric_limits<int>::max()),
              "of a capture: so many are used, spread evenly over it, and others are not rendered, which saves time; "
-             "adam takes others "
-             "in each iteration; 0: all are",
+             "adam takes others in each iteration; 0: all are",
              {.unset = target.histograms == 0});
 }
 

@@ -268,7 +268,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.map(
         "adam", adam,
         "coarse levels are fitted by adam, with steps that shrink towards the end of each, so that borders go all of "
-        "their way. The first (with `outline` two) and the last are not",
+        "their way, and with twice `samples.interior`. The first (with `outline` two) and the last are not",
         {.unset = spec.remesh.adam_iterations == 0});
   };
   keys.map("remesh", remesh,

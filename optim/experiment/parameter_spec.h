@@ -1,6 +1,5 @@
 // Parameters: what an experiment says of each, and the names of their types.
 #pragma once
-#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>

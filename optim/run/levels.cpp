@@ -59,8 +59,8 @@ void write_surface(const std::string& file, const Mesh& mesh) {
 /// Of a part or a hole that the outline makes, in squares of the edges: three vertices have more, one or two mean nothing.
 constexpr double kLeastPart = 2;
 
-/// A regular triangle's, likewise: parts that a fit has shrunk below it would become ever smaller, and what is relative to their vertices'
-/// distance ever stiffer.
+/// Area of a regular triangle, in squares of its edges. Parts that a fit has shrunk below it are left out: they would shrink with every level,
+/// and penalties relative to the distance of their vertices would grow without bound.
 constexpr double kTriangle = 0.43;
 
 /// A number, or null where it is none.
@@ -217,7 +217,7 @@ class Levels {
     options.folder = folder(level);
     options.errors = level == remeshed_.remesh.levels;
     options.report = [this](const std::string& text) { report_ = text; };
-    // Its losses scatter by design, and what comes of it is told by the levels that follow.
+    // Losses of a level by adam scatter by design. The levels that follow show what came of it.
     if (remeshed_.remesh.steps_by_adam(level)) options.warning = {};
     options.progress = [this, level](Progress progress) {
       progress.level = level;

@@ -133,6 +133,15 @@ class DetectorArray : public ::testing::Test {
     ASSERT_TRUE(write_histograms(folder_.file("counts.h5"), problem.experiment(), problem.scene(), counts));
   }
 
+  /// The file of an experiment that fits gain and background to counts.
+  std::string fit_of_gain_and_background(const std::string& method) const {
+    const std::string parameters =
+        "  - {name: gain, type: gain, initial: 5000, target: 8000}\n"
+        "  - {name: b, type: background, initial: 0.5, target: 0.3}\n";
+    write_counts(parameters, 0);
+    return experiment("{capture: counts.h5}", parameters, "{method: " + method + "}");
+  }
+
   /// Final values of a fit to them, in the order of theta.
   std::vector<double> fit(const std::string& parameters, const std::string& optimizer) const {
     const Experiment e = load_experiment(experiment("{capture: counts.h5}", parameters, optimizer));
@@ -175,11 +184,7 @@ TEST_F(DetectorArray, BinsOfTheFileEndWithTheWindow) {
 // Those chosen have the bits of all, and others no samples: the loss is that of the chosen ones, the gradient its slope, and the work falls
 // with their number. Common random numbers: images of the same paths, shifted.
 TEST_F(DetectorArray, SomeHistogramsAreUsed) {
-  const std::string parameters =
-      "  - {name: gain, type: gain, initial: 5000, target: 8000}\n"
-      "  - {name: b, type: background, initial: 0.5, target: 0.3}\n";
-  write_counts(parameters, 0);
-  const std::string file = experiment("{capture: counts.h5}", parameters, "{method: quasi_newton}");
+  const std::string file = fit_of_gain_and_background("quasi_newton");
   const Problem whole(load_experiment(file)), some(load_experiment(file, {"target.histograms=7"}));
   const Problem precise(load_experiment(
       file, {"target.histograms=7", "samples.primal=16384", "samples.interior=16384", "samples.path_length=16384"}));
@@ -223,13 +228,9 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
 }
 
 // Loss and gradient are those of all histograms on average, over as many draws of each; and the stated noise of a loss is that of the draw,
-// too. Four z-tests at 4.5 standard errors.
+// too. Four z-tests at 4.5 standard errors of 200 differences (false alarms: 7e-6 each).
 TEST_F(DetectorArray, AdamDrawsOtherHistogramsInEachIteration) {
-  const std::string parameters =
-      "  - {name: gain, type: gain, initial: 5000, target: 8000}\n"
-      "  - {name: b, type: background, initial: 0.5, target: 0.3}\n";
-  write_counts(parameters, 0);
-  const std::string file = experiment("{capture: counts.h5}", parameters, "{method: adam}");
+  const std::string file = fit_of_gain_and_background("adam");
   const Problem whole(load_experiment(file)), some(load_experiment(file, {"target.histograms=7"}));
   EXPECT_FALSE(whole.redraws_histograms());
   ASSERT_TRUE(some.redraws_histograms());
