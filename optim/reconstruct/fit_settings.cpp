@@ -31,8 +31,9 @@ constexpr double kFreeSlope = 0.5;
 /// Expected change of the first level's albedos from vertex to vertex: half of what they are on average, so that both dark and bright
 /// neighbours are likely.
 constexpr double kOutlineChange = 0.5 * 0.25;
-/// Of an image in the coarse levels, and at least that many histograms (optim/README.md, Histograms).
-constexpr int kCoarseHistograms = 1024, kCoarseSamples = 1024 * 512;
+/// Of an image in the coarse levels, per second of the whole: of the rabbit 1024 histograms with 512 each (optim/README.md, Histograms).
+constexpr double kCoarseSamplesPerSecond = 1024 * 512 / 300.0;
+constexpr int kLeastCoarseHistograms = 256;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;
@@ -113,7 +114,8 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
     ++settings.levels;
   const double each = kLevelSamplesPerSecond * seconds / (settings.levels * histograms);
   settings.samples = static_cast<int>(std::clamp(each, 1.0 * kLeastSamples, 1.0 * kMostSamples)) / 2 * 2;
-  settings.coarse_histograms = std::max(kCoarseHistograms, kCoarseSamples / settings.samples);
+  settings.coarse_histograms =
+      std::max(kLeastCoarseHistograms, static_cast<int>(kCoarseSamplesPerSecond * seconds / settings.samples));
   return settings;
 }
 

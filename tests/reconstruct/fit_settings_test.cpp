@@ -18,10 +18,10 @@ BackProjection wall_projected(const CaptureGeometry& wall) {
 }
 
 /// For a square of that area.
-FitSettings settings_for(double area, double resolution) {
+FitSettings settings_for(double area, double resolution, int histograms = 4096, double seconds = 300) {
   const double side = std::sqrt(area);
   return fit_settings({{{0, 0, 0}, {side, 0, 0}, {side, side, 0}, {0, side, 0}}, {{0, 1, 2}, {0, 2, 3}}}, resolution,
-                      4096, 300);
+                      histograms, seconds);
 }
 
 TEST(FitSettings, NeitherTheLayoutNorThePointsLimitTheResolution) {
@@ -57,7 +57,7 @@ TEST(FitSettings, TheWorkOfALevelFallsWithTheirNumber) {
   EXPECT_NEAR(large.samples * large.levels, small.samples * small.levels, 2 * large.levels);
 }
 
-/// 1024 of 4096 with 512 samples each; more where each has fewer, so that an image of them has as many.
+/// 1024 of 4096 with 512 samples each; more where each has fewer, so that an image of them has as many for the same time.
 TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   const FitSettings usual = settings_for(0.04, 0.0137);
   EXPECT_GT(usual.samples, 500);
@@ -65,6 +65,10 @@ TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   const FitSettings many = fit_settings({{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}}, {{0, 1, 2}}}, 0.0137, 1 << 16, 300);
   EXPECT_LT(many.samples, 64);
   EXPECT_NEAR(many.coarse_histograms * many.samples, 1024 * 512, 64);
+  const FitSettings quick = settings_for(0.04, 0.0137, 4096, 60), small = settings_for(0.04, 0.0137, 576, 60);
+  EXPECT_NEAR(quick.coarse_histograms, 1024, 20) << "a fifth of the work by a fifth of the samples";
+  EXPECT_GT(small.samples, 500);
+  EXPECT_EQ(small.coarse_histograms, 256) << "few have enough samples";
 }
 
 }  // namespace
