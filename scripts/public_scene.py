@@ -28,8 +28,8 @@ from reproduction.measure import Failure, program
 from reproduction.tables import Usage as WrongUsage
 from reproduction.tables import markdown, read_rows, run_action, write_rows
 
-SAMPLES = {"image": (16, 512), "derivative": (16, 64)}  # per pixel, for all frames together; the last make the reference
-SEEDS = 4  # images that noise is estimated from
+SAMPLES = {"image": (16, 256), "derivative": (16, 64)}  # per pixel, for all frames together; the last make the reference
+SEEDS = 3  # images that noise is estimated from
 LIT = 0.9  # of the light, or of the magnitudes of the derivative: what the frames hold that errors are taken in
 METRES_PER_NS = 0.299792458
 WINDOWS, CELLS = 6, 128  # of time, and of an image's width, in the picture
