@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Derivatives of the shipped experiments against finite differences: runs `isochron check` on small images.
+"""Derivatives of the experiments after the paper against finite differences: runs `isochron check` on small images.
 
 usage: check_experiments.py CSV [FACTOR]
 

@@ -142,7 +142,7 @@ def largest(values):
 def main():
     samples = int(sys.argv[1]) if len(sys.argv) > 1 else 400_000
     generator = np.random.default_rng(3)
-    print("| width of the gate | derivative | interior, kept length | ends of arcs | coupled pairs | their largest thousandth has |\n"
+    print("| width of the gate | derivative | interior, kept length | ends of arcs | coupled pairs | largest 0.1 % |\n"
           "|---|---|---|---|---|---|")
     for width in WIDTHS:
         u, v = PIXEL[0] + PIXEL[2] * generator.random(samples), PIXEL[1] + PIXEL[2] * generator.random(samples)
