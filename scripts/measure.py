@@ -34,10 +34,11 @@ def parse(arguments):
     return options
 
 
-def chosen(options, version):
+def chosen(options):
     if options.all:
         measured = record.load()
-        return [name for name in options.known if name not in measured or measured[name].version != version]
+        return [name for name, step in options.known.items()
+                if name not in measured or measured[name].version != record.version(step.programs)]
     return [name for name in options.known if any(fnmatch.fnmatch(name, pattern) for pattern in options.steps)]
 
 
@@ -62,11 +63,11 @@ def main(arguments):
             print(f"{name:34}", f"{entry.version:10} {entry.date} {entry.minutes:>6} min" if entry else "not measured")
         return 0
     failures = 0
-    for name in [] if options.page else chosen(options, record.version()):
+    for name in [] if options.page else chosen(options):
         print(f"== {name}", flush=True)
         start = time.monotonic()
         if measure(options.known[name]):
-            record.keep(name, time.monotonic() - start)
+            record.keep(name, options.known[name].programs, time.monotonic() - start)
             page.write()
         else:
             failures += 1

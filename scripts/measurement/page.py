@@ -1,6 +1,7 @@
 """experiments/MEASURED.md: the text of MEASURED.md.in beside this file, with a table in the place of every {{NAME}} (tables.py), and the
 versions of all steps."""
 
+import dataclasses
 import os
 import pathlib
 
@@ -8,7 +9,7 @@ from reproduction import results
 from reproduction.measure import ROOT
 
 from . import record
-from .steps import STEPS
+from .steps import STEPS, egg, hidden_s
 from .tables import TABLES
 
 TEMPLATE = pathlib.Path(__file__).with_name("MEASURED.md.in")
@@ -22,9 +23,15 @@ def _of_one_version(entries):
 
 
 def versions(records):
-    """One sentence where all steps are of one version and machine, else one of each."""
+    """One sentence where all steps are of one version and machine, else one of each. What has not changed since it was measured is of the
+    present version."""
+    steps = STEPS | egg(".") | hidden_s()
+    newest = record.version(tuple(program for step in steps.values() for program in step.programs))
     groups = {}
     for entry in records.values():
+        step = steps.get(entry.step)
+        if step and entry.version == record.version(step.programs):
+            entry = dataclasses.replace(entry, version=newest)
         groups.setdefault((entry.version, entry.processor), []).append(entry)
     missing = [name for name in STEPS if name not in records]
     if len(groups) == 1 and not missing:

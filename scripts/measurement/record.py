@@ -26,9 +26,11 @@ def _git(*arguments):
     return subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, check=True).stdout.strip()
 
 
-def version():
-    changed = _git("status", "--porcelain", "--", *SOURCES)
-    return _git("log", "-1", "--format=%h", "--", *SOURCES) + ("+" if changed else "")
+def version(programs=()):
+    """Of a step that runs these programs."""
+    sources = (*SOURCES, *programs)
+    changed = _git("status", "--porcelain", "--", *sources)
+    return _git("log", "-1", "--format=%h", "--", *sources) + ("+" if changed else "")
 
 
 def processor():
@@ -42,8 +44,8 @@ def load():
     return {row["step"]: Record(**row) for row in read_rows(FILE)} if FILE.exists() else {}
 
 
-def keep(step, seconds):
+def keep(step, programs, seconds):
     records = load()
     today = datetime.date.today().isoformat()
-    records[step] = Record(step, version(), today, f"{seconds / 60:.1f}", processor())
+    records[step] = Record(step, version(programs), today, f"{seconds / 60:.1f}", processor())
     write_rows(FILE, [f.name for f in fields(Record)], [astuple(record) for record in records.values()])

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from reproduction.catalogue import RECONSTRUCTIONS
 
-# What the numbers depend on: the version of a measurement is that of the last commit that changed any of these. No step remeshes.
-SOURCES = ("CMakeLists.txt", "app/*.cpp", "app/*.h", "core", "optim", "scenes", "experiments/*.yaml", "tests/benchmark",
+# What the numbers of every step depend on, beside its own programs: the version of a measurement is that of the last commit that
+# changed any of these. No step remeshes.
+SOURCES = ("CMakeLists.txt", "app/*.cpp", "app/*.h", "core", "optim", "scenes", "experiments/*.yaml", "tests/benchmark/*.h",
            "tests/data/cornell", ":!*.md", ":!optim/remesh", ":!optim/reconstruct", ":!experiments/rabbit.yaml")
 CHARTED = ("cube", "branches", "corridor", "tree", "height_field", "bunny", "sofa")
 CHART_SECONDS = {"cube": 240, "bunny": 120}  # where the gradient has to stand out of much noise; 60 for the others
@@ -20,6 +21,13 @@ class Step:
     commands: tuple  # words each; from the top of the repository
     environment: tuple = ()  # pairs
     removed: tuple = ()  # files that would keep older rows
+
+    @property
+    def programs(self):
+        """Sources of the programs that this step alone runs."""
+        names = [words[0].removeprefix("build/isochron_") for words in self.commands if words[0].startswith("build/isochron_")]
+        names += [f"figure{words[1]}" for words in self.commands if words[0] == "scripts/figure"]
+        return tuple(f"tests/benchmark/measure/{name}.cpp" for name in names)
 
 
 def _built(name, *arguments):

@@ -78,6 +78,15 @@ class Steps(unittest.TestCase):
                     self.assertTrue(os.access(ROOT / command, os.X_OK), command)
 
 
+    def test_know_their_programs(self):
+        self.assertEqual(steps.STEPS["gate_width"].programs, ("tests/benchmark/measure/gate_width.cpp",) * 2)
+        self.assertEqual(steps.STEPS["figure9"].programs, ("tests/benchmark/measure/figure9.cpp",))
+        self.assertEqual(steps.STEPS["charts/cube"].programs, ())
+        for name, step in steps.STEPS.items():
+            for program in step.programs:
+                self.assertTrue((ROOT / program).exists() or name == "figure1", program)
+
+
 class Resume(unittest.TestCase):
     def run_all(self, arguments, fail=()):
         """What was measured, in a copy that keeps its own records."""
@@ -97,7 +106,7 @@ class Resume(unittest.TestCase):
     def test_only_what_is_not_of_this_version(self):
         with tempfile.TemporaryDirectory() as folder, \
              unittest.mock.patch.object(record, "FILE", pathlib.Path(folder) / "versions.csv"), \
-             unittest.mock.patch.object(record, "version", lambda: "one"):
+             unittest.mock.patch.object(record, "version", lambda programs: "one"):
             self.old = pathlib.Path(folder) / "older_rows.csv"
             self.old.touch()
             self.assertEqual(self.run_all(["--all"], fail=["a/2"]), (["a/1", "a/2", "b"], 1))
@@ -107,7 +116,7 @@ class Resume(unittest.TestCase):
             self.assertEqual(self.run_all(["a/*"]), (["a/1", "a/2"], 0), "named steps are measured again")
             with open(record.FILE, encoding="ascii", newline="") as file:
                 self.assertEqual([row["version"] for row in csv.DictReader(file)], ["one"] * 3)
-            with unittest.mock.patch.object(record, "version", lambda: "two"):
+            with unittest.mock.patch.object(record, "version", lambda programs: "two"):
                 self.assertEqual(self.run_all(["--all"]), (["a/1", "a/2", "b"], 0))
 
     def test_a_step_that_does_not_exist_is_refused(self):
