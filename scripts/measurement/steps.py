@@ -77,7 +77,7 @@ STEPS = {
 
 def hidden_s():
     """The fit of public data, which are not part of this repository either."""
-    return {"hidden_s": Step((_script("fit_probabilities.py", "measure", "experiments/hidden_s.yaml", _csv("fit_probabilities"), "4"),))}
+    return {"hidden_s": Step((_script("fit_probabilities.py", "measure", "experiments/hidden_s.yaml", _csv("fit_probabilities"), "3"),))}
 
 
 def egg(folder):

@@ -167,7 +167,7 @@ def boundary(folder):
 
 
 def contact(folder):
-    rows = [r for r in read_rows(folder / "contact.csv") if (r["kind"], r["sampling"]) == ("cost", "standard")]
+    rows = [r for r in read_rows(folder / "contact.csv") if r["kind"] == "cost"]
     columns = list(dict.fromkeys((r["samples"], r["follow"]) for r in rows))
     lines = []
     for case in dict.fromkeys((r["case"], r["gate"]) for r in rows):

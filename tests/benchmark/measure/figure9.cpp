@@ -35,6 +35,7 @@ void measure(const char* folder, std::FILE* csv, double budget) {
   const Scene scene = problem.parameters().apply(theta);
   const TangentBasis basis = problem.parameters().tangent(theta);
   EstimatorOptions options = problem.experiment().estimator;
+  options.keep_length = false;  // as in the paper: else the interior term would be all
   std::vector<std::string> names = {"image"};
   std::vector<GatedImage> images = {
       Renderer(scene, problem.gates(), options).render(problem.stream(Pass::primal), {0, 256})};
