@@ -12,7 +12,7 @@ import sys
 import time
 
 from measurement import page, record
-from measurement.steps import STEPS, egg, hidden_s
+from measurement.steps import STEPS, egg
 from reproduction.measure import ROOT
 
 
@@ -21,11 +21,10 @@ def parse(arguments):
     parser.add_argument("steps", nargs="*", metavar="STEP", help="names or patterns, measured again whatever their version")
     parser.add_argument("--all", action="store_true", help="every step that is not of the present version")
     parser.add_argument("--egg", metavar="FOLDER", help="where the public egg scene is; without it its step is left out")
-    parser.add_argument("--hidden-s", action="store_true", help="the public capture is imported; without it its step is left out")
     parser.add_argument("--list", action="store_true", help="the steps, with the version that each was measured with")
     parser.add_argument("--page", action="store_true", help="writes the pages alone, from the tables as they are")
     options = parser.parse_args(arguments)
-    options.known = STEPS | (hidden_s() if options.hidden_s else {}) | (egg(options.egg) if options.egg else {})
+    options.known = STEPS | (egg(options.egg) if options.egg else {})
     for pattern in options.steps:
         if not fnmatch.filter(options.known, pattern):
             parser.error(f"there is no step {pattern} (scripts/measure --list)")

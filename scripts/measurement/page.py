@@ -9,7 +9,7 @@ from reproduction import results
 from reproduction.measure import ROOT
 
 from . import record
-from .steps import STEPS, egg, hidden_s
+from .steps import STEPS, egg
 from .tables import TABLES
 
 TEMPLATE = pathlib.Path(__file__).with_name("MEASURED.md.in")
@@ -25,7 +25,7 @@ def _of_one_version(entries):
 def versions(records):
     """One sentence where all steps are of one version and machine, else one of each. What has not changed since it was measured is of the
     present version."""
-    steps = STEPS | egg(".") | hidden_s()
+    steps = STEPS | egg(".")
     newest = record.version(tuple(program for step in steps.values() for program in step.programs))
     groups = {}
     for entry in records.values():

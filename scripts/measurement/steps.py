@@ -75,11 +75,6 @@ STEPS = {
 }
 
 
-def hidden_s():
-    """The fit of public data, which are not part of this repository either."""
-    return {"hidden_s": Step((_script("fit_probabilities.py", "measure", "experiments/hidden_s.yaml", _csv("fit_probabilities"), "3"),))}
-
-
 def egg(folder):
     """The public scene of "Differentiable Transient Rendering" (Yi et al. 2021), which is not part of this repository."""
     scene = os.fspath(pathlib.Path(folder).resolve() / "scene.xml")

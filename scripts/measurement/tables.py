@@ -8,7 +8,6 @@ import numpy as np
 import capture_cost
 import cube_cost
 import error_coverage
-import fit_probabilities
 import interval_coverage
 import public_scene
 from reproduction.tables import markdown, read_rows
@@ -267,7 +266,6 @@ TABLES = {
     "cubes": _of("cube_cost", cube_cost.table_of),
     "captures": _of("capture_cost", capture_cost.table_of),
     "stated_errors": _of("error_coverage", error_coverage.tables_of),
-    "fit probabilities": _of("fit_probabilities", fit_probabilities.tables_of),
     "intervals": _of("interval_coverage", interval_coverage.table_of),
     "egg": _of("egg", public_scene.table_of),
     "stability cube": lambda folder: stability(folder, "cube"),
