@@ -151,7 +151,7 @@ def draw_stability(folder):
 def draw_solvers(folder):
     """Error of the parameters over core-seconds, a line per run."""
     rows = read_rows(folder / "chart_solvers.csv")
-    colors = {"adam": "tab:blue", "lbfgs": "tab:orange", "levenberg_marquardt": "tab:green"}
+    colors = {"adam": "tab:blue", "lbfgs": "tab:orange", "levenberg_marquardt": "tab:green", "quasi_newton": "tab:red"}
     figure, axis = plt.subplots(figsize=(8, 5), layout="constrained")
     first = min(float(r["core_seconds"]) for r in rows if float(r["core_seconds"]) > 0)
     for method, seed in dict.fromkeys((r["method"], r["seed"]) for r in rows):
