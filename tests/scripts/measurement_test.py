@@ -58,16 +58,26 @@ class Page(unittest.TestCase):
         for step in re.findall(r"step: `([\w/]+)`", text):
             self.assertIn(step, steps.STEPS | steps.egg("."))
 
-    def test_says_which_versions_where_they_differ(self):
-        def entry(name, version):
-            return record.Record(name, version, "2020-01-02", "1.5", "2 x chip")
+    def entry(self, name, version):
+        return record.Record(name, version, "2020-01-02", "1.5", "2 x chip")
 
+    @unittest.mock.patch.object(record, "version", lambda programs: "not measured")
+    def test_says_which_versions_where_they_differ(self):
+        entry = self.entry
         same = {name: entry(name, "abc") for name in steps.STEPS}
         self.assertEqual(page.versions(same), f"All of version `abc`, 2020-01-02, on 2 x chip, in {1.5 * len(same):.0f} minutes.")
         other = same | {"cubes": entry("cubes", "def")}
         self.assertIn("- Of version `def`, 2020-01-02, on 2 x chip, in 2 minutes: `cubes`.", page.versions(other))
         del other["speed"]
         self.assertIn("- Of older versions: `speed`.", page.versions(other))
+
+    @unittest.mock.patch.object(record, "version", lambda programs: "new" if any("figure9" in p for p in programs) else "abc")
+    def test_what_has_not_changed_is_of_the_present_version(self):
+        measured = {name: self.entry(name, "new" if name == "figure9" else "abc") for name in steps.STEPS}
+        self.assertRegex(page.versions(measured), "^All of version `new`")
+        measured["figure9"] = self.entry("figure9", "abc")
+        self.assertIn("- Of version `abc`, 2020-01-02, on 2 x chip, in 2 minutes: `figure9`.", page.versions(measured))
+        self.assertIn("- Of version `new`", page.versions(measured))
 
 
 class Steps(unittest.TestCase):
@@ -77,14 +87,23 @@ class Steps(unittest.TestCase):
                 if command.startswith("scripts/"):
                     self.assertTrue(os.access(ROOT / command, os.X_OK), command)
 
-
     def test_know_their_programs(self):
-        self.assertEqual(steps.STEPS["gate_width"].programs, ("tests/benchmark/measure/gate_width.cpp",) * 2)
+        self.assertEqual(steps.STEPS["gate_width"].programs, ("tests/benchmark/measure/gate_width.cpp",))
         self.assertEqual(steps.STEPS["figure9"].programs, ("tests/benchmark/measure/figure9.cpp",))
         self.assertEqual(steps.STEPS["charts/cube"].programs, ())
-        for name, step in steps.STEPS.items():
+        self.assertEqual(steps.STEPS["figure1"].programs, ())
+        for step in steps.STEPS.values():
             for program in step.programs:
-                self.assertTrue((ROOT / program).exists() or name == "figure1", program)
+                self.assertTrue((ROOT / program).exists(), program)
+
+
+class Version(unittest.TestCase):
+    def test_is_of_the_programs_too(self):
+        asked = []
+        with unittest.mock.patch.object(record, "_git", lambda *words: asked.append(words) or "abc"):
+            self.assertEqual(record.version(("p.cpp",)), "abc+")
+        self.assertEqual([words[0] for words in asked], ["status", "log"])
+        self.assertTrue(all({"core", "p.cpp"} <= set(words) for words in asked), asked)
 
 
 class Resume(unittest.TestCase):
