@@ -144,19 +144,20 @@ void print_costs(const Inspection& inspection) {
 
 /// How a problem's paths are found.
 void print_techniques(const Problem& problem) {
-  const auto print = [](const char* what, double connections, double light) {
-    const double others = 100 * (1 - connections);
-    fmt::print("  {:<24} {:>3.0f} % ellipsoidal connections, {:>3.0f} % standard sampling, {:>3.0f} % light subpaths\n",
-               what, 100 * connections, others * (1 - light), others * light);
+  const auto print = [](const char* what, bool connections, double light) {
+    if (connections)
+      fmt::print("  {:<24} ellipsoidal connections{}\n", what, light > 0 ? " with light subpaths" : "");
+    else
+      fmt::print("  {:<24} {:>3.0f} % standard sampling, {:>3.0f} % light subpaths\n", what, 100 * (1 - light), 100 * light);
   };
   const auto mix_of = [&](const EstimatorOptions& options) {
     return sampling_mix(options, problem.gates(), problem.scene());
   };
   const SamplingMix image = mix_of(problem.image_estimator()), gradient = mix_of(problem.estimator());
   fmt::print("\nHow paths are found:\n");
-  print("images", image.image, image.image_light);
-  print("images, for gradients", gradient.image, gradient.image_light);
-  print("interior", gradient.interior, gradient.interior_light);
+  print("images", image.image_connections, image.image_light);
+  print("images, for gradients", gradient.image_connections, gradient.image_light);
+  print("interior", gradient.interior_connections, gradient.interior_light);
 }
 
 void print_advice(const Problem& problem, const Inspection& inspection) {

@@ -22,24 +22,24 @@ void PathOrigin::add_shape(int triangle) {
   if (std::find(shapes_.begin(), shapes_.end(), shape) == shapes_.end()) shapes_.push_back(shape);
 }
 
-void ImageBreakdownSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
-  const Rgb weighted = value * use.value;
+void ImageBreakdownSink::add(int pixel, const Rgb& value, double length, GateUse) {
   GatedImage& image = breakdown_.image;
   gates_.for_each_value(length, [&](int g, double w) {
     double* out = &image.data[image.index(pixel, origin_.bounces() * gates_.size() + g)];
     double sum = 0;
     for (int c = 0; c < image.channels; ++c) {
-      out[c] += w * weighted[c];
-      sum += w * weighted[c];
+      out[c] += w * value[c];
+      sum += w * value[c];
     }
     for (int shape : origin_.shapes()) breakdown_.by_shape[shape] += sum;
     breakdown_.by_technique[origin_.technique()] += sum;
   });
 }
 
-void GradientBreakdownSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
-  gates_.for_each_derivative(
-      length, [&](int g, double w, double slope) { add_to_gate(pixel, g, value, w * use.value, slope * use.slope); });
+void GradientBreakdownSink::add(int pixel, const Rgb& value, double length, GateUse use) {
+  gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+    add_to_gate(pixel, g, value, w, slope_factor(use) * slope);
+  });
 }
 
 void GradientBreakdownSink::add_to_gate(int pixel, int gate, const Rgb& value, double w, double slope) {

@@ -39,7 +39,7 @@ class ImageBreakdownSink final : public Sink {
   bool differential() const override { return false; }
   void note_technique(Technique technique) override { origin_.note_technique(technique); }
   void note_path(const Path& path) override { origin_.note_path(path); }
-  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add(int pixel, const Rgb& value, double length, GateUse use) override;
 
  private:
   PathOrigin origin_;
@@ -64,7 +64,7 @@ class GradientBreakdownSink final : public Sink {
   void note_path(const Path& path) override { origin_.note_path(path); }
   void note_boundary(int bounces, int triangle, double) override { origin_.note_boundary(bounces, triangle); }
   void bind(const LocalDifferential& differential) override { rates_.bind(differential); }
-  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add(int pixel, const Rgb& value, double length, GateUse use) override;
   void add_length_rate(int pixel, int gate, const Rgb& value) override { add_to_gate(pixel, gate, value, 0, 1); }
 
  private:

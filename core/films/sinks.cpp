@@ -5,18 +5,17 @@
 
 namespace isochron {
 
-void PrimalSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
-  const Rgb weighted = value * use.value;
+void PrimalSink::add(int pixel, const Rgb& value, double length, GateUse) {
   if (film_.channels() == 1) {
     gates_.for_each_run(length, [&](const GateSet::Run& run) {
       double* out = film_.at(pixel, run.first, run.size);
-      for (int k = 0; k < run.size; ++k) out[k] += run.value[k] * weighted.r;
+      for (int k = 0; k < run.size; ++k) out[k] += run.value[k] * value.r;
     });
     return;
   }
   gates_.for_each_value(length, [&](int g, double w) {
     double* out = film_.at(pixel, g);
-    for (int c = 0; c < film_.channels(); ++c) out[c] += w * weighted[c];
+    for (int c = 0; c < film_.channels(); ++c) out[c] += w * value[c];
   });
 }
 
@@ -50,10 +49,10 @@ void ColumnRates::for_each_column(int dof, F&& f) {
   }
 }
 
-void TangentSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
+void TangentSink::add(int pixel, const Rgb& value, double length, GateUse use) {
   gates_.for_each_derivative(length, [&](int g, double w, double slope) {
     for (int column : rates_.touched())
-      splat(column, pixel, g, value, w * use.value, slope * use.slope * rates_[column].length);
+      splat(column, pixel, g, value, w, slope_factor(use) * slope * rates_[column].length);
   });
 }
 
@@ -67,11 +66,11 @@ void TangentSink::splat(int column, int pixel, int gate, const Rgb& value, doubl
   for (int c = 0; c < film.channels(); ++c) out[c] += value[c] * (w * rates_[column].log_f[c] + length_part);
 }
 
-void AdjointSink::add(int pixel, const Rgb& value, double length, GateWeights use) {
+void AdjointSink::add(int pixel, const Rgb& value, double length, GateUse use) {
   for (std::size_t a = 0; a < adjoints_.size(); ++a) add(a, pixel, value, length, use);
 }
 
-void AdjointSink::add(std::size_t which, int pixel, const Rgb& value, double length, GateWeights use) {
+void AdjointSink::add(std::size_t which, int pixel, const Rgb& value, double length, GateUse use) {
   const GatedImage& adjoint = adjoints_[which];
   // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
   Rgb weight;
@@ -104,7 +103,7 @@ void AdjointSink::add(std::size_t which, int pixel, const Rgb& value, double len
       }
     });
   }
-  scatter(which, weight * use.value, slope_weight * use.slope);
+  scatter(which, weight, slope_factor(use) * slope_weight);
 }
 
 void AdjointSink::add_length_rate(int pixel, int gate, const Rgb& value) {

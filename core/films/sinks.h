@@ -17,11 +17,12 @@
 
 namespace isochron {
 
-/// How the gate enters a contribution: value * W d ln F + slope * W' dl. Images take value * W.
-struct GateWeights {
-  double value = 1, slope = 1;
-};
-inline constexpr GateWeights kValueOnly{1, 0};
+/// How the gate enters the derivative of a contribution: W d ln F + W' dl, or its value W alone. Images take W.
+enum class GateUse { value_and_slope, value_only };
+/// What W' is multiplied by.
+inline double slope_factor(GateUse use) {
+  return use == GateUse::value_and_slope ? 1 : 0;
+}
 
 /// The interface that the estimators write to, see above. Not shared between threads.
 class Sink {
@@ -44,7 +45,7 @@ class Sink {
   /// The differential that the next contributions share; lives until they are added.
   virtual void bind(const LocalDifferential&) {}
   /// One contribution, at a path length that the gates are to be evaluated for.
-  virtual void add(int pixel, const Rgb& value, double length, GateWeights use) = 0;
+  virtual void add(int pixel, const Rgb& value, double length, GateUse use) = 0;
   /// value * dl for one gate, where contributions are derivatives: a member of a coupled pair.
   virtual void add_length_rate(int /*pixel*/, int /*gate*/, const Rgb& /*value*/) {}
 };
@@ -54,7 +55,7 @@ class PrimalSink final : public Sink {
   PrimalSink(const GateSet& gates, const Film& film) : gates_(gates), film_(film) {}
 
   bool differential() const override { return false; }
-  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add(int pixel, const Rgb& value, double length, GateUse use) override;
 
  private:
   const GateSet& gates_;
@@ -96,7 +97,7 @@ class TangentSink final : public Sink {
 
   bool differential() const override { return true; }
   void bind(const LocalDifferential& differential) override { rates_.bind(differential); }
-  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add(int pixel, const Rgb& value, double length, GateUse use) override;
   void add_length_rate(int pixel, int gate, const Rgb& value) override;
 
  private:
@@ -117,11 +118,11 @@ class AdjointSink final : public Sink {
 
   bool differential() const override { return true; }
   void bind(const LocalDifferential& differential) override { differential_ = &differential; }
-  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add(int pixel, const Rgb& value, double length, GateUse use) override;
   void add_length_rate(int pixel, int gate, const Rgb& value) override;
 
  private:
-  void add(std::size_t adjoint, int pixel, const Rgb& value, double length, GateWeights use);
+  void add(std::size_t adjoint, int pixel, const Rgb& value, double length, GateUse use);
   void scatter(std::size_t adjoint, const Rgb& weight, double slope_weight);
 
   const GateSet& gates_;

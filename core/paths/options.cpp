@@ -57,11 +57,12 @@ SamplingMix sampling_mix(const EstimatorOptions& options, const GateSet& gates, 
   if (chooses && options.mix && !scene.capture)
     mix = *options.mix;
   else if (draws_lengths)  // area sampling serves all gates of a capture at once
-    mix.image = mix.interior = !chooses || (!scene.capture && gates.relative_coverage() < kNarrow) ? 1 : 0;
-  if (!draws_lengths) mix.image = mix.interior = 0;
+    mix.image_connections = mix.interior_connections =
+        !chooses || (!scene.capture && gates.relative_coverage() < kNarrow);
+  if (!draws_lengths) mix.image_connections = mix.interior_connections = false;
   const bool possible = draws_lengths && may_keep_length(scene);
-  if (possible && options.keep_length == true && mix.interior == 0) mix.interior = 1;
-  mix.keep_length = mix.interior > 0 && possible &&
+  if (possible && options.keep_length == true) mix.interior_connections = true;
+  mix.keep_length = mix.interior_connections && possible &&
                     options.keep_length.value_or(gates.shape().width() < kSteep * emitter_size(scene));
   if (options.light && !scene.capture) mix.image_light = mix.interior_light = *options.light;
   if (options.max_bounces == 0) mix.image_light = mix.interior_light = 0;

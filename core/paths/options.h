@@ -29,19 +29,18 @@ struct BoundaryTechniques {
   bool operator==(const BoundaryTechniques&) const = default;
 };
 
-/// The share of samples, 0 to 1, that ellipsoidal connections take in images and in the interior term; the others are
-/// standard or have light subpaths. Strictly between, multiple importance sampling combines the two.
+/// What finds the paths of images and of the interior term: ellipsoidal connections, or standard sampling.
 struct SamplingMix {
-  double image = 0, interior = 0;
-  /// The part, 0 to below 1, of the samples not taken by connections that are with light subpaths (LightSubpaths); the others are
-  /// standard. Where it is not zero, connections have them, too.
+  bool image_connections = false, interior_connections = false;
+  /// The part of the samples, 0 to below 1, that are with light subpaths (LightSubpaths), the others are standard. Connections have light
+  /// subpaths where it is not zero.
   double image_light = 0, interior_light = 0;
   /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives do not act on the gates, but for light that the camera
   /// sees an emitter by. Needs connections in the interior term.
   bool keep_length = false;
   /// Whether every sample of a camera's images, or of the interior term, adds to its own pixel only.
-  bool image_stays_in_pixels() const { return image == 0 && image_light == 0; }
-  bool interior_stays_in_pixels() const { return interior == 0 && interior_light == 0; }
+  bool image_stays_in_pixels() const { return !image_connections && image_light == 0; }
+  bool interior_stays_in_pixels() const { return !interior_connections && interior_light == 0; }
   bool operator==(const SamplingMix&) const = default;
 };
 
@@ -53,7 +52,7 @@ struct EstimatorOptions {
   Numbers numbers = Numbers::low_discrepancy;
   std::optional<SamplingMix> mix = {};  ///< of automatic sampling, see measure_mix; none: by the gates' width alone
   BoundaryTechniques boundary = {};
-  /// Whether paths keep their lengths, see SamplingMix and may_keep_length. True: connections take a share of the interior term.
+  /// Whether paths keep their lengths, see SamplingMix and may_keep_length. True: by connections in the interior term.
   /// None: where they do and gates are narrow over the smallest emitter (the root of its area).
   std::optional<bool> keep_length = {};
   /// SamplingMix::image_light and interior_light. None: those of `mix`. Not of captures.

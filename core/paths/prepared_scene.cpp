@@ -87,7 +87,7 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
   }
   const std::vector<int> emitted = emitters.triangles();
   update_emitters();
-  update_hidden();
+  hidden.update(*this);
   any_changed |= emitters.triangles() != emitted;
   flows.update(*this, follow);
   moving_bounds = differentiable.bounds.grown(caster.offset());
@@ -159,78 +159,6 @@ Vec3 PreparedScene::texture_gradient(const SurfacePoint& x) const {
   const double b = scene.texture[r.vertex[1]] - scene.texture[r.vertex[0]],
                c = scene.texture[r.vertex[2]] - scene.texture[r.vertex[0]];
   return (cross(r.edge[1], r.normal) * b + cross(r.normal, r.edge[0]) * c) / (2 * r.area);
-}
-
-void PreparedScene::update_hidden() {
-  if (revision_ == 1) {
-    const bool any = std::any_of(scene.shapes.begin(), scene.shapes.end(), [](const Shape& s) { return s.hidden; });
-    std::vector<int> triangles;
-    std::vector<Vec3> centers;
-    for (int t = 0; t < static_cast<int>(records_.size()); ++t) {
-      if (any ? !scene.shapes[records_[t].shape].hidden : !captures()) continue;
-      triangles.push_back(t);
-      centers.push_back(records_[t].origin + (records_[t].edge[0] + records_[t].edge[1]) / 3);
-    }
-    hidden_order_.clear();
-    for (const int i : spatial_order(centers)) hidden_order_.push_back(triangles[i]);
-  }
-  // Of a box about the sensor points: a face that has all these corners behind it is invisible to every sensor point.
-  std::vector<Vec3> corners;
-  if (captures()) {
-    Bounds box;
-    for (const WallPoint& s : scene.capture->sensor) box.add(s.p);
-    for (int i = 0; i < 8; ++i)
-      corners.push_back(
-          {i & 1 ? box.high.x : box.low.x, i & 2 ? box.high.y : box.low.y, i & 4 ? box.high.z : box.low.z});
-  }
-  const auto seen = [&](int t) {
-    if (two_sided(t) || transparent(t)) return true;
-    return std::any_of(corners.begin(), corners.end(), [&](const Vec3& p) { return height_over(t, p) > 0; });
-  };
-  std::vector<int> triangles;
-  std::vector<double> areas;
-  for (const int t : hidden_order_) {
-    records_[t].hidden = records_[t].area > 0 && (!captures() || seen(t));
-    if (!records_[t].hidden) continue;
-    triangles.push_back(t);
-    areas.push_back(records_[t].area);
-  }
-  hidden = HiddenGeometry(std::move(triangles), areas);
-  all_visible_is_area_sampled = hidden_order_.size() == records_.size();
-  if (revision_ == 1)
-    area_sampling_alone = all_visible_is_area_sampled && captures() && area_sampling_beats_cosine_sampling();
-  const auto changes = [](const std::vector<std::uint8_t>& which) {
-    return std::ranges::count(which, 0) < std::ssize(which);
-  };
-  only_area_sampled_has_gradient = only_area_sampled_x1_has_gradient = !hidden.empty() && !differentiable.every_path &&
-                                                                       !changes(differentiable.light) &&
-                                                                       !changes(differentiable.emission);
-  for (int t = 0; only_area_sampled_x1_has_gradient && t < static_cast<int>(records_.size()); ++t) {
-    // An emitter that moves is at the end of paths, too, which next-event estimation finds.
-    if (!records_[t].has_gradient || (records_[t].hidden && !emits(t)) || records_[t].area == 0) continue;
-    only_area_sampled_has_gradient = false;
-    only_area_sampled_x1_has_gradient = captures() && !emits(t) && !seen(t);
-  }
-}
-
-bool PreparedScene::area_sampling_beats_cosine_sampling() const {
-  constexpr int kPoints = 1024;
-  constexpr Stream kTrialStream{0x68696464656eu, 0, 0};  // what it decides about has other numbers
-  double sum = 0, squares = 0;
-  for (int i = 0; i < kPoints && !hidden.empty(); ++i) {
-    Rng rng(kTrialStream, static_cast<std::uint64_t>(i), 0);
-    const int pixel = std::min(static_cast<int>(rng.uniform() * pixels()), pixels() - 1);
-    double u0 = rng.uniform();
-    const double u1 = rng.uniform();
-    const SurfacePoint s = sensor_point(pixel), x = sample_hidden(u0, u1);
-    const Vec3 d = x.p - s.p;
-    const double r = length(d);
-    if (!(r > 0) || (!(dot(x.n, d) < 0) && !two_sided(x.triangle) && !transparent(x.triangle))) continue;
-    const double weight = importance(pixel, d / r) * solid_angle_to_area(s.p, x) / hidden.pdf();
-    sum += weight;
-    squares += weight * weight;
-  }
-  return squares <= sum;
 }
 
 void PreparedScene::update_lights() {

@@ -57,13 +57,6 @@ class PreparedScene {
   /// Lights without an extent: the scene's, or the spots of a capture's laser.
   std::vector<PointLight> lights;
   HiddenGeometry hidden;
-  /// Whether area sampling can draw every point that a sensor point sees.
-  bool all_visible_is_area_sampled = false;
-  /// Whether area sampling alone has lower variance than mixed with cosine sampling of the wall. Decided once, from the initial
-  /// scene.
-  bool area_sampling_alone = false;
-  /// Whether every vertex, or every first vertex x1 of a capture's paths, that gives its path a derivative is area-sampled.
-  bool only_area_sampled_has_gradient = false, only_area_sampled_x1_has_gradient = false;
 
   /// Triangles that ellipsoids are intersected with: all, those that can give a path a derivative, those that emit. A hierarchy
   /// is made when first asked for: standard sampling asks for none.
@@ -98,15 +91,6 @@ class PreparedScene {
   double importance(int pixel, const Vec3& w) const {
     if (!captures()) return camera.image_area_per_solid_angle(w);
     return std::max(0.0, dot(scene.capture->sensor_of(pixel).n, w)) * kInvPi;
-  }
-  /// Density per area of a path's next vertex on `triangle`, which the one before sees: area sampling with probability `share`,
-  /// or else another way, of density `pdf`, whichever has the larger density (maximum heuristic).
-  double next_vertex_pdf(int triangle, double share, double pdf) const {
-    return std::max(hidden_pdf(triangle, share), (1 - share) * pdf);
-  }
-  /// Whether it is area sampling.
-  bool hidden_takes(int triangle, double share, double pdf) const {
-    return hidden_pdf(triangle, share) >= (1 - share) * pdf;
   }
   /// The light that a pixel of a capture is lit by, in place of a triangle.
   int spot_of(int pixel) const { return index_of_light(scene.capture->spot_index(pixel)); }
@@ -175,9 +159,6 @@ class PreparedScene {
     const std::size_t i = light_number(triangle);
     return i < differentiable.light.size() && differentiable.light[i];
   }
-  bool is_hidden(int triangle) const { return records_[triangle].hidden; }
-  /// Density per area of area sampling with probability `share`.
-  double hidden_pdf(int triangle, double share) const { return is_hidden(triangle) ? share * hidden.pdf() : 0; }
   /// f(corner, vertex) for each of the triangle's vertices that move.
   template <class F>
   void for_each_moving_corner(int triangle, F&& f) const {
@@ -296,10 +277,7 @@ class PreparedScene {
     if (triangle < 0 || dot(records_[triangle].normal, w) == 0) return std::nullopt;
     return point_on_triangle(triangle, origin, w);
   }
-  /// First surface point of such rays.
-  std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) const {
-    return end_point(closest_hit(x, w), x.p, w);
-  }
+  /// First surface point of such a ray.
   std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
     return end_point(closest_camera_hit(direction), camera.position, direction);
   }
@@ -344,10 +322,6 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_emitter_borders(const Shape& shape);
-  void update_hidden();
-  /// Whether points drawn by area on the area-sampled shapes have weights (the wall's reflection over their density) of no larger
-  /// mean square than points drawn by the wall's cosine, whose weights are 1.
-  bool area_sampling_beats_cosine_sampling() const;
   double texture_at(const SurfacePoint& x) const {
     const auto b = barycentrics(x);
     const auto& v = records_[x.triangle].vertex;
@@ -361,7 +335,6 @@ class PreparedScene {
   mutable std::array<std::unique_ptr<LazyHierarchy>, 3> hierarchies_;  ///< by Part
   std::vector<ShapeRecord> shapes_;
   std::vector<char> emitting_shapes_;
-  std::vector<int> hidden_order_;  ///< triangles in spatial order
   bool has_medium_ = false;
   double least_index_ = 1;
 };

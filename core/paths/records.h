@@ -42,7 +42,6 @@ struct alignas(64) TriangleRecord {
   int shape = -1;
   bool emits = false;
   bool has_gradient = false;        ///< a path through the triangle can have a derivative
-  bool hidden = false;              ///< part of the area-sampled shapes
   std::uint8_t moving_corners = 0;  ///< bit i: corner i is a vertex that moves
   Vec3 edge[2];                     ///< corners 1 and 2 from corner 0
   std::array<int, 3> vertex = {};

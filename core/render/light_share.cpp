@@ -39,19 +39,18 @@ class MomentSink final : public Sink {
   bool differential() const override { return rates_.has_value(); }
   void note_path(const Path& path) override { ratio_ = balance_.light_ratio(path, 0).all; }
   void bind(const LocalDifferential& differential) override { rates_->bind(differential); }
-  void add(int, const Rgb& value, double length, GateWeights use) override {
+  void add(int, const Rgb& value, double length, GateUse use) override {
     double squares = 0;
     if (!rates_) {
       gates_.for_each_value(length, [&](int, double w) { squares += w * w; });
-      const double counted = value.max() * use.value;
-      squares *= counted * counted;
+      squares *= value.max() * value.max();
     } else if (!rates_->touched().empty()) {
       const ColumnRates::Rates& rates = (*rates_)[0];
       gates_.for_each_derivative(length, [&](int, double w, double slope) {
         double most = 0;
         for (int c = 0; c < 3; ++c)
           most =
-              std::max(most, std::abs(value[c] * (w * use.value * rates.log_f[c] + slope * use.slope * rates.length)));
+              std::max(most, std::abs(value[c] * (w * rates.log_f[c] + slope_factor(use) * slope * rates.length)));
         squares += most * most;
       });
     }

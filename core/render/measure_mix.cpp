@@ -1,12 +1,12 @@
 #include "core/render/measure_mix.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include "core/render/light_share.h"
-#include "core/render/share_trial.h"
+#include "core/render/technique_trial.h"
 
 namespace isochron {
 namespace {
@@ -19,15 +19,18 @@ struct TrialWidths {
 };
 constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
-constexpr int kTrialSamples = 4;  ///< per pixel and batch: two of each kind
+constexpr int kTrialSamples = 2;  ///< per pixel, batch and technique
 /// Before images are larger. Sums over blocks vary together, so that only batches say more about them.
 constexpr int kMostBatches = 32, kFewestBatches = 4, kFewestBatchesOfSums = 16;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
 constexpr int kPixels = 4096, kFewestPixels = 576;
-/// Of an image: trials keep ten.
-constexpr double kMostValues = 1 << 21;
+/// Of the sums that a trial keeps.
+constexpr double kMostValues = 1 << 23;
 constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what connections take
 constexpr int kBlocks = 4;        ///< across the image
+/// By what low-discrepancy numbers lower the variance of pixels under standard sampling, where trials do without: about 2 on the
+/// cube, 0.8 in the Cornell box (isochron_technique_trial: costs of trials against those of 64 samples).
+constexpr double kGainOfStandard = 1.3;
 /// The work of all trials is this part of that of the job at most; that of light subpaths takes its part of it.
 constexpr double kTrialPart = 0.1, kLightTrialPart = 0.04;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
@@ -64,8 +67,8 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
   return basis.combined(sign);
 }
 
-/// What one trial has to say.
-struct Trial {
+/// Decides between standard sampling and connections.
+struct Choice {
   const Scene& scene;
   const GateSet& gates;
   EstimatorOptions options;
@@ -73,35 +76,45 @@ struct Trial {
   double job;   ///< samples per pixel that it decides about
   double part;  ///< of the job's work, at most
 
-  /// The best of kConnectionShares, or `by_width` where it cannot tell. `column`: of the interior term; null: of images.
-  double choose(double by_width, const TangentBasis* column, const Stream& stream, double& work) const {
-    const double budget =
+  /// Whether connections cost less, or `by_width` where trials cannot tell. `column`: of the interior term; null: of images. `work`
+  /// grows by what that took.
+  bool connections(bool by_width, const TangentBasis* column, const Stream& stream, double& work) const {
+    const double samples =
         part * pixels_of(scene) * job - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+    if (!(samples >= kFewestBudget)) return by_width;
     const bool sums = column && purpose == Purpose::gradients;
-    const auto trial = [&](const Scene& small, int batches, double most_samples) {
-      return measure_shares({.scene = small,
-                             .gates = gates,
-                             .options = options,
-                             .column = column,
-                             .block = sums ? std::max(1, small.camera.width / kBlocks) : 1,
-                             .samples = kTrialSamples,
-                             .batches = batches,
-                             .most_samples = most_samples},
-                            stream, work);
+    const auto run = [&](const Scene& small, int batches, double budget) {
+      const TechniqueTrial trial{small, gates, options, column, sums ? std::max(1, small.camera.width / kBlocks) : 1,
+                                 kTrialSamples};
+      SceneCache cache(small, CasterUpdate::rebuild);
+      std::array<TrialBatches, 2> found;
+      for (const int t : {0, 1}) {
+        found[t] = run_trial(trial, t == 1, batches, budget, stream, cache);
+        budget -= found[t].work * found[t].count;
+        work += found[t].work * found[t].count;
+      }
+      return found;
     };
-    if (!(budget >= kFewestBudget)) return by_width;
     // What connections take differs between scenes: a tiny image tells.
     const Scene tiny = reduced(scene, kTinyPixels);
-    const double affordable = (trial(tiny, 1, budget).affordable_batches - 1) * pixels_of(tiny);
+    const auto first = run(tiny, 1, 0);
+    const double both = first[0].work + first[1].work, least = std::min(first[0].work, first[1].work);
+    const double of_sample = least / (kTrialSamples * pixels_of(tiny)), budget = samples * of_sample - both;
+    const double affordable = budget / both * pixels_of(tiny);  // pixels times batches
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
     if (!(affordable >= 2 * fewest)) return by_width;
     const double most = std::min<double>(kPixels, kMostValues / (gates.size() * (scene.grey ? 1.0 : 3.0)));
     const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
-    const auto cost = trial(small, kMostBatches, budget * (1 - pixels_of(tiny) / (affordable + pixels_of(tiny)))).cost;
-    if (!cost) return by_width;
-    const auto best = std::min_element(cost->begin(), cost->end());
-    return std::isfinite(*best) ? kConnectionShares[best - cost->begin()] : by_width;
+    const auto batches = static_cast<int>(std::min<double>(kMostBatches, affordable / pixels_of(small)));
+    const auto [standard, by_connections] = run(small, batches, budget);
+    const auto cost = [](const TrialBatches& of) {
+      // Nothing seen says nothing: a technique that never hit the gates is no good one.
+      return of.variance > 0 ? of.variance * of.work : std::numeric_limits<double>::infinity();
+    };
+    const double gain = sums || options.numbers != Numbers::low_discrepancy ? 1 : kGainOfStandard;
+    const double costs[] = {cost(standard) / gain, standard.has_others ? std::numeric_limits<double>::infinity() : cost(by_connections)};
+    return std::isinf(costs[0]) && std::isinf(costs[1]) ? by_width : costs[1] < costs[0];
   }
 };
 
@@ -132,19 +145,19 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     return measure_light_share(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
                                work);
   };
-  const auto choose = [&](const TrialWidths& widths, double otherwise, double samples, const TangentBasis* column) {
-    if (coverage < widths.below_is_ellipsoidal) return 1.0;
-    if (width > widths.above_is_standard) return 0.0;
+  const auto choose = [&](const TrialWidths& widths, bool otherwise, double samples, const TangentBasis* column) {
+    if (coverage < widths.below_is_ellipsoidal) return true;
+    if (width > widths.above_is_standard) return false;
     EstimatorOptions trial = options;
     if (!trial.light) trial.light = column ? best.interior_light : best.image_light;
-    return Trial{scene, gates, trial, purpose, samples, part}.choose(otherwise, column, stream, work);
+    return Choice{scene, gates, trial, purpose, samples, part}.connections(otherwise, column, stream, work);
   };
   best.image_light = choose_light(kImage, job.image, nullptr);
-  best.image = choose(kImage, by_width.image, job.image, nullptr);
+  best.image_connections = choose(kImage, by_width.image_connections, job.image, nullptr);
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
   best.interior_light = choose_light(kInterior, job.interior, &one);
-  best.interior = choose(kInterior, by_width.interior, job.interior, &one);
+  best.interior_connections = choose(kInterior, by_width.interior_connections, job.interior, &one);
   return best;
 }
 

@@ -89,9 +89,6 @@ Passes::Passes(const Scene& source, const GateSet& gate_set, const EstimatorOpti
   if (options.light.value_or(0) > 0 && scene.captures())
     throw InputError("estimator.light: paths of captures have no light subpaths (allowed here: 0)");
   if (gates.shape().is_dirac()) check_dirac();
-  // The two sides of a pair cancel the better the closer they are: by about this factor coupling lowers the variance
-  // (measured on the cube and the box, 0.1 % to 10 %).
-  if (options.antithetic) pair_coupling_gain_ = 1 + 0.1 / gates.relative_width();
 }
 
 void Passes::check_dirac() const {
@@ -141,33 +138,27 @@ void Passes::prepare(Term term) const {
 
 void Passes::run_images(const Pass& pass, Partition partition, Sink& sink) const {
   Worker worker(scene, gates, options, every_gate, sink);
-  GatePass lengths;
-  lengths.value = true;
-  run_paths(worker, mix.image, mix.image_light, lengths, pass, partition);
+  std::optional<GatePass> lengths;
+  if (mix.image_connections) lengths = {.value = true};
+  run_paths(worker, lengths, mix.image_light, pass, partition);
   count(worker);
 }
 
 void Passes::run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const {
   Worker worker(scene, gates, options, pick, sink);
-  GatePass lengths;
-  if (term == Term::interior) {
-    lengths.value = true;
-    lengths.pairs = interior_pairs();
-    if (lengths.pairs) lengths.use = kValueOnly;
-    run_paths(worker, mix.interior, mix.interior_light, lengths, pass, partition);
-  } else if (term == Term::path_length) {
-    lengths.pairs = true;
-    lengths.part = PairPart::dirac;
-    lengths.coupled = options.antithetic;
-    run_paths(worker, 1, mix.interior_light, lengths, pass, partition);
-  } else {
+  if (term == Term::visibility) {
     run_visibility(worker, pass, partition);
+  } else {
+    std::optional<GatePass> lengths;
+    if (term == Term::path_length) {
+      lengths = {.pairs = true, .part = PairPart::dirac, .coupled = options.antithetic};
+    } else if (mix.interior_connections) {
+      const bool pairs = options.antithetic && scene.differentiable.lengths && any_slope();
+      lengths = {.value = true, .use = pairs ? GateUse::value_only : GateUse::value_and_slope, .pairs = pairs};
+    }
+    run_paths(worker, lengths, mix.interior_light, pass, partition);
   }
   count(worker);
-}
-
-bool Passes::interior_pairs() const {
-  return mix.interior > 0 && options.antithetic && scene.differentiable.lengths && any_slope();
 }
 
 void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pass& pass, Partition partition) const {
@@ -194,35 +185,40 @@ void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pas
   });
 }
 
-void Passes::run_paths(Worker& worker, double share, double light, const GatePass& lengths, const Pass& pass,
+void Passes::run_paths(Worker& worker, const std::optional<GatePass>& lengths, double light, const Pass& pass,
                        Partition partition) const {
-  worker.balance.rates = {share, light_rate(light), light > 0 && options.max_bounces > 1, pair_coupling_gain_};
-  GatePass single_lengths = lengths, pairs = lengths;
+  worker.balance.rates = {light_rate(light), light > 0 && options.max_bounces > 1};
+  if (!lengths) {
+    StandardPaths standard(worker);
+    LightSubpaths light_subpaths(worker);
+    const TechniqueUse uses[] = {
+        {Technique::standard, 1 - light, true,
+         [&](int pixel, double scale, Rng& rng) { standard.start(pixel, scale, rng); }},
+        {Technique::light_subpath, light, true,
+         [&](int pixel, double scale, Rng& rng) { light_subpaths.sample(pixel, scale, rng); }},
+    };
+    visit(uses, worker, pass, partition);
+    worker.sink.note_technique(Technique::standard);
+    const CountedWork counted(worker, Technique::standard);
+    standard.finish();
+    return;
+  }
+  GatePass single_lengths = *lengths, pairs = *lengths;
   single_lengths.pairs = false;
   pairs.value = false;
-  const GatePass& of_walks = mix.keep_length ? single_lengths : lengths;
+  const GatePass& of_walks = mix.keep_length ? single_lengths : *lengths;
   EllipsoidalConnections connections(worker, of_walks), camera_lengths(worker, single_lengths),
       camera_pairs(worker, pairs);
-  StandardPaths standard(worker, lengths.pairs);
-  LightSubpaths light_subpaths(worker, lengths.pairs);
   const bool from_camera = !scene.captures();
-  const double others = 1 - share;
   const TechniqueUse uses[] = {
-      {Technique::camera_lengths, from_camera && lengths.value ? share : 0, false,
+      {Technique::camera_lengths, from_camera && lengths->value ? 1.0 : 0.0, false,
        [&](int, double scale, Rng& rng) { camera_lengths.sample_from_camera(scale, rng); }},
-      {Technique::camera_pairs, from_camera && lengths.pairs ? share : 0, false,
+      {Technique::camera_pairs, from_camera && lengths->pairs ? 1.0 : 0.0, false,
        [&](int, double scale, Rng& rng) { camera_pairs.sample_from_camera(scale, rng); }},
-      {Technique::walk, of_walks.value || of_walks.pairs ? share : 0, true,
+      {Technique::walk, of_walks.value || of_walks.pairs ? 1.0 : 0.0, true,
        [&](int pixel, double scale, Rng& rng) { connections.sample_walk(pixel, scale, rng); }},
-      {Technique::standard, others * (1 - light), true,
-       [&](int pixel, double scale, Rng& rng) { standard.start(pixel, scale, rng); }},
-      {Technique::light_subpath, others * light, true,
-       [&](int pixel, double scale, Rng& rng) { light_subpaths.sample(pixel, scale, rng); }},
   };
   visit(uses, worker, pass, partition);
-  worker.sink.note_technique(Technique::standard);
-  const CountedWork counted(worker, Technique::standard);
-  standard.finish();
 }
 
 /// What searches for boundaries.

@@ -75,7 +75,7 @@ class Passes {
   /// Whether the term draws lengths from the gates.
   bool draws_lengths(Term term) const {
     if (term == Term::path_length) return true;
-    return term == Term::interior ? mix.interior > 0 : narrow();
+    return term == Term::interior ? mix.interior_connections : narrow();
   }
 
   /// To be called before a term is run: the visibility term needs its edges, and its guiding learns. What is learned depends
@@ -94,9 +94,6 @@ class Passes {
     else
       run_images(pass, partition, sink);
   }
-
-  /// What the density of connections is multiplied by in the weights of the slope of the gate, in the interior term.
-  double slope_gain() const { return interior_pairs() ? pair_coupling_gain_ : 1; }
 
   const GateSet gates;  ///< as the detector's time offset shifts them
   const EstimatorOptions options;
@@ -144,16 +141,14 @@ class Passes {
   void check_dirac() const;
 
   /// Whether the visibility term uses techniques that draw lengths.
-  bool narrow() const { return mix.interior == 1; }
+  bool narrow() const { return mix.interior_connections; }
 
   /// Whether derivatives may act on the gates: where paths keep their lengths, those do by which the camera sees an emitter.
   bool any_slope() const { return !mix.keep_length || scene.emitters.seen_by_camera; }
 
-  /// Whether the interior term takes the continuous part of dW in pairs.
-  bool interior_pairs() const;
-
-  /// Camera paths: `share` of the samples by ellipsoidal connections, the others by standard sampling and light subpaths. `light`: see SamplingMix::interior_light.
-  void run_paths(Worker& worker, double share, double light, const GatePass& lengths, const Pass& pass,
+  /// Camera paths by ellipsoidal connections for such lengths, or, without `lengths`, by standard sampling and light subpaths. `light`:
+  /// see SamplingMix::interior_light.
+  void run_paths(Worker& worker, const std::optional<GatePass>& lengths, double light, const Pass& pass,
                  Partition partition) const;
   struct Searches;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
@@ -169,7 +164,6 @@ class Passes {
   const BoundaryEdges& edges() const { return *ready->edges; }
 
   SceneCache* const cache_;
-  double pair_coupling_gain_ = 1;
   mutable std::atomic<long long> rays_{0}, arcs_{0};
   struct Counts {
     std::atomic<long long> rays{0}, arcs{0};

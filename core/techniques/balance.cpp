@@ -7,26 +7,13 @@
 
 namespace isochron {
 
-template <class F>
-GateWeights Balance::for_value_and_slope(const Path& path, int pixel, bool pairs, F&& f) const {
-  if (!(rates.ellipsoidal_share > 0)) {
-    const double both = f(0.0);
-    return {both, both};
-  }
-  const double of_value = f(of_connections(path, pixel, 1));
-  return {of_value, pairs ? f(of_connections(path, pixel, rates.pair_coupling_gain)) : of_value};
+double Balance::standard(const Path& path, int pixel) const {
+  return rates.light > 0 ? 1 / (1 + rates.light * light_ratio(path, pixel).all) : 1;
 }
 
-GateWeights Balance::standard(const Path& path, int pixel, bool pairs) const {
-  if (!(rates.ellipsoidal_share > 0 || rates.light > 0)) return {};
-  const double of_standard = rates.light > 0 ? 1 / (1 + rates.light * light_ratio(path, pixel).all) : 1;
-  return for_value_and_slope(path, pixel, pairs, [&](double connections) { return (1 - connections) * of_standard; });
-}
-
-GateWeights Balance::light(const Path& path, int pixel, int camera_vertices, bool pairs) const {
+double Balance::light(const Path& path, int pixel, int camera_vertices) const {
   const LightRatio ratio = light_ratio(path, pixel, camera_vertices);
-  const double of_light = rates.light * ratio.of_joint / (1 + rates.light * ratio.all);
-  return for_value_and_slope(path, pixel, pairs, [&](double connections) { return (1 - connections) * of_light; });
+  return rates.light * ratio.of_joint / (1 + rates.light * ratio.all);
 }
 
 LightRatio Balance::light_ratio(const Path& path, int pixel, int joint) const {
@@ -89,17 +76,13 @@ double Balance::connection(const Path& path, int pixel, const TargetLength& targ
   // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
   // densities of the length differ between the two techniques.
   const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !rates.light_connections);
-  const double part = part_of_arc(path, on_arc, pdf_on_arc, false, [&](int from) {
+  return part_of_arc(path, on_arc, pdf_on_arc, false, [&](int from) {
     if (same_length_pdf) return 1.0;
     const int served = from == 0 ? GatePick::kImage : pixel;
     // A pair serves one gate.
     return (from == 0 ? 1 : pick_.rate(pixel)) *
            (target.pair ? pick_.probability(served, target.gate) : pick_.length_pdf(served, target.tau[side]));
   });
-  if (!(part > 0)) return 0;
-  // No other technique finds lengths at a jump.
-  if (target.jump[side] || rates.ellipsoidal_share == 1) return part;
-  return part * of_connections(path, pixel, target.pair ? rates.pair_coupling_gain : 1);
 }
 
 double Balance::gathered(const Path& path, int on_arc, double pdf_on_arc) const {
@@ -119,47 +102,6 @@ double Balance::border(const Path& path, int pixel, double tau, const Vec3& tang
       !scene_.outside(x, q) ? 0 : border_pdf * (pdf_on_arc ? *pdf_on_arc : surface_arc_pdf(x, q, y)) * tries(last - 2);
   const double sum = from_q + by_arcs;
   return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / sum : 0;
-}
-
-/// The part of connections, whose density is multiplied by `gain`, against all other techniques.
-double Balance::of_connections(const Path& path, int pixel, double gain) const {
-  const double others = (1 - rates.ellipsoidal_share) / rates.ellipsoidal_share;
-  return 1 / (1 + others / (gain * connection_ratio(path, pixel)));
-}
-
-/// Light arcs, which find few paths that other arcs do not, are left out of the estimate.
-double Balance::connection_ratio(const Path& path, int pixel) const {
-  const int last = path.size() - 1;
-  const SurfacePoint& y = path.vertex[last];
-  const double length = path.length[last], pdf_y = scene_.emitter_pdf(y.triangle);
-  const double to_y = length - path.length[last - 1];
-  // The arc that an emitter of this size leaves on a sphere of this radius.
-  const double across = std::min(1 / std::sqrt(pdf_y), 2 * kPi * to_y);
-  const double rate = pick_.rate(pixel);  // of walks through the pixel
-  double standard, ellipsoidal;
-  if (last == 1) {
-    standard = rate * step_pdf(path, 0, y);
-    ellipsoidal = pick_.length_pdf(GatePick::kImage, length) / across;
-  } else {
-    const SurfacePoint &x = path.vertex[last - 2], &q = path.vertex[last - 1];
-    if (!scene_.outside(q, y)) return 0;
-    const double to_q = path.length[last - 1] - path.length[last - 2], pdf_q = rate * step_pdf(path, last - 2, q);
-    standard = pdf_q * (pdf_y + step_pdf(path, last - 1, y));
-    // Ellipsoids cross the scene on a few closed curves, where dA = |q-a| |q-b| / sqrt(tau^2 - |P(b-a)|^2)
-    // dphi dtau.
-    constexpr double kCurves = 1;
-    const Vec3 d = y.p - x.p;
-    const double in_plane = isochron::length_squared(d) - dot(d, q.n) * dot(d, q.n);
-    const double area_rate = to_q * to_y / std::sqrt((to_q + to_y) * (to_q + to_y) - in_plane);
-    ellipsoidal = is_light(y.triangle) ? 0 : pdf_q * pick_.length_pdf(pixel, length) / across;
-    if (scene_.outside(x, q))
-      ellipsoidal += pdf_y *
-                     (last == 2 ? pick_.length_pdf(GatePick::kImage, length) : rate * pick_.length_pdf(pixel, length)) /
-                     (2 * kPi * kCurves * area_rate);
-  }
-  // Of the samples that are no connections, one in 1 + rates.light is standard.
-  if (rates.light > 0) standard *= (1 + rates.light * light_ratio(path, pixel).all) / (1 + rates.light);
-  return ellipsoidal / standard;
 }
 
 /// Density per area with which a walk at the path's vertex `from` continues to q (from the camera: by a random point of a

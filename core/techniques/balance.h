@@ -5,8 +5,6 @@
 // to one whatever densities they come from, so long as all ask the same functions; contributions are divided by the true ones.
 //   standard sampling      from the camera, as densities per area of every vertex; Russian roulette and area sampling are left out
 //   light subpaths         the same from the emitter, joined behind each camera vertex, as ratios to standard sampling
-//   connections            an estimate: they choose among all the arcs that an ellipsoid leaves on the scene, whose common length no
-//                          single path knows
 //   arcs                   among connections, by the vertex that was put on an arc: per area and length there, over the camera walk
 //                          to the last vertex but two. Connections of the camera itself serve every pixel; so that they
 //                          compare, walks count as starting at a random point of a random pixel
@@ -23,10 +21,8 @@ namespace isochron {
 
 /// How often each technique is used.
 struct TechniqueRates {
-  double ellipsoidal_share = 0;    ///< of the samples; the others are standard or have light subpaths
   double light = 0;                ///< samples with light subpaths per standard one
-  bool light_connections = false;  ///< whether connections have light subpaths, too
-  double pair_coupling_gain = 1;   ///< factor on the density of coupled pairs
+  bool light_connections = false;  ///< whether connections have light subpaths
 };
 
 /// Samples with light subpaths per standard one, where they are this part, below one, of both.
@@ -47,12 +43,12 @@ class Balance {
 
   TechniqueRates rates;
 
-  // The part that a technique takes of the complete path x0 .. x(K) of a pixel. Parts of all techniques add up to one.
+  // The part that a technique takes of the complete path x0 .. x(K) of a pixel. Parts of standard sampling and of all joints of light
+  // subpaths add up to one, and those of all arcs.
 
-  /// `pairs`: the slope of the gate is shared with ellipsoidal connections in coupled pairs.
-  GateWeights standard(const Path& path, int pixel, bool pairs) const;
+  double standard(const Path& path, int pixel) const;
   /// Of light subpaths joined behind so many camera vertices.
-  GateWeights light(const Path& path, int pixel, int camera_vertices, bool pairs) const;
+  double light(const Path& path, int pixel, int camera_vertices) const;
   /// Of connections that put vertex number `on_arc` of the path on an arc, where the path is as long as that side of the target:
   /// emitter arcs put the last one, surface arcs one before. `pdf_on_arc`: of the point that was found, per area and length.
   double connection(const Path& path, int pixel, const TargetLength& target, int side, int on_arc,
@@ -65,10 +61,6 @@ class Balance {
   double border(const Path& path, int pixel, double tau, const Vec3& tangent, double border_pdf,
                 std::optional<double> pdf_on_arc) const;
 
-  /// Density of the path under ellipsoidal connections over that under all other samples, as if there were as many of both; an
-  /// estimate. Infinite where only connections find it.
-  double connection_ratio(const Path& path, int pixel) const;
-
   /// See LightRatio. `joint`: the number of camera vertices before it; 0: the camera itself is joined.
   LightRatio light_ratio(const Path& path, int pixel, int joint = -1) const;
 
@@ -76,10 +68,6 @@ class Balance {
   /// Of all techniques of connections that one by `on_arc` is, its part.
   template <class LengthPdf>
   double part_of_arc(const Path& path, int on_arc, double pdf_on_arc, bool gathered, LengthPdf&& length_pdf) const;
-  double of_connections(const Path& path, int pixel, double gain) const;
-  /// f(part of connections in a path's value or slope) for both.
-  template <class F>
-  GateWeights for_value_and_slope(const Path& path, int pixel, bool pairs, F&& f) const;
   double step_pdf(const Path& path, int from, const SurfacePoint& q) const;
   double step_from_light_pdf(const Path& path, int to) const;
   double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const;

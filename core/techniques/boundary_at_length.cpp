@@ -65,7 +65,7 @@ bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, co
   worker_.sink.note_boundary(c.bounces, g.y.edge->face[0], alone ? 1 : 1 - shares.from_edge);
   // Its share over its density is that of random edge points over theirs.
   const double weight = alone ? 1 / rate : shares.from_camera;
-  worker_.sink.add(pixel, c.value * radiance * weight, tau, kValueOnly);
+  worker_.sink.add(pixel, c.value * radiance * weight, tau, GateUse::value_only);
   return true;
 }
 

@@ -33,7 +33,7 @@ double SecondaryBoundary::camera_over_edge(const Segment& g, const SurfacePoint&
   const double received = scene_.importance(pixel, normalize(x1.p - eye)) * solid_angle_to_area(eye, x1);
   // Segments from an edge serve all pixels of a camera, but one of a capture.
   const double found = scene_.captures()
-                           ? scene_.next_vertex_pdf(x1.triangle, worker_.first_step_probability(), received)
+                           ? scene_.hidden.next_vertex_pdf(x1.triangle, worker_.area_steps.first, received)
                            : worker_.pick.rate(pixel) * received / scene_.pixels();
   const double by_camera = camera_over_edge_rate_ * camera_warp(pixel, k).density(g.y.x()) /
                            edge_warp().density(g.y.x()) * found * walk.towards_light;

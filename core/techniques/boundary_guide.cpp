@@ -202,7 +202,7 @@ void GuideSink::bind(const LocalDifferential& differential) {
       rate_ += column_sign(basis_.entries[i].column) * s.log_f * basis_.entries[i].coefficient;
 }
 
-void GuideSink::add(int pixel, const Rgb& value, double length, GateWeights) {
+void GuideSink::add(int pixel, const Rgb& value, double length, GateUse) {
   if (pixel != pixel_) square_sums();
   pixel_ = pixel;
   part_of_sums_ = std::isfinite(camera_part_) ? camera_part_ : 0;

@@ -90,7 +90,7 @@ class GuideSink final : public Sink {
   void note_boundary(int, int, double camera_part) override { camera_part_ = camera_part; }
   void note_guide(int table, double x) override;
   void bind(const LocalDifferential& differential) override;
-  void add(int pixel, const Rgb& value, double length, GateWeights use) override;
+  void add(int pixel, const Rgb& value, double length, GateUse use) override;
 
   std::vector<GuideRecord> records;
 

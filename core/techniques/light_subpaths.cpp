@@ -51,8 +51,8 @@ void LightSubpaths::join(int pixel, const Rgb& throughput) {
     if (value.is_black()) continue;
     light_.append(scene_, i, path_);
     if (worker_.contributes(path_) && worker_.visible(x, z.point))
-      worker_.emit(path_, lands_on, value, path_.length.back(),
-                   worker_.balance.light(path_, lands_on, camera_vertices, pairs_));
+      worker_.emit(path_, lands_on, value * worker_.balance.light(path_, lands_on, camera_vertices),
+                   path_.length.back(), GateUse::value_and_slope);
     light_.remove(i, path_);
   }
 }

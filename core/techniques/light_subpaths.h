@@ -11,12 +11,10 @@ namespace isochron {
 /// Not of captures.
 class LightSubpaths {
  public:
-  /// `pairs`: see Balance::standard.
-  LightSubpaths(Worker& worker, bool pairs)
+  explicit LightSubpaths(Worker& worker)
       : worker_(worker),
         scene_(worker.scene),
         reach_{worker.gates.lower(), worker.gates.upper()},
-        pairs_(pairs),
         path_(worker.options.max_bounces) {}
 
   /// One camera path from `pixel` and one light subpath, with all their joints. Contributions to the pixel are scaled by `scale`. Those of
@@ -30,7 +28,6 @@ class LightSubpaths {
   Worker& worker_;
   const PreparedScene& scene_;
   const LengthRange reach_;
-  const bool pairs_;
   Path path_;
   LightWalk light_;
 };

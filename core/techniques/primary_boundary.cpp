@@ -96,12 +96,12 @@ void PrimaryBoundary::sample(double scale, Rng& rng) {
       for (const GatheredLight& light :
            light_side_.gather(eye_, *x1, {&before, 1}, worker_.options.max_bounces, walk_rng)) {
         worker_.sink.note_boundary(light.bounces, edge->face[0], 0);
-        worker_.sink.add(pixel, light.value * (-sign * factor), light.whole_length(before.length), kValueOnly);
+        worker_.sink.add(pixel, light.value * (-sign * factor), light.whole_length(before.length), GateUse::value_only);
       }
     }
     follow(
         *x1, pixel, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng,
-        [&](const Rgb& value, double length) { worker_.sink.add(pixel, value * (sign * factor), length, kValueOnly); });
+        [&](const Rgb& value, double length) { worker_.sink.add(pixel, value * (sign * factor), length, GateUse::value_only); });
     if (moves) worker_.sink.bind(differential);
   }
   worker_.sink.note_guide(table, x);
@@ -110,7 +110,7 @@ void PrimaryBoundary::sample(double scale, Rng& rng) {
 void PrimaryBoundary::sample_pixel_border(double scale, Rng& rng) {
   const CameraModel& camera = scene_.camera;
   const int table = BoundaryGuide::table(Technique::pixel_border);
-  const double x = guide_.warp(table).sample(rng.uniform());
+  const double x = guide_.warp(table).sample(rng.fine_uniform());
   // Pixels in rows, with one column and one row more than the image has, for the borders at its end.
   const int borders = 2 * (camera.width + 1) * (camera.height + 1);
   const double place = x * borders;
@@ -128,8 +128,8 @@ void PrimaryBoundary::sample_pixel_border(double scale, Rng& rng) {
   const double factor = scale * borders / guide_.warp(table).density(x);
   follow(*x1, GatePick::kImage, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng,
          [&](const Rgb& value, double length) {
-           if (has_after) worker_.sink.add(pixel, value * factor, length, kValueOnly);
-           if (has_before) worker_.sink.add(before, value * -factor, length, kValueOnly);
+           if (has_after) worker_.sink.add(pixel, value * factor, length, GateUse::value_only);
+           if (has_before) worker_.sink.add(before, value * -factor, length, GateUse::value_only);
          });
   worker_.sink.note_guide(table, x);
 }

@@ -333,7 +333,7 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
                             : found == Found::from_edge ? shares.from_edge
                                                         : shares.from_camera;
       worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0], 1 - shares.from_edge);
-      worker_.sink.add(c.pixel, c.value * e.value * weight, e.whole_length(before_[i].length), kValueOnly);
+      worker_.sink.add(c.pixel, c.value * e.value * weight, e.whole_length(before_[i].length), GateUse::value_only);
     }
   }
 }

@@ -8,10 +8,10 @@ constexpr std::size_t kCachedTriangles = 1 << 13;
 
 }  // namespace
 
-StandardPaths::StandardPaths(Worker& worker, bool pairs)
+StandardPaths::StandardPaths(Worker& worker)
     : worker_(worker),
       large_(worker.scene.scene.triangles.size() > kCachedTriangles),
-      slots_{Slot(worker, pairs), Slot(worker, pairs)} {}
+      slots_{Slot(worker), Slot(worker)} {}
 
 void StandardPaths::start(int pixel, double scale, Rng& rng) {
   if (worker_.scene.captures()) {
@@ -41,11 +41,11 @@ void StandardPaths::finish() {
 
 void StandardPaths::Slot::run_at_wall(int pixel, double scale, Rng& rng) {
   pixel_ = pixel;
-  scale_ = scale * worker_.start_path(pixel, rng, worker_.standard_first_step_probability());
+  scale_ = scale * worker_.start_path(pixel, rng, worker_.area_steps.standard_first);
   if (scale_ == 0) return;
   std::swap(path_, worker_.path);
   walk_standard(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()}, rng,
-                Visitor{*this}, worker_.walk_step_probability());
+                Visitor{*this}, worker_.area_steps.later);
 }
 
 void StandardPaths::Slot::start(int pixel, double scale, const Rng& rng) {
@@ -61,13 +61,14 @@ StandardPaths::Slot::Walk StandardPaths::Slot::begin(int pixel, double scale, Rn
   pixel_ = pixel;
   scale_ = scale;
   Walk walk(worker_, path_, pixel, worker_.options.max_bounces, {worker_.gates.lower(), worker_.gates.upper()},
-            Visitor{*this}, worker_.walk_step_probability());
+            Visitor{*this}, worker_.area_steps.later);
   walk.begin_at_camera(pixel, rng);
   return walk;
 }
 
 void StandardPaths::Slot::emit(const Rgb& value) {
-  worker_.emit(path_, pixel_, value * scale_, path_.length.back(), worker_.balance.standard(path_, pixel_, pairs_));
+  worker_.emit(path_, pixel_, value * (scale_ * worker_.balance.standard(path_, pixel_)), path_.length.back(),
+               GateUse::value_and_slope);
 }
 
 }  // namespace isochron

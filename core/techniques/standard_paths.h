@@ -11,8 +11,7 @@ namespace isochron {
 /// from main memory, the other continues.
 class StandardPaths {
  public:
-  /// `pairs`: see Balance::standard.
-  StandardPaths(Worker& worker, bool pairs);
+  explicit StandardPaths(Worker& worker);
 
   /// Starts a path through `pixel`; contributions are scaled by `scale`. It ends during later calls, of finish() at the
   /// latest.
@@ -23,7 +22,7 @@ class StandardPaths {
   /// Holds the path under way, if any.
   class Slot {
    public:
-    Slot(Worker& worker, bool pairs) : worker_(worker), path_(worker.options.max_bounces), pairs_(pairs) {}
+    explicit Slot(Worker& worker) : worker_(worker), path_(worker.options.max_bounces) {}
     Slot(const Slot&) = delete;
     Slot& operator=(const Slot&) = delete;
 
@@ -48,7 +47,6 @@ class StandardPaths {
 
     Worker& worker_;
     Path path_;
-    const bool pairs_;
     int pixel_ = -1;
     double scale_ = 0;
     Rng rng_{Stream{}, 0, 0};

@@ -40,7 +40,7 @@ class StandardWalk {
     w_o_ = path_.vertex[path_.size() - 2].p - path_.back().p;
     distance_o_ = length(w_o_);
     w_o_ *= 1 / distance_o_;
-    if (worker_.scene.is_hidden(path_.back().triangle)) hidden_share_ = 0;
+    if (hidden_share_ > 0 && worker_.scene.hidden.holds(path_.back().triangle)) hidden_share_ = 0;
     if (worker_.scene.emits(path_.back().triangle)) take_emission(1);
     draw_light(rng);
     pick_light();
@@ -67,7 +67,7 @@ class StandardWalk {
     const SurfacePoint y = scene.point_on_emitter(light_, u1, u2);
     const Scattering s(x, w_o_, distance_o_, y.p);
     const bool goes_on = bounce_ < max_bounces_;
-    const double hidden = goes_on && !scene.transparent(x.triangle) ? hidden_share() : 0;
+    const double hidden = goes_on && !scene.transparent(x.triangle) ? scene.hidden.step(hidden_share_, bounce_ + 1 == max_bounces_) : 0;
     const bool has_extent = !is_light(light_);
     const double cos_y = has_extent ? -dot(y.n, s.w_i) : 1;
     if (cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {
@@ -110,12 +110,12 @@ class StandardWalk {
     const bool emits = scene.emits(x->triangle);
     if (emits || hidden_ > 0) {
       const double to_area = std::abs(dot(x->n, w_o_)) / (distance_o_ * distance_o_);
-      if (hidden_ > 0 && by_area_ != scene.hidden_takes(x->triangle, hidden_, pdf_ * to_area)) return false;
+      if (hidden_ > 0 && by_area_ != scene.hidden.takes(x->triangle, hidden_, pdf_ * to_area)) return false;
       const double pdf_walk = step_pdf(pdf_ * to_area, x->triangle, hidden_);
       if (hidden_ > 0) throughput_ *= (by_area_ ? 1 : pdf_) * to_area / pdf_walk;
       if (emits) take_emission(bounce_ == 0 ? 1 : pdf_walk / (pdf_walk + scene.emitter_pdf(x->triangle)));
     }
-    if (hidden_share_ > 0 && scene.is_hidden(x->triangle)) hidden_share_ = 0;
+    if (hidden_share_ > 0 && scene.hidden.holds(x->triangle)) hidden_share_ = 0;
     hidden_ = 0;
     return bounce_++ < max_bounces_ && russian_roulette(throughput_, bounce_ - 1, rng);
   }
@@ -124,14 +124,9 @@ class StandardWalk {
   Vec3 direction() const { return -w_o_; }
 
  private:
-  /// Of the next step: if it is the last that can lead to what changes, all, for else the path adds nothing to derivatives.
-  double hidden_share() const {
-    return bounce_ + 1 == max_bounces_ && worker_.scene.only_area_sampled_has_gradient ? std::ceil(hidden_share_)
-                                                                                       : hidden_share_;
-  }
   /// Density per area of a step's end, which the vertex before sees, with area sampling of probability `hidden`.
   double step_pdf(double pdf_bsdf, int triangle, double hidden) const {
-    return hidden == 0 ? pdf_bsdf : worker_.scene.next_vertex_pdf(triangle, hidden, pdf_bsdf);
+    return hidden == 0 ? pdf_bsdf : worker_.scene.hidden.next_vertex_pdf(triangle, hidden, pdf_bsdf);
   }
   /// Takes the step by area sampling; intersect() continues. False if the walk ends.
   bool step_to_hidden(const SurfacePoint& x, Rng& rng) {

@@ -14,7 +14,7 @@ namespace isochron {
 /// Which lengths a pass draws for its connections.
 struct GatePass {
   bool value = false;  ///< lengths drawn from W
-  GateWeights use;     ///< how the gate enters contributions of those
+  GateUse use = GateUse::value_and_slope;  ///< how the gate enters contributions of those
   bool pairs = false;  ///< lengths drawn in pairs from dW
   PairPart part = PairPart::smooth;
   bool coupled = true;

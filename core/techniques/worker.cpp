@@ -11,6 +11,7 @@ Worker::Worker(const PreparedScene& prepared, const GateSet& gate_set, const Est
       balance(prepared, gate_pick),
       sink(target),
       differential_sink(target.differential()),
+      area_steps(prepared.hidden.steps(estimator, differential_sink)),
       path(estimator.max_bounces) {}
 
 void Worker::start_at_sensor(Path& sensor_path, int pixel) const {
@@ -47,19 +48,19 @@ double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
   const double shortest = r + length(x.p - scene.scene.capture->spot_of(pixel).p) * scene.least_index();
   if (path.length.back() + shortest > gates.upper()) return 0;
   const double received = scene.importance(pixel, d / r) * solid_angle_to_area(s.p, x);
-  if (!(received > 0) || by_area != scene.hidden_takes(x.triangle, hidden, received)) return 0;
+  if (!(received > 0) || by_area != scene.hidden.takes(x.triangle, hidden, received)) return 0;
   if (by_area && !visible(s, x)) return 0;
   path.push(scene, x, r);
-  return received / scene.next_vertex_pdf(x.triangle, hidden, received);
+  return received / scene.hidden.next_vertex_pdf(x.triangle, hidden, received);
 }
 
-void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use) {
+void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, GateUse use) {
   sink.note_path(p);
   if (differential_sink) {
     differentiate_path(scene, pixel, p.vertex.data(), p.size(), false, differential);
     if (differential.empty()) return;
     sink.bind(differential);
-    if (keeps_length(p)) use.slope = 0;
+    if (keeps_length(p)) use = GateUse::value_only;
   }
   sink.add(pixel, value, length, use);
 }
@@ -79,7 +80,7 @@ void Worker::emit_length_flux(const Path& p, int pixel, const Rgb& value, double
   differential.add_length(of_length, 1);
   if (differential.empty()) return;
   sink.bind(differential);
-  sink.add(pixel, value, length, kValueOnly);
+  sink.add(pixel, value, length, GateUse::value_only);
 }
 
 std::optional<NextVertex> trace_next_vertex(Worker& worker, const SurfacePoint& x, const Vec3& w_back, Rgb& throughput,

@@ -13,10 +13,6 @@
 
 namespace isochron {
 
-/// EstimatorOptions::hidden of captures with other shapes: of images, of derivatives (isochron_hidden_share: the least loss against
-/// the best share of each scene and number of bounces).
-inline constexpr double kHiddenShareOfImages = 0.5, kHiddenShareOfDerivatives = 0.75;
-
 /// The state of one partition; not shared between threads. What it refers to must outlive it.
 struct Worker {
   const PreparedScene& scene;
@@ -26,6 +22,7 @@ struct Worker {
   Balance balance;
   Sink& sink;
   const bool differential_sink;  ///< sink.differential()
+  const AreaSteps area_steps;
   Path path;
   LocalDifferential differential, of_length;
   std::vector<int> candidates;              ///< triangles that may hold an arc
@@ -77,28 +74,7 @@ struct Worker {
   /// by the reflection of the wall or by area sampling, whichever has the larger density there (maximum heuristic). Returns what
   /// the pixel makes of radiance from x1, over density; 0: there is no x1. `hidden`: probability of area sampling.
   double start_path(int pixel, Rng& rng, double hidden);
-  double start_path(int pixel, Rng& rng) { return start_path(pixel, rng, first_step_probability()); }
-
-  // Probabilities that a step is drawn by area (theory section 9), so far as there are area-sampled shapes.
-
-  /// Of the first step from a capture's wall.
-  double first_step_probability() const {
-    if (scene.hidden.empty()) return 0;
-    const double share = differential_sink ? kHiddenShareOfDerivatives : kHiddenShareOfImages;
-    return options.hidden.value_or(scene.area_sampling_alone ? 1 : share);
-  }
-  /// The same for paths that contribute themselves, not by a boundary at their end: 1 where their only bounce must be on what
-  /// changes.
-  double standard_first_step_probability() const {
-    const bool all = differential_sink && options.max_bounces == 1 && scene.only_area_sampled_x1_has_gradient;
-    return all ? 1 : first_step_probability();
-  }
-  /// Of later steps: EstimatorOptions::hidden where it is of use. That is for derivatives, to which paths that miss these shapes
-  /// add nothing, and where there are other shapes.
-  double walk_step_probability() const {
-    const bool of_use = differential_sink && !scene.hidden.empty() && !scene.all_visible_is_area_sampled;
-    return of_use ? options.hidden.value_or(scene.captures() ? kHiddenShareOfDerivatives : 0) : 0;
-  }
+  double start_path(int pixel, Rng& rng) { return start_path(pixel, rng, area_steps.first); }
 
   /// Whether the complete path p (last vertex on an emitter) contributes: to images always, to derivatives where it can
   /// have a gradient.
@@ -111,7 +87,7 @@ struct Worker {
   bool keeps_length(const Path& p) const { return differential_sink && p.size() > 2 && scene.flows.keep_length(); }
 
   /// Hands the complete path p to the sink.
-  void emit(const Path& p, int pixel, const Rgb& value, double length, GateWeights use);
+  void emit(const Path& p, int pixel, const Rgb& value, double length, GateUse use);
   /// Passes only the change of its length to the sink, for one gate: a member of a coupled pair.
   void emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value);
   /// Passes value x the change of its length x the gates' values to the sink: what a flow that keeps the length carries across

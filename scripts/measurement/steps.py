@@ -67,7 +67,7 @@ STEPS = {
     "boundary": Step((_built("boundary", _csv("boundary"), "64"),)),
     "hidden_share": Step((_built("hidden_share", _csv("hidden_share"), "16"),)),
     "light_share": Step((_built("light_share", _csv("light_share"), "4"),)),
-    "share_trial": Step((_built("share_trial", _csv("share_trial"), "2"),)),
+    "technique_trial": Step((_built("technique_trial", _csv("technique_trial"), "4"),)),
     "capture_cost": Step((_script("capture_cost.py", "measure", _csv("capture_cost")),)),
     "stated_errors": Step((_script("error_coverage.py", "measure", _csv("error_coverage")),)),
     "intervals": Step((_script("interval_coverage.py", "measure", _csv("interval_coverage")),)),

@@ -237,16 +237,14 @@ def light_share(folder):
     return markdown(["", "connections", "light", *shares], lines)
 
 
-def share_trial(folder):
-    shares = ("0", "0.25", "0.5", "0.75", "1")
+def technique_trial(folder):
     lines = []
-    for r in read_rows(folder / "share_trial.csv"):
-        chosen = ", ".join(f"{s} ({r[f'trials for {s}']})" for s in shares if int(r[f"trials for {s}"]))
-        costs = [float(r[s]) for s in shares]
+    for r in read_rows(folder / "technique_trial.csv"):
+        costs = [float(r[technique]) for technique in ("standard", "connections")]
         noise = min(costs) <= 0
-        lines.append([f"{r['scene']}, {r['of']}", chosen, "noise" if noise else number(r["cost of trials"]),
+        lines.append([f"{r['scene']}, {r['of']}", r["trials for connections"], "noise" if noise else number(r["cost of trials"]),
                       *("noise" if c <= 0 else number(c) for c in costs)])
-    return markdown(["", "chosen (trials)", "times the best", *shares], lines)
+    return markdown(["", "trials for connections, of 8", "times the better", "standard", "connections"], lines)
 
 
 def checks(folder):
@@ -262,7 +260,7 @@ def _of(name, table_of):
 
 TABLES = {
     **{f.__name__: f for f in (figure8, figure9, charts, solvers, gate_width, growth, boundary, contact, tails, set_up, speed,
-                               growth_of_cost, hidden_share, light_share, share_trial, checks)},
+                               growth_of_cost, hidden_share, light_share, technique_trial, checks)},
     "cubes": _of("cube_cost", cube_cost.table_of),
     "captures": _of("capture_cost", capture_cost.table_of),
     "stated_errors": _of("error_coverage", error_coverage.tables_of),

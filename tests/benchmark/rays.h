@@ -23,7 +23,7 @@ struct RecordedRay {
 class NoSink final : public Sink {
  public:
   bool differential() const override { return false; }
-  void add(int, const Rgb&, double, GateWeights) override {}
+  void add(int, const Rgb&, double, GateUse) override {}
 };
 
 /// Keeps the rays of standard walks along a path.

@@ -160,7 +160,7 @@ void BM_AdjointScatter(benchmark::State& state) {
   for (auto _ : state) {
     sink.bind(differentials[i]);
     sink.add(static_cast<int>(i), Rgb(1.0), 5 + 4 * static_cast<double>(i) / static_cast<double>(four.paths.size()),
-             GateWeights{});
+             GateUse{});
     i = (i + 1) % four.paths.size();
   }
   double sum = 0;

@@ -118,7 +118,7 @@ TEST_F(GateKinds, ModulatedInMetres) {
     EXPECT_NEAR(slope, -k * std::sin(k * 1.7 - phase), 1e-13);
   });
   EXPECT_TRUE(e.gates.unbounded());
-  EXPECT_EQ(sampling_mix(e.estimator, gates, Scene()).image, 0);
+  EXPECT_FALSE(sampling_mix(e.estimator, gates, Scene()).image_connections);
   const ExrNotes notes = exr_notes(e.gates);
   EXPECT_EQ(notes[0].second, "0 90 180 270");
   EXPECT_EQ(notes[1].second, "degrees");

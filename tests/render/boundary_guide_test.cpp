@@ -162,10 +162,10 @@ TEST(BoundaryGuide, SinkSumsBeforeItSquares) {
     const int samples = columns == 1 ? 1 : 4096;
     for (int i = 0; i < samples; ++i) {
       sink.bind(differential);
-      sink.add(3, Rgb(1, 0, 0), 5, kValueOnly);
-      sink.add(3, Rgb(-0.5, 0, 0), 5, kValueOnly);
-      sink.add(3, Rgb(0, 4, 0), 7, kValueOnly);
-      sink.add(4, Rgb(0, 0, -2), 5, kValueOnly);
+      sink.add(3, Rgb(1, 0, 0), 5, GateUse::value_only);
+      sink.add(3, Rgb(-0.5, 0, 0), 5, GateUse::value_only);
+      sink.add(3, Rgb(0, 4, 0), 7, GateUse::value_only);
+      sink.add(4, Rgb(0, 0, -2), 5, GateUse::value_only);
       sink.note_guide(BoundaryGuide::table(Technique::primary_edge), 0.5);
     }
     double mean = 0;

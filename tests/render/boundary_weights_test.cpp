@@ -59,7 +59,7 @@ namespace {
 
 struct NoSink final : Sink {
   bool differential() const override { return true; }
-  void add(int, const Rgb&, double, GateWeights) override {}
+  void add(int, const Rgb&, double, GateUse) override {}
 };
 
 /// One that has learned that some edges count more, by whichever technique.

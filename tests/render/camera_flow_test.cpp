@@ -167,7 +167,7 @@ struct VelocitySink final : Sink {
     velocity = 0;
     for (const VertexGradient& g : differential.vertices) velocity += dot(g.log_f, Vec3{0.3, 1, 0.5});
   }
-  void add(int, const Rgb&, double, GateWeights) override {
+  void add(int, const Rgb&, double, GateUse) override {
     largest = std::max(largest, std::abs(velocity));
     ++segments;
   }

@@ -173,13 +173,13 @@ TEST_P(HardLight, MatchesQuadrature) {
   constexpr int kBatches = 32, kSamples = 40;
   constexpr double kQuadrature = 0.002;
   double least_error = INFINITY, least_relative[2] = {INFINITY, INFINITY};
-  for (const double share : {1.0, 0.3, 0.0}) {
+  for (const bool connections : {true, false}) {
     EstimatorOptions options{.max_bounces = 1};
-    options.mix = SamplingMix{share, share};
+    options.mix = SamplingMix{connections, connections};
     const Renderer renderer(scene, gates, options, &basis);
     const Estimate image = image_means(renderer, 1, kSamples, kBatches, {61, 0, 0})[0];
     EXPECT_LT(std::abs(image.mean - exact_image), 4.5 * image.standard_error + kQuadrature * exact_image)
-        << "share " << share << ": " << image.mean << " +- " << image.standard_error << ", exact " << exact_image;
+        << "connections " << connections << ": " << image.mean << " +- " << image.standard_error << ", exact " << exact_image;
     least_error = std::min(least_error, image.standard_error);
     std::vector<std::vector<Estimate>> terms[3];
     for (int t = 0; t < 3; ++t)
@@ -194,7 +194,7 @@ TEST_P(HardLight, MatchesQuadrature) {
       }
       const double wanted = m < 2 ? exact[m] : 0;  // the wall has no part in it
       EXPECT_LE(std::abs(total - wanted), 4.5 * error + kQuadrature * std::abs(wanted))
-          << "share " << share << " motion " << m << ": " << total << " +- " << error << ", exact " << wanted;
+          << "connections " << connections << " motion " << m << ": " << total << " +- " << error << ", exact " << wanted;
       if (m < 2) least_relative[m] = std::min(least_relative[m], scale > 0 ? error / scale : 0);
     }
   }
@@ -240,15 +240,15 @@ TEST(ShortestPath, GatesThatEndThereAreExactlyDark) {
       make_basis(scene, {translate(scene, "floor", {0, 1, 0}), translate(scene, "lamp", {0.3, 1, 0}),
                          change_material(scene, "floor", "albedo")});
   for (const double width : {1e-6, 3e-3, 0.3})
-    for (const double share : {0.0, 0.3, 1.0}) {
+    for (const bool connections : {false, true}) {
       EstimatorOptions options{.max_bounces = 2};
-      options.mix = SamplingMix{share, share};
+      options.mix = SamplingMix{connections, connections};
       const auto lit = [&](double center) {
         return non_zero_values(scene, GateSet(GateShape::boxcar(width), {center}), basis, options);
       };
-      EXPECT_EQ(lit(shortest - 0.5 * width), 0) << "width " << width << ", share " << share;
+      EXPECT_EQ(lit(shortest - 0.5 * width), 0) << "width " << width << ", connections " << connections;
       if (width > 1e-3) {
-        EXPECT_GT(lit(shortest + 0.5 * width), 0) << "width " << width << ", share " << share;
+        EXPECT_GT(lit(shortest + 0.5 * width), 0) << "width " << width << ", connections " << connections;
       }
     }
 }

@@ -139,14 +139,6 @@ TEST(LengthKeeping, ThreeBounces) {
                      {.max_bounces = 3, .sampling = Sampling::ellipsoidal, .guiding_samples = 64}, 32, 64);
 }
 
-TEST(LengthKeeping, SharesSamplesWithStandardSampling) {
-  const Scene scene = box_with_panel();
-  EstimatorOptions options{.max_bounces = 3, .guiding_samples = 64};
-  options.mix = SamplingMix{0.3, 0.3};
-  compare_with_pairs(scene, {translate(scene, "light", {0.4, 0.5, 0.3}), translate(scene, "panel", {0.3, 0.2, 0.1})},
-                     GateSet(GateShape::gaussian(0.1), {5.0, 5.5, 6.0}), options, 32, 64);
-}
-
 void compare_dirac(const Scene& scene, const std::vector<Motion>& motions, const std::vector<double>& lengths,
                    const EstimatorOptions& options, double step, int samples, int batches) {
   const GateSet gates(GateShape::dirac(), lengths);

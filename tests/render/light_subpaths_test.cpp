@@ -16,7 +16,7 @@ namespace {
 
 struct LightCase {
   const char* name;
-  double share;  ///< of ellipsoidal connections
+  bool connections;
   GateShape gate;
   int samples;  ///< of derivatives, per batch; twice as many without light subpaths
 };
@@ -24,9 +24,9 @@ void PrintTo(const LightCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-EstimatorOptions with_light(int bounces, double share, double light) {
+EstimatorOptions with_light(int bounces, bool connections, double light) {
   EstimatorOptions options{.max_bounces = bounces};
-  options.mix = SamplingMix{share, share};
+  options.mix = SamplingMix{connections, connections};
   options.light = light;
   return options;
 }
@@ -51,10 +51,10 @@ void expect_equal_images(const Scene& scene, const GateSet& gates, const Estimat
 class LightSubpathsIn : public ::testing::TestWithParam<LightCase> {};
 
 TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
-  const auto& [name, share, shape, samples] = GetParam();
+  const auto& [name, connections, shape, samples] = GetParam();
   const Scene scene = glossy_validation_scene(16, 0.5, diffuse(Rgb(0.6)));
   const GateSet gates(shape, {5.0, 6.5});
-  const EstimatorOptions ours = with_light(3, share, 0.6);
+  const EstimatorOptions ours = with_light(3, connections, 0.6);
   expect_equal_images(scene, gates, ours);
   const TangentBasis basis =
       make_basis(scene, {translate(scene, "light", {0.4, 0, 0.3}), change_material(scene, "panel", "roughness"),
@@ -84,16 +84,15 @@ TEST_P(LightSubpathsIn, ImagesAndDerivativesAreThoseOfStandardSampling) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Mixes, LightSubpathsIn,
-                         ::testing::Values(LightCase{"standard", 0, GateShape::gaussian(1.2), 24},
-                                           LightCase{"combined", 0.3, GateShape::gaussian(1.2), 32},
-                                           LightCase{"connections", 1, GateShape::gaussian(0.4), 24},
-                                           LightCase{"jumps", 1, GateShape::boxcar(0.5), 60},
-                                           LightCase{"boxcar", 0, GateShape::boxcar(1.5), 30}),
+                         ::testing::Values(LightCase{"standard", false, GateShape::gaussian(1.2), 24},
+                                           LightCase{"connections", true, GateShape::gaussian(0.4), 24},
+                                           LightCase{"jumps", true, GateShape::boxcar(0.5), 60},
+                                           LightCase{"boxcar", false, GateShape::boxcar(1.5), 30}),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST(LightSubpaths, LeaveGlassInTheDirectionsOfImportance) {
   expect_equal_images(glossy_validation_scene(16, 0.5, glass(0.3, 1.5)), GateSet(GateShape::gaussian(1.5), {5.0, 7.0}),
-                      with_light(4, 0, 0.5), 128);
+                      with_light(4, false, 0.5), 128);
 }
 
 TEST(LightSubpaths, OfLightsWithoutAnExtent) {
@@ -105,7 +104,7 @@ TEST(LightSubpaths, OfLightsWithoutAnExtent) {
                   .direction = normalize(Vec3{0.2, -1, -0.3}),
                   .intensity = Rgb(4)};
   scene.lights = {point, spot};
-  expect_equal_images(scene, GateSet(GateShape::gaussian(1.5), {3.0, 5.0}), with_light(3, 0, 0.5));
+  expect_equal_images(scene, GateSet(GateShape::gaussian(1.5), {3.0, 5.0}), with_light(3, false, 0.5));
 }
 
 TEST(LightSubpaths, AreTakenWhereTheyHelp) {

@@ -78,7 +78,7 @@ TEST_P(Sinks, AdjointIsTheTransposeOfTheJacobian) {
     const GateSet gates(s.shape, {4.9, 5.6, 5.8});
     const Renderer renderer(scene, gates, {.max_bounces = 3, .sampling = s.sampling, .antithetic = s.antithetic},
                             &basis);
-    ASSERT_EQ(renderer.mix().interior, s.sampling == Sampling::ellipsoidal ? 1 : 0);
+    ASSERT_EQ(renderer.mix().interior_connections, s.sampling == Sampling::ellipsoidal);
     for (const Term term : kTerms) {
       SCOPED_TRACE(std::string(s.name) + (s.sampling == Sampling::standard ? ", standard, " : ", ellipsoidal, ") +
                    name(term));

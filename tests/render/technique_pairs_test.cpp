@@ -29,7 +29,8 @@ void expect_pairs_agree(const std::string& what, const std::vector<BySet>& found
 
 struct PathSet {
   const char* name;
-  double connections, light;
+  bool connections;
+  double light;
   int samples;  ///< of the derivative, per batch; a third of them for images
 };
 
@@ -37,10 +38,10 @@ class TechniquePairs : public ::testing::TestWithParam<bool> {};
 
 TEST_P(TechniquePairs, OfPathsAgree) {
   constexpr int kBatches = 24;
-  constexpr PathSet kSets[] = {{"standard sampling", 0, 0, 40},
-                               {"light subpaths", 0, 0.9, 40},
-                               {"connections", 1, 0, 40},
-                               {"connections with light subpaths", 1, 0.9, 40}};
+  constexpr PathSet kSets[] = {{"standard sampling", false, 0, 40},
+                               {"light subpaths", false, 0.9, 40},
+                               {"connections", true, 0, 40},
+                               {"connections with light subpaths", true, 0.9, 40}};
   const Scene scene = glossy_validation_scene(16, 0.5, diffuse(Rgb(0.6)));
   const TangentBasis basis = make_basis(scene, {translate(scene, "light", {0.4, 0, 0.3})});
   const GateSet gates(GateShape::gaussian(GetParam() ? 0.3 : 1.2), {5.5});

@@ -18,13 +18,11 @@ struct PathSink final : Sink {
     Path path;
     int pixel;
     Rgb value;
-    double part = 1;  ///< of the value of a gate
   };
   std::vector<Found> found;
   bool differential() const override { return false; }
   void note_path(const Path& path) override { found.push_back({path, -1, {}}); }
-  void add(int pixel, const Rgb& value, double, GateWeights use) override {
-    found.back().part = use.value;
+  void add(int pixel, const Rgb& value, double, GateUse) override {
     found.back().pixel = pixel;
     found.back().value = value;
   }
@@ -55,7 +53,7 @@ struct Finder {
         worker(prepared, gates, options, pick, sink) {}
 
   void find_by_standard_sampling(int paths) {
-    StandardPaths standard(worker, false);
+    StandardPaths standard(worker);
     for (int i = 0; i < paths; ++i) {
       Rng rng(Stream{test_seed(1), 0, 0}, i, 0);
       standard.start(i % prepared.pixels(), 1, rng);
@@ -113,7 +111,7 @@ class Weights : public ::testing::TestWithParam<const char*> {
   Finder finder() const { return Finder(std::string(GetParam()) == "glass" ? glass(0.3, 1.5) : diffuse(Rgb(0.6))); }
 };
 
-TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
+TEST_P(Weights, AddUpToOne) {
   Finder f = finder();
   f.find_by_standard_sampling(4000);
   f.find_by_connections(2000, [](auto& connections, int pixel, Rng& rng) {
@@ -121,51 +119,47 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
     connections.sample_from_camera(1, rng);
   });
   ASSERT_GT(f.sink.found.size(), 1000u);
-  int shared = 0, shared_by_light = 0;
+  int shared_by_light = 0, found_by_arcs = 0;
   for (const PathSink::Found& found : f.sink.found) {
-    f.worker.balance.rates.pair_coupling_gain = 7;
-    for (const double share : {0.3, 0.9}) {
-      f.worker.balance.rates.ellipsoidal_share = share;
-      const GateWeights standard = f.worker.balance.standard(found.path, found.pixel, true);
-      const double of_value = part_of_connections(f, found, {});
-      EXPECT_NEAR(of_value + standard.value, 1, 1e-9);
-      for (int gate = 0; gate < 3; ++gate)
-        EXPECT_NEAR(part_of_connections(f, found, pair_target(gate)) + standard.slope, 1, 1e-9);
-      shared += of_value > 0.01 && standard.value > 0.01;
-    }
-    // Of light subpaths, by every joint.
-    for (const double light : {0.25, 3.0}) {
+    // Of standard sampling and light subpaths, by every joint.
+    for (const double light : {0.0, 0.25, 3.0}) {
       f.worker.balance.rates.light = light;
-      for (const double share : {0.0, 0.3}) {
-        f.worker.balance.rates.ellipsoidal_share = share;
-        GateWeights sum = f.worker.balance.standard(found.path, found.pixel, true);
-        double of_light = 0;
-        for (int joint = 0; joint <= found.path.size() - 3; ++joint) {
-          const GateWeights part = f.worker.balance.light(found.path, found.pixel, joint, true);
-          of_light += part.value;
-          sum.slope += part.slope;
-        }
-        sum.value += of_light;
-        const double by_arcs = share > 0 ? part_of_connections(f, found, {}) : 0;
-        EXPECT_NEAR(by_arcs + sum.value, 1, 1e-9);
-        const double pairs = share > 0 ? part_of_connections(f, found, pair_target(1)) : 0;
-        EXPECT_NEAR(pairs + sum.slope, 1, 1e-9);
-        shared_by_light += of_light > 0.01 && of_light < 0.99;
-      }
+      double of_light = 0;
+      for (int joint = 0; joint <= found.path.size() - 3; ++joint)
+        of_light += f.worker.balance.light(found.path, found.pixel, joint);
+      EXPECT_NEAR(f.worker.balance.standard(found.path, found.pixel) + of_light, 1, 1e-9);
+      shared_by_light += of_light > 0.01 && of_light < 0.99;
     }
-    f.worker.balance.rates.light = 0;
-    // By themselves, and at jumps, which standard sampling does not find.
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
-    f.worker.balance.rates.ellipsoidal_share = 1;
     for (const bool light : {false, true}) {
       f.worker.balance.rates.light_connections = light;
-      for (const TargetLength& target : {TargetLength{}, pair_target(1), pair_target(2, true)})
+      for (const TargetLength& target : {TargetLength{}, pair_target(0), pair_target(1), pair_target(2, true)})
         EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
     }
     f.worker.balance.rates.light_connections = false;
+    ++found_by_arcs;
+  }
+  EXPECT_GT(shared_by_light, 500);
+  EXPECT_GT(found_by_arcs, 500);
+}
+
+/// Of the two ways to end a path on an emitter's border.
+TEST_P(Weights, OfBordersAddUpToOne) {
+  Finder f = finder();
+  f.find_by_standard_sampling(4000);
+  int shared = 0;
+  for (const PathSink::Found& found : f.sink.found) {
+    const int last = found.path.size() - 1;
+    const double pdf = pdf_on_arc(f.prepared, found.path, last - 1);
+    if (last < 2 || !(pdf > 0) || !f.prepared.outside(found.path.vertex[last - 2], found.path.vertex[last - 1])) continue;
+    const Vec3 tangent = normalize(f.prepared.edges(found.path.back().triangle)[0]);
+    const auto part = [&](std::optional<double> pdf_of_arc) {
+      return f.worker.balance.border(found.path, found.pixel, found.path.length.back(), tangent, 0.7, pdf_of_arc);
+    };
+    EXPECT_NEAR(part(pdf) + part({}), 1, 1e-9);
+    shared += part(pdf) > 0.01 && part({}) > 0.01;
   }
   EXPECT_GT(shared, 500);
-  EXPECT_GT(shared_by_light, 500);
 }
 
 /// Of two bounces' paths, surface arcs come from the camera and serve the whole image, emitter arcs serve a pixel: what each
@@ -173,9 +167,8 @@ TEST_P(Weights, OfStandardSamplingAndConnectionsAddUpToOne) {
 TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
   Finder f = finder();
   f.find_by_standard_sampling(4000);
-  f.worker.balance.rates.ellipsoidal_share = 1;
   int compared = 0;
-  for (const auto& [path, pixel, value, part] : f.sink.found) {
+  for (const auto& [path, pixel, value] : f.sink.found) {
     if (path.size() != 3) continue;
     const double surface = pdf_on_arc(f.prepared, path, 1), emitter = pdf_on_arc(f.prepared, path, 2);
     if (!(surface > 0 && emitter > 0)) continue;
@@ -204,13 +197,12 @@ TEST_P(Weights, OfArcsAreInProportionToTheirDensities) {
 TEST_P(Weights, AreThoseOfWhatConnectionsHandOn) {
   for (const bool from_camera : {true, false}) {
     Finder f = finder();
-    f.worker.balance.rates.ellipsoidal_share = 0.3;
     f.find_by_connections(4000, [&](EllipsoidalConnections& connections, int pixel, Rng& rng) {
       from_camera ? connections.sample_from_camera(1, rng) : connections.sample_walk(pixel, 1, rng);
     });
     const int on_arc = from_camera ? 1 : 2;
     int compared = 0;
-    for (const auto& [path, pixel, value, part] : f.sink.found) {
+    for (const auto& [path, pixel, value] : f.sink.found) {
       if (path.size() != 3) continue;
       const SurfacePoint &x = path.vertex[0], &q = path.vertex[1], &y = path.vertex[2];
       const Scattering s(x.p, q, y.p);
@@ -244,7 +236,7 @@ TEST_P(Weights, OfNextEventsAndRaysAddUpToOne) {
   Finder f = finder();
   f.find_by_standard_sampling(4000);
   int found_of[4] = {0, 0, 0, 0};
-  for (const auto& [path, pixel, value, part] : f.sink.found) {
+  for (const auto& [path, pixel, value] : f.sink.found) {
     const int last = path.size() - 1;
     const SurfacePoint& y = path.back();
     Rgb expected = f.prepared.emitted(y, normalize(path.vertex[last - 1].p - y.p));
@@ -270,7 +262,7 @@ TEST_P(Weights, OfLightSubpathsAreOverTheSumOfAllDensities) {
   f.find_by_standard_sampling(2000);
   const std::size_t by_standard = f.sink.found.size();
   std::vector<int> from(by_standard, -1);
-  LightSubpaths light(f.worker, false);
+  LightSubpaths light(f.worker);
   for (int i = 0; i < 6000; ++i) {
     Rng rng(Stream{test_seed(4), 0, 0}, i, 0);
     light.sample(i % f.prepared.pixels(), 1, rng);
@@ -278,7 +270,7 @@ TEST_P(Weights, OfLightSubpathsAreOverTheSumOfAllDensities) {
   }
   int of_bounces[4] = {0, 0, 0, 0}, by_camera = 0;
   for (std::size_t i = 0; i < f.sink.found.size(); ++i) {
-    const auto& [path, pixel, value, part] = f.sink.found[i];
+    const auto& [path, pixel, value] = f.sink.found[i];
     const int last = path.size() - 1;
     if (last < 2) continue;
     const SurfacePoint& y = path.back();
@@ -310,7 +302,7 @@ TEST_P(Weights, OfLightSubpathsAreOverTheSumOfAllDensities) {
     of_camera *= f.prepared.pixels() / f.pick.rate(pixel);
     const double sum = standard + kLight * (of_light + of_camera);
     double expected = contribution.r / sum;
-    const double handed_on = value.r * part;
+    const double handed_on = value.r;
     if (from[i] >= 0) {
       expected *= kLight;
       const double of_own = expected * f.pick.rate(from[i]) / f.pick.rate(pixel);

@@ -82,19 +82,19 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
       const SamplingMix mix = measure_mix(scene, gates, options, &basis, {2, 0, 0}, Purpose::images);
       options.mix = mix;
       const Renderer renderer(scene, gates, options, &basis);
-      const auto report = [&](const char* quantity, double share, auto&& image) {
-        const int samples = share < 1 ? setting.samples : (setting.samples + 3) / 4;
+      const auto report = [&](const char* quantity, bool connections, auto&& image) {
+        const int samples = connections ? (setting.samples + 3) / 4 : setting.samples;
         const double start = cpu_seconds();
         const PixelEstimate e = pixel_estimate(samples, batches, image);
         const double cost = e.variance * (cpu_seconds() - start);
-        std::fprintf(csv, "%s,%g,\"%s\",%s,%g,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity, share,
+        std::fprintf(csv, "%s,%g,\"%s\",%s,%d,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity, connections,
                      e.mean, e.variance, cost);
-        std::printf("%-5s %6g  %-28s %-9s share %-4g mean % .4e   variance x seconds %.2e\n", setting.name, width,
-                    method.name, quantity, share, e.mean, cost);
+        std::printf("%-5s %6g  %-28s %-9s connections %d mean % .4e   variance x seconds %.2e\n", setting.name, width,
+                    method.name, quantity, connections, e.mean, cost);
         std::fflush(stdout);
       };
-      report("image", mix.image, [&](SampleRange range) { return renderer.render({1, 0, 0}, range); });
-      report("derivative", mix.interior, [&](SampleRange range) {
+      report("image", mix.image_connections, [&](SampleRange range) { return renderer.render({1, 0, 0}, range); });
+      report("derivative", mix.interior_connections, [&](SampleRange range) {
         GatedImage sum = renderer.derive(Term::interior, {1, 0, 1}, range)[0];
         const GatedImage visibility = renderer.derive(Term::visibility, {1, 0, 2}, range)[0];
         for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += visibility.data[i];
@@ -105,7 +105,7 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
 }
 
 void measure_cost(int batches, std::FILE* csv) {
-  std::fprintf(csv, "scene,relative_width,method,quantity,ellipsoidal_share,mean,variance,variance_seconds\n");
+  std::fprintf(csv, "scene,relative_width,method,quantity,connections,mean,variance,variance_seconds\n");
   measure({"cube", PROJECT_ROOT "/scenes/cube/scene.yaml", "cube", 5.4, 4, 4}, batches, csv);
   measure({"box", PROJECT_ROOT "/tests/data/reference/scene.yaml", "block", 6.0, 3, 16}, batches, csv);
 }

@@ -43,8 +43,8 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
         return derivative ? renderer.derive(Term::interior, stream, range)[0] : renderer.render(stream, range);
       });
   for (std::FILE* out : {csv, stdout}) {
-    std::fprintf(out, "%s,%s,%g,%g", c.name.c_str(), derivative ? "derivative" : "image",
-                 derivative ? chosen.interior : chosen.image, derivative ? chosen.interior_light : chosen.image_light);
+    std::fprintf(out, "%s,%s,%d,%g", c.name.c_str(), derivative ? "derivative" : "image",
+                 derivative ? chosen.interior_connections : chosen.image_connections, derivative ? chosen.interior_light : chosen.image_light);
     write_costs(costs, out);
   }
 }

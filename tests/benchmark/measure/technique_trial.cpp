@@ -1,6 +1,6 @@
-// What the trial of automatic sampling chooses, and what that costs: isochron_share_trial CSV [SEEDS]. Variance x CPU seconds over
-// the mean square by shares of ellipsoidal connections, and how often of so many trials each was chosen, with their mean
-// cost over that of the best share. Images, and the interior term of a derivative in pixels and in sums over blocks of pixels.
+// What the trial of automatic sampling chooses, and what that costs: isochron_technique_trial CSV [SEEDS]. Variance x CPU seconds over
+// the mean square of standard sampling and of ellipsoidal connections, and how often of so many trials connections were chosen, with
+// the trials' mean cost over that of the better technique. Images, and the interior term of a derivative in pixels and in sums over blocks of pixels.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -20,7 +20,6 @@ namespace {
 
 using namespace testing;
 
-constexpr double kShares[] = {0, 0.25, 0.5, 0.75, 1};
 constexpr int kTrials = 8, kSamples = 64;
 
 struct Case {
@@ -45,9 +44,9 @@ void measure(const Case& c, Of of, int seeds, std::FILE* csv) {
   const SamplingMix first = trial(0);
   plain.light = image ? first.image_light : first.interior_light;
   std::vector<EstimatorOptions> options;
-  for (const double share : kShares) {
+  for (const bool connections : {false, true}) {
     options.push_back(plain);
-    options.back().mix = SamplingMix{.image = share, .interior = share};
+    options.back().mix = SamplingMix{connections, connections};
   }
   const SampleRange range{0, kSamples};
   const std::vector<double> costs =
@@ -56,14 +55,13 @@ void measure(const Case& c, Of of, int seeds, std::FILE* csv) {
         GatedImage derivative = renderer.derive(Term::interior, stream, range)[0];
         return of == Of::pixels ? derivative : blocks(derivative, derivative.width / 4);
       });
-  int chosen[std::size(kShares)] = {};
+  int chosen = 0;
   double mean = 0;
   for (int seed = 0; seed < kTrials; ++seed) {
     const SamplingMix mix = trial(seed);
-    const double share = image ? mix.image : mix.interior;
-    const auto at = std::ranges::min_element(kShares, {}, [&](double s) { return std::abs(s - share); });
-    ++chosen[at - kShares];
-    mean += costs[at - kShares] / kTrials;
+    const bool connections = image ? mix.image_connections : mix.interior_connections;
+    chosen += connections;
+    mean += costs[connections] / kTrials;
   }
   for (std::FILE* out : {csv, stdout}) {
     std::fprintf(out, "%s,%s,%g", c.name.c_str(),
@@ -71,8 +69,7 @@ void measure(const Case& c, Of of, int seeds, std::FILE* csv) {
                  : of == Of::pixels ? "derivative"
                                     : "sums",
                  *plain.light);
-    for (const int n : chosen) std::fprintf(out, ",%d", n);
-    std::fprintf(out, ",%.3g", mean / *std::ranges::min_element(costs));
+    std::fprintf(out, ",%d,%.3g", chosen, mean / *std::ranges::min_element(costs));
     write_costs(costs, out);
   }
 }
@@ -102,15 +99,10 @@ std::vector<Case> cases() {
 
 int main(int argc, char** argv) {
   using namespace isochron::benchmarks;
-  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_share_trial CSV [SEEDS]", 16, 2);
+  const Arguments arguments = read_arguments(argc, argv, 1, "isochron_technique_trial CSV [SEEDS]", 16, 2);
   isochron::set_thread_count(1);
-  for (std::FILE* out : {arguments.csv.get(), stdout}) {
-    std::fprintf(out, "scene,of,light");
-    for (const double share : kShares) std::fprintf(out, ",trials for %g", share);
-    std::fprintf(out, ",cost of trials");
-    for (const double share : kShares) std::fprintf(out, ",%g", share);
-    std::fprintf(out, "\n");
-  }
+  for (std::FILE* out : {arguments.csv.get(), stdout})
+    std::fprintf(out, "scene,of,light,trials for connections,cost of trials,standard,connections\n");
   for (const Case& c : cases())
     for (const Of of : {Of::image, Of::pixels, Of::sums}) measure(c, of, arguments.number, arguments.csv.get());
 }

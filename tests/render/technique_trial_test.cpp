@@ -1,8 +1,8 @@
-// One trial tells what every share of connections would cost: against images rendered with each share.
+// Trials tell what standard sampling and connections cost: against images rendered by each.
 //
 // Statistics: both are variances from 64 batches of 256 pixels. Over 8 seeds their ratio has a standard deviation of 0.02 to 0.05;
-// the tolerance is five of the largest (false alarms: 6e-7 each, 1e-5 for the file).
-#include "core/render/share_trial.h"
+// the tolerance is five of the largest (false alarms: 6e-7 each, 5e-6 for the file).
+#include "core/render/technique_trial.h"
 
 #include <gtest/gtest.h>
 
@@ -23,30 +23,22 @@ void PrintTo(const TrialCase& c, std::ostream* out) {
   *out << c.name;
 }
 
-class ShareTrials : public ::testing::TestWithParam<TrialCase> {};
+class TechniqueTrials : public ::testing::TestWithParam<TrialCase> {};
 
-TEST_P(ShareTrials, TellWhatEveryShareCosts) {
-  constexpr int kBatches = 64, kTrialSamples = 4, kSamples = 8;  // whole numbers of each kind under every share
+TEST_P(TechniqueTrials, TellWhatEachCosts) {
+  constexpr int kBatches = 64, kSamples = 4;
   const auto [name, derivative, light, block] = GetParam();
   const Scene scene = glossy_validation_scene(16, 0.5, diffuse(Rgb(0.6)));
   const GateSet gates(GateShape::gaussian(0.3), {5.0, 6.0});
   const TangentBasis basis = make_basis(scene, {translate(scene, "light", {0.4, 0, 0.3})});
   EstimatorOptions options{.max_bounces = 3, .numbers = Numbers::independent, .keep_length = false, .light = light};
-  double work = 0;
-  const auto costs = measure_shares({.scene = scene,
-                                     .gates = gates,
-                                     .options = options,
-                                     .column = derivative ? &basis : nullptr,
-                                     .block = block,
-                                     .samples = kTrialSamples,
-                                     .batches = kBatches,
-                                     .most_samples = 1e9},
-                                    {1, 2, 3}, work)
-                         .cost;
-  ASSERT_TRUE(costs);
-  EXPECT_GT(work, 0);
-  for (std::size_t k = 0; k < kConnectionShares.size(); ++k) {
-    options.mix = SamplingMix{.image = kConnectionShares[k], .interior = kConnectionShares[k]};
+  SceneCache cache(scene, CasterUpdate::rebuild);
+  for (const bool connections : {false, true}) {
+    const TechniqueTrial trial{scene, gates, options, derivative ? &basis : nullptr, block, kSamples};
+    const TrialBatches found = run_trial(trial, connections, kBatches, 1e12, {1, 2, 3}, cache);
+    EXPECT_EQ(found.count, kBatches);
+    EXPECT_FALSE(found.has_others);
+    options.mix = SamplingMix{connections, connections};
     const Renderer renderer(scene, gates, options, &basis);
     PixelBatches images;
     for (int b = 0; b < kBatches; ++b) {
@@ -58,12 +50,28 @@ TEST_P(ShareTrials, TellWhatEveryShareCosts) {
     double variance = 0;
     for (std::size_t i = 0; i < images.mean().data.size(); ++i) variance += images.variance(i) * kBatches;
     const double sums = double{1} * block * block * block * block;  // blocks() averages
-    EXPECT_NEAR((*costs)[k] / (variance * sums * renderer.work() / kBatches), 1, 0.25)
-        << "share " << kConnectionShares[k];
+    EXPECT_NEAR(found.variance * found.work / (variance * sums * renderer.work() / kBatches), 1, 0.25) << connections;
+    // As many batches as the work allows, but one.
+    EXPECT_EQ(run_trial(trial, connections, kBatches, 3.5 * found.work, {1, 2, 3}, cache).count, 3);
+    EXPECT_EQ(run_trial(trial, connections, kBatches, 0, {1, 2, 3}, cache).count, 1);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, ShareTrials,
+/// Light behind glass, which connections do not find.
+TEST(TechniqueTrial, SaysThatThereAreOtherPaths) {
+  Scene scene = glossy_validation_scene(16, 0.5, glass(0.3, 1.5));
+  const Shape& block = scene.shapes[scene.find_shape("block")];
+  Vec3 middle{0, 0, 0};
+  for (int v = block.first_vertex; v < block.first_vertex + block.vertex_count; ++v)
+    middle = middle + scene.positions[v] / block.vertex_count;
+  scene.lights.push_back({.name = "inside", .position = middle, .intensity = Rgb(1)});
+  const GateSet gates(GateShape::gaussian(0.6), {5.0});
+  SceneCache cache(scene, CasterUpdate::rebuild);
+  const TechniqueTrial trial{scene, gates, {.max_bounces = 3}, nullptr, 1, 4};
+  EXPECT_TRUE(run_trial(trial, false, 2, 1e12, {1, 2, 3}, cache).has_others);
+}
+
+INSTANTIATE_TEST_SUITE_P(Of, TechniqueTrials,
                          ::testing::Values(TrialCase{"images", false, 0, 1},
                                            TrialCase{"images_with_light", false, 0.5, 1},
                                            TrialCase{"derivatives", true, 0, 1},

@@ -1,0 +1,122 @@
+#include "core/render/technique_trial.h"
+
+#include <cmath>
+
+#include "core/base/listed_sum.h"
+
+namespace isochron {
+namespace {
+
+/// Where the sums over blocks of pixels are.
+struct Layout {
+  int width, block, blocks_across, gates, channels;
+  std::size_t size;
+
+  Layout(const Passes& passes, int block_size)
+      : width(passes.scene.camera.width),
+        block(block_size),
+        blocks_across((width + block - 1) / block),
+        gates(passes.gates.size()),
+        channels(passes.scene.scene.grey ? 1 : 3),
+        size(static_cast<std::size_t>(blocks_across) * ((passes.scene.camera.height + block - 1) / block) * gates *
+             channels) {}
+  std::size_t at(int pixel, int gate) const {
+    const int of_block = pixel / width / block * blocks_across + pixel % width / block;
+    return (static_cast<std::size_t>(of_block) * gates + gate) * channels;
+  }
+};
+
+/// Sums over blocks, and behind them the magnitudes of what connections do not find.
+class BlockSink final : public Sink {
+ public:
+  BlockSink(const Passes& passes, const TangentBasis* column, const Layout& layout, ListedSum& sums)
+      : gates_(passes.gates), scene_(passes.scene), layout_(layout), sums_(sums) {
+    if (column) rates_.emplace(passes.scene.layout, *column);
+  }
+
+  bool differential() const override { return rates_.has_value(); }
+  void note_path(const Path& path) override {
+    const int last = path.size() - 1;
+    const auto outside = [&](int k) { return scene_.outside(path.vertex[k], path.vertex[k + 1]); };
+    by_others_ = last > 1 && (!outside(last - 1) || (is_light(path.back().triangle) && !outside(last - 2)));
+  }
+  void bind(const LocalDifferential& differential) override { rates_->bind(differential); }
+
+  void add(int pixel, const Rgb& value, double length, GateUse use) override {
+    if (!rates_) {
+      gates_.for_each_value(length, [&](int g, double w) { splat(pixel, g, value * w); });
+    } else if (!rates_->touched().empty()) {
+      const ColumnRates::Rates& rates = (*rates_)[0];
+      const Rgb log_f(rates.log_f[0], rates.log_f[1], rates.log_f[2]);
+      gates_.for_each_derivative(length, [&](int g, double w, double slope) {
+        splat(pixel, g, value * (log_f * w + Rgb(slope_factor(use) * slope * rates.length)));
+      });
+    }
+  }
+  void add_length_rate(int pixel, int gate, const Rgb& value) override {
+    if (!rates_->touched().empty()) splat(pixel, gate, value * (*rates_)[0].length);
+  }
+
+ private:
+  void splat(int pixel, int gate, const Rgb& value) {
+    double* out = sums_.at(layout_.at(pixel, gate), layout_.channels);
+    for (int c = 0; c < layout_.channels; ++c) out[c] += value[c];
+    if (by_others_) *sums_.at(layout_.size, 1) += std::abs(value.r) + std::abs(value.g) + std::abs(value.b);
+  }
+
+  const GateSet& gates_;
+  const PreparedScene& scene_;
+  const Layout& layout_;
+  ListedSum& sums_;
+  std::optional<ColumnRates> rates_;
+  bool by_others_ = false;
+};
+
+}  // namespace
+
+TrialBatches run_trial(const TechniqueTrial& trial, bool connections, int batches, double work, const Stream& stream,
+                       SceneCache& cache) {
+  EstimatorOptions options = trial.options;
+  options.mix = SamplingMix{.image_connections = connections, .interior_connections = connections};
+  // Where paths keep their lengths, a part of the variance is another term's.
+  options.keep_length = false;
+  // What low-discrepancy numbers gain in a pixel grows with its samples, of which trials have few. In sums, techniques whose
+  // points cover the whole image gain as much in a trial (isochron_technique_trial: cube, 5 %, sums).
+  if (trial.block == 1) options.numbers = Numbers::independent;
+  const Passes passes(trial.scene, trial.gates, options, trial.column, &cache);
+  TrialBatches result;
+  if (passes.scene.emitters.empty() || (trial.column && !passes.has(Term::interior))) return result;
+  const Layout layout(passes, trial.block);
+  ListedSum sums(layout.size), squares(layout.size);
+  const PassKind kind = trial.column ? PassKind::interior : PassKind::primal;
+  double done = 0;
+  do {
+    const SampleRange range{result.count * trial.samples, (result.count + 1) * trial.samples};
+    const int partitions = passes.partitions_for(range, layout.size);
+    const auto found = passes.sum_of<ListedSum>(kind, partitions, [&](int partition) {
+      ListedSum own(layout.size + 1);
+      BlockSink sink(passes, trial.column, layout, own);
+      passes.run_images_or_interior({stream, range}, {partition, partitions}, sink);
+      own.finish();
+      return own;
+    });
+    found.for_each(0, layout.size, [&](std::size_t i, double value) {
+      *sums.at(i, 1) += value;
+      *squares.at(i, 1) += value * value;
+    });
+    found.for_each(layout.size, layout.size + 1, [&](std::size_t, double value) { result.has_others |= value > 0; });
+    ++result.count;
+    done = passes.work();
+  } while (result.count < batches && done * (result.count + 1) <= work * result.count);
+  result.work = done / result.count;
+  sums.finish();
+  squares.finish();
+  if (result.count < 2) return result;
+  double variance = 0;
+  squares.for_each(0, layout.size, [&](std::size_t, double value) { variance += value; });
+  sums.for_each(0, layout.size, [&](std::size_t, double value) { variance -= value * value / result.count; });
+  result.variance = variance / (result.count - 1);
+  return result;
+}
+
+}  // namespace isochron
