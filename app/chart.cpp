@@ -22,7 +22,7 @@ struct ChartCommand {
   double seconds = 60;
   double error_percent = 1;
   std::vector<double> steps;
-  bool solvers = false;
+  bool techniques = false, solvers = false;
   int seeds = 3;
 };
 
@@ -52,6 +52,7 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
   options.core_seconds = command.seconds * thread_count(command.common);
   options.error = command.error_percent / 100;
   options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
+  options.techniques = command.techniques;
   options.poll = throw_if_stopped;
   options.progress = note_progress;
   options.progress("target");
@@ -103,8 +104,11 @@ void add_chart(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->check(CLI::PositiveNumber)
       ->type_name("A,B,C");
+  CLI::Option* techniques = sub->add_flag("--techniques", command->techniques,
+                                          "what each technique brings: `auto` without each, in place of other methods");
   sub->add_flag("--solvers", command->solvers,
-                "reconstructions instead: error of the parameters against time for every optimiser");
+                "reconstructions instead: error of the parameters against time for every optimiser")
+      ->excludes(techniques);
   sub->add_option("--seeds", command->seeds, "with --solvers: runs of each optimiser")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str()
@@ -115,6 +119,7 @@ void add_chart(CLI::App& app, Action& action) {
       "runs/NAME-chart.\n"
       "Examples:\n"
       "  isochron chart cube.yaml\n"
+      "  isochron chart cube.yaml --techniques\n"
       "  isochron chart cube.yaml --solvers --seeds 5\n"
       "  isochron chart cube.yaml --seconds 300 --at height=0.1 -o charts\n"
       "  isochron chart cube.yaml --set gates.sigma=0.1 --steps 0.1,0.01");

@@ -7,18 +7,13 @@
 namespace isochron {
 namespace {
 
-/// Shares that are compared (isochron_light_share measures what each brings), and the one that the trial has: with it both kinds of
-/// samples find what the other does not.
-constexpr std::array kShares = {0.0, 0.2, 0.35, 0.5, 0.65, 0.8};
-constexpr double kLightTrialShare = 0.5;
-/// The cost of a share over that of none must be below this, for images and for derivatives: rays do not count the differential of
-/// every joint, which takes as long again (corridor). The least of those shares within the second ratio of the best is taken, as other
-/// terms of a derivative take time, too.
-constexpr double kMaxCostRatio[] = {0.8, 0.5}, kAsGoodAsTheBest = 1.25;
+/// The cost with light subpaths over that without must be below this, for images and for derivatives: rays do not count the
+/// differential of every joint, which takes as long again (corridor).
+constexpr double kMaxCostRatio[] = {0.8, 0.5};
 
-/// Second moments of what samples find, by kShares.
+/// Second moments of what samples find, without and with light subpaths.
 struct Moments {
-  std::array<double, kShares.size()> of{};
+  std::array<double, 2> of{};
   void add(const Moments& other) {
     for (std::size_t i = 0; i < of.size(); ++i) of[i] += other.of[i];
   }
@@ -27,7 +22,7 @@ struct Moments {
 };
 
 /// A contribution v = f / (n_s p_s + n_l p_l) is the same whichever technique found it, so that the sum of v g over all that is
-/// found is the integral of f g; with g = f / (p_s + n p_l), for any n, the second moment under a rate of n.
+/// found is the integral of f g; with g = f / p_s the second moment of standard sampling alone.
 class MomentSink final : public Sink {
  public:
   /// `column`: null for images.
@@ -54,8 +49,9 @@ class MomentSink final : public Sink {
         squares += most * most;
       });
     }
-    for (std::size_t i = 0; i < kShares.size(); ++i)
-      moments_.of[i] += squares * (1 + light_rate(kLightTrialShare) * ratio_) / (1 + light_rate(kShares[i]) * ratio_);
+    // Of as many standard samples alone.
+    moments_.of[0] += squares * (1 + light_rate(kLightShare) * ratio_);
+    moments_.of[1] += squares;
   }
 
  private:
@@ -68,8 +64,8 @@ class MomentSink final : public Sink {
 
 }  // namespace
 
-double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOptions options,
-                           const TangentBasis* column, const Stream& stream, double paths, double& work) {
+bool light_subpaths_pay(const Scene& scene, const GateSet& gates, EstimatorOptions options, const TangentBasis* column,
+                        const Stream& stream, double paths, double& work) {
   options.mix = SamplingMix{};
   options.keep_length = false;
   const SampleRange range{
@@ -78,11 +74,11 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
   double work_of[2];
   SceneCache cache(scene, CasterUpdate::rebuild);
   for (const int i : {0, 1}) {
-    options.light = i * kLightTrialShare;
+    options.light = i * kLightShare;
     const Passes passes(scene, gates, options, column, &cache);
-    if (passes.scene.emitters.empty() || (column && !passes.has(Term::interior))) return 0;
+    if (passes.scene.emitters.empty() || (column && !passes.has(Term::interior))) return false;
     const PassKind kind = column ? PassKind::interior : PassKind::primal;
-    const int partitions = passes.partitions_for(range, kShares.size());
+    const int partitions = passes.partitions_for(range, 2);
     moments = passes.sum_of<Moments>(kind, partitions, [&](int partition) {
       Moments own;
       MomentSink sink(passes, column, own);
@@ -92,18 +88,8 @@ double measure_light_share(const Scene& scene, const GateSet& gates, EstimatorOp
     work_of[i] = passes.work();
     work += work_of[i];
   }
-  // Of as many samples.
-  const double of_standard = work_of[0],
-               of_light = (work_of[1] - (1 - kLightTrialShare) * work_of[0]) / kLightTrialShare;
-  const auto cost = [&](std::size_t i) {
-    return moments.of[i] / (1 - kShares[i]) * ((1 - kShares[i]) * of_standard + kShares[i] * of_light);
-  };
-  const double without = kMaxCostRatio[column != nullptr] * cost(0);
-  double best = without;
-  for (std::size_t i = 1; i < kShares.size(); ++i) best = std::min(best, cost(i));
-  for (std::size_t i = 1; i < kShares.size(); ++i)
-    if (cost(i) <= std::min(kAsGoodAsTheBest * best, without)) return kShares[i];
-  return 0;
+  // Of as many samples, of which the others are standard.
+  return moments.of[1] / (1 - kLightShare) * work_of[1] <= kMaxCostRatio[column != nullptr] * moments.of[0] * work_of[0];
 }
 
 }  // namespace isochron

@@ -142,8 +142,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
                           kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
     const double paths = std::min(kLightPaths, budget / kLightWork);
     if (!light_is_open || coverage < widths.below_is_ellipsoidal || !(paths >= kFewestLightPaths)) return 0.0;
-    return measure_light_share(reduced(scene, std::min<double>(paths, kPixels)), gates, options, column, stream, paths,
-                               work);
+    const Scene small = reduced(scene, std::min<double>(paths, kPixels));
+    return light_subpaths_pay(small, gates, options, column, stream, paths, work) ? kLightShare : 0.0;
   };
   const auto choose = [&](const TrialWidths& widths, bool otherwise, double samples, const TangentBasis* column) {
     if (coverage < widths.below_is_ellipsoidal) return true;

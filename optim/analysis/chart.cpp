@@ -127,7 +127,8 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
         fmt::format("the gradient does not stand out of its noise at this point (squared norm {:.3g} +- {:.2g}): "
                     "another point (--at), or more time (--seconds)",
                     chart.reference.norm2.value, chart.reference.norm2.standard_error));
-  const std::vector<Method> methods = methods_for(experiment, options.steps, chart.notes);
+  const std::vector<Method> methods =
+      options.techniques ? methods_without(experiment) : methods_for(experiment, options.steps, chart.notes);
   std::deque<MethodRun> runs;
   for (const Method& method : methods) runs.emplace_back(experiment, method);
   const std::vector<std::size_t> first = first_alike(runs, methods, "", chart.notes);

@@ -18,6 +18,7 @@ struct ChartOptions {
   double core_seconds = 120;  ///< for the whole chart, about, without the target; the reference takes a quarter
   double error = 0.01;        ///< relative, that the table asks for
   std::vector<double> steps;  ///< of finite differences
+  bool techniques = false;    ///< in place of other methods, `auto` without each technique (methods_without)
   Poll poll;
   std::function<void(const std::string&)> progress;  ///< one line
 };

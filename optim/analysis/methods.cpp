@@ -9,6 +9,7 @@
 
 #include "core/base/cpu_time.h"
 #include "optim/analysis/check.h"
+#include "optim/experiment/technique_names.h"
 #include "optim/problem/loss.h"
 
 namespace isochron {
@@ -94,6 +95,20 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
                        e.estimator.numbers = Numbers::independent;
                      },
                      Method::Gradient::forward});
+  return methods;
+}
+
+std::vector<Method> methods_without(const Experiment& experiment) {
+  std::vector<Method> methods{automatic_method()};
+  EstimatorOptions options = changed(experiment, methods[0]).estimator;
+  if (experiment.gates.unbounded()) leave_out("ellipsoidal", options);
+  for (const std::string& technique : used_techniques(options)) {
+    if (technique == "standard" && experiment.gates.unbounded()) continue;
+    methods.push_back({"without_" + technique, [technique](Experiment& e) {
+                         set_automatic(e);
+                         leave_out(technique, e.estimator);
+                       }});
+  }
   return methods;
 }
 

@@ -12,7 +12,7 @@ inline constexpr auto kChoices<LengthUnit> = std::to_array<Choice<LengthUnit>>(
 template <>
 inline constexpr auto kChoices<Sampling> = std::to_array<Choice<Sampling>>(
     {{Sampling::automatic, "auto",
-      "what measures best for the gates' width: one of the two, or both combined; with light subpaths where those "
+      "what measures best for the gates' width: one of the two; with light subpaths where those "
       "help"},
      {Sampling::standard, "standard", "paths of any length"},
      {Sampling::ellipsoidal, "ellipsoidal", "paths of the lengths that the gates let through"}});

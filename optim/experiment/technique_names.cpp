@@ -22,16 +22,6 @@ constexpr BoundaryName kBoundaryNames[] = {
     {"light_arcs", "connections beyond boundary segments, where gates are narrow", &BoundaryTechniques::light_arcs},
 };
 
-std::vector<std::string> used(const EstimatorOptions& options) {
-  std::vector<std::string> names;
-  if (options.sampling != Sampling::ellipsoidal) names.emplace_back("standard");
-  if (options.sampling != Sampling::standard) names.emplace_back("ellipsoidal");
-  if (options.light != 0) names.emplace_back("light");
-  for (const BoundaryName& each : kBoundaryNames)
-    if (options.boundary.*each.used) names.emplace_back(each.name);
-  return names;
-}
-
 void use_only(const std::set<std::string>& names, const YamlValue& value, EstimatorOptions& options) {
   const bool standard = names.contains("standard"), ellipsoidal = names.contains("ellipsoidal");
   if (!standard && !ellipsoidal) value.fail("leaves no technique that finds paths", "standard, ellipsoidal or both");
@@ -47,6 +37,24 @@ void use_only(const std::set<std::string>& names, const YamlValue& value, Estima
 }
 
 }  // namespace
+
+std::vector<std::string> used_techniques(const EstimatorOptions& options) {
+  std::vector<std::string> names;
+  if (options.sampling != Sampling::ellipsoidal) names.emplace_back("standard");
+  if (options.sampling != Sampling::standard) names.emplace_back("ellipsoidal");
+  if (options.light != 0) names.emplace_back("light");
+  for (const BoundaryName& each : kBoundaryNames)
+    if (options.boundary.*each.used) names.emplace_back(each.name);
+  return names;
+}
+
+void leave_out(const std::string& technique, EstimatorOptions& options) {
+  if (technique == "standard") options.sampling = Sampling::ellipsoidal;
+  if (technique == "ellipsoidal") options.sampling = Sampling::standard;
+  if (technique == "light") options.light = 0;
+  for (const BoundaryName& each : kBoundaryNames)
+    if (technique == each.name) options.boundary.*each.used = false;
+}
 
 Field techniques(EstimatorOptions& options) {
   std::vector<std::string> known{"standard", "ellipsoidal", "light"};
@@ -66,7 +74,7 @@ Field techniques(EstimatorOptions& options) {
     }
     use_only(names, value, options);
   };
-  return {"list of words", allowed, read, [&options] { return fmt::format("[{}]", fmt::join(used(options), ", ")); },
+  return {"list of words", allowed, read, [&options] { return fmt::format("[{}]", fmt::join(used_techniques(options), ", ")); },
           meanings};
 }
 

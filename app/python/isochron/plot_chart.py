@@ -27,6 +27,7 @@ STYLES = {
     "paper": ("tab:brown", "X"),
 }
 STEEP = -0.65  # slopes of fewer samples than the law of -1/2 needs
+MARKERS = "osDv^<>Pp"  # of other methods, one after the other
 DIFFERENCES = [("#1b7837", "v"), ("#5aae61", "^"), ("#a6dba0", ">")]
 
 
@@ -51,7 +52,9 @@ def styles(methods):
     """Method -> colour and marker; finite differences in the order of the file."""
     differences = [m for m in methods if m.startswith("finite_difference")]
     others = {m: DIFFERENCES[i % len(DIFFERENCES)] for i, m in enumerate(differences)}
-    return {m: STYLES.get(m) or others.get(m, ("grey", ".")) for m in methods}
+    rest = [m for m in methods if m not in STYLES and m not in others]
+    others |= {m: (f"C{i % 10}", MARKERS[i % len(MARKERS)]) for i, m in enumerate(rest)}
+    return {m: STYLES.get(m) or others[m] for m in methods}
 
 
 def plain(method):
