@@ -51,7 +51,8 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
   ChartOptions options;
   options.core_seconds = command.seconds * thread_count(command.common);
   options.error = command.error_percent / 100;
-  options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
+  options.steps = command.steps;
+  if (options.steps.empty() && !command.techniques) options.steps = default_steps(problem, theta);
   options.techniques = command.techniques;
   options.poll = throw_if_stopped;
   options.progress = note_progress;
@@ -98,14 +99,17 @@ void add_chart(CLI::App& app, Action& action) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str()
       ->type_name("PERCENT");
-  sub->add_option("--steps", command->steps,
-                  "steps of the finite differences, in units of the parameters; default: 4, 1 and 1/4 times the step "
-                  "that `check` would take")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber)
-      ->type_name("A,B,C");
+  CLI::Option* steps =
+      sub->add_option(
+             "--steps", command->steps,
+             "steps of the finite differences, in units of the parameters; default: 4, 1 and 1/4 times the step "
+             "that `check` would take")
+          ->delimiter(',')
+          ->check(CLI::PositiveNumber)
+          ->type_name("A,B,C");
   CLI::Option* techniques = sub->add_flag("--techniques", command->techniques,
-                                          "what each technique brings: `auto` without each, in place of other methods");
+                                          "what each technique brings: `auto` without each, in place of other methods")
+                                ->excludes(steps);
   sub->add_flag("--solvers", command->solvers,
                 "reconstructions instead: error of the parameters against time for every optimiser")
       ->excludes(techniques);

@@ -148,7 +148,8 @@ void print_techniques(const Problem& problem) {
     if (connections)
       fmt::print("  {:<24} ellipsoidal connections{}\n", what, light > 0 ? " with light subpaths" : "");
     else
-      fmt::print("  {:<24} {:>3.0f} % standard sampling, {:>3.0f} % light subpaths\n", what, 100 * (1 - light), 100 * light);
+      fmt::print("  {:<24} {:>3.0f} % standard sampling, {:>3.0f} % light subpaths\n", what, 100 * (1 - light),
+                 100 * light);
   };
   const auto mix_of = [&](const EstimatorOptions& options) {
     return sampling_mix(options, problem.gates(), problem.scene());

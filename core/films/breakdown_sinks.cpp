@@ -37,9 +37,8 @@ void ImageBreakdownSink::add(int pixel, const Rgb& value, double length, GateUse
 }
 
 void GradientBreakdownSink::add(int pixel, const Rgb& value, double length, GateUse use) {
-  gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-    add_to_gate(pixel, g, value, w, slope_factor(use) * slope);
-  });
+  gates_.for_each_derivative(
+      length, [&](int g, double w, double slope) { add_to_gate(pixel, g, value, w, slope_factor(use) * slope); });
 }
 
 void GradientBreakdownSink::add_to_gate(int pixel, int gate, const Rgb& value, double w, double slope) {

@@ -6,6 +6,7 @@
 
 #include "core/base/bounds.h"
 #include "core/base/random.h"
+#include "core/paths/path.h"
 #include "core/paths/prepared_scene.h"
 
 namespace isochron {
@@ -52,9 +53,8 @@ std::vector<int> candidates_of(const PreparedScene& scene) {
   std::vector<Vec3> centers;
   for (int t = 0; t < std::ssize(scene.scene.triangles); ++t) {
     if (any ? !scene.shape_of(t).hidden : !scene.captures()) continue;
-    const auto corner = scene.corners(t);
     triangles.push_back(t);
-    centers.push_back((corner[0] + corner[1] + corner[2]) / 3);
+    centers.push_back(scene.corners(t)[0] + (scene.edges(t)[0] + scene.edges(t)[1]) / 3);
   }
   std::vector<int> ordered;
   for (const int i : spatial_order(centers)) ordered.push_back(triangles[i]);
@@ -100,8 +100,8 @@ void HiddenGeometry::update(const PreparedScene& scene) {
     return std::ranges::count(which, 0) < std::ssize(which);
   };
   const Differentiable& differentiable = scene.differentiable;
-  alone_changes_ = alone_changes_x1_ = !empty() && !differentiable.every_path && !changes(differentiable.light) &&
-                                       !changes(differentiable.emission);
+  alone_changes_ = alone_changes_x1_ =
+      !empty() && !differentiable.every_path && !changes(differentiable.light) && !changes(differentiable.emission);
   for (int t = 0; alone_changes_x1_ && t < count; ++t) {
     // An emitter that moves is at the end of paths, too, which next-event estimation finds.
     if (!scene.has_gradient(t) || (holds(t) && !scene.emits(t)) || scene.area(t) == 0) continue;

@@ -37,7 +37,9 @@ class HiddenGeometry {
   AreaSteps steps(const EstimatorOptions& options, bool derivatives) const;
   /// Of a step of that probability; `last`: that can lead to what changes. If nothing else does, all, for else the path adds nothing to
   /// derivatives.
-  double step(double probability, bool last) const { return last && alone_changes_ ? std::ceil(probability) : probability; }
+  double step(double probability, bool last) const {
+    return last && alone_changes_ ? std::ceil(probability) : probability;
+  }
 
   /// A triangle, by area. `u` in (0, 1) is replaced by a fresh uniform number.
   int pick(double& u) const { return triangles_[distribution_.sample(u)]; }
@@ -54,7 +56,9 @@ class HiddenGeometry {
   }
 
  private:
-  double own_pdf(int triangle, double probability) const { return holds(triangle) ? probability * pdf() : 0; }
+  double own_pdf(int triangle, double probability) const {
+    return probability > 0 && holds(triangle) ? probability * pdf() : 0;
+  }
   /// Whether its points have weights (the wall's reflection over their density) of no larger mean square than points drawn by the
   /// wall's cosine, whose weights are 1.
   bool beats_cosine_sampling(const PreparedScene& scene) const;

@@ -59,7 +59,7 @@ struct EstimatorOptions {
   std::optional<double> light = {};
   /// In [0, 1): as long as a path by standard sampling has met no area-sampled shape (Shape::hidden), the probability that its
   /// next vertex is drawn there by area (see HiddenGeometry) rather than by the BSDF or the cosine of a capture's wall. None: the
-  /// default, see Worker. For paths of cameras, and after x1 in captures, it applies to derivatives only.
+  /// default, see HiddenGeometry::steps. For paths of cameras, and after x1 in captures, it applies to derivatives only.
   std::optional<double> hidden = {};
   /// Contact-aware reparameterisation: within which distance path vertices follow what is close to them and moves differently,
   /// see VertexFlows; 0: not at all. All values give the same derivative, with other variances, divided differently between

@@ -7,8 +7,6 @@
 #include <utility>
 
 #include "core/base/parallel.h"
-#include "core/base/random.h"
-#include "core/paths/path.h"
 
 namespace isochron {
 

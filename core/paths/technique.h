@@ -29,9 +29,4 @@ inline const char* name(Technique technique) {
   return kNames[static_cast<std::size_t>(technique)];
 }
 
-/// Whether it connects two points by arcs of ellipsoids.
-inline bool is_connection(Technique t) {
-  return t == Technique::walk || t == Technique::camera_lengths || t == Technique::camera_pairs;
-}
-
 }  // namespace isochron

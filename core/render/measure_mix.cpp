@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
-#include "core/render/light_share.h"
+#include "core/render/light_trial.h"
 #include "core/render/technique_trial.h"
 
 namespace isochron {
@@ -68,38 +69,40 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
 }
 
 /// Decides between standard sampling and connections.
-struct Choice {
+struct TechniqueChoice {
   const Scene& scene;
   const GateSet& gates;
   EstimatorOptions options;
-  Purpose purpose;
-  double job;   ///< samples per pixel that it decides about
-  double part;  ///< of the job's work, at most
+  const TangentBasis* column;  ///< of the interior term; null: of images
+  bool sums;                   ///< over blocks of pixels count, not pixels
+  double job;                  ///< samples per pixel that it decides about
+  double part;                 ///< of the job's work, at most
 
-  /// Whether connections cost less, or `by_width` where trials cannot tell. `column`: of the interior term; null: of images. `work`
-  /// grows by what that took.
-  bool connections(bool by_width, const TangentBasis* column, const Stream& stream, double& work) const {
+  int block_of(const Scene& small) const { return sums ? std::max(1, small.camera.width / kBlocks) : 1; }
+
+  /// Batches of standard sampling and of connections, each within a work of its own. `work` grows by what they took.
+  std::array<TrialBatches, 2> run(const Scene& small, int batches, const std::array<double, 2>& most,
+                                  const Stream& stream, double& work) const {
+    const TechniqueTrial trial{small, gates, options, column, block_of(small), kTrialSamples};
+    SceneCache cache(small, CasterUpdate::rebuild);
+    std::array<TrialBatches, 2> found;
+    for (const int t : {0, 1}) {
+      found[t] = run_trial(trial, t == 1, batches, most[t], stream, cache);
+      work += found[t].work * found[t].count;
+    }
+    return found;
+  }
+
+  /// Whether connections cost less, or `by_width` where trials cannot tell.
+  bool connections(bool by_width, const Stream& stream, double& work) const {
     const double samples =
         part * pixels_of(scene) * job - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
     if (!(samples >= kFewestBudget)) return by_width;
-    const bool sums = column && purpose == Purpose::gradients;
-    const auto run = [&](const Scene& small, int batches, double budget) {
-      const TechniqueTrial trial{small, gates, options, column, sums ? std::max(1, small.camera.width / kBlocks) : 1,
-                                 kTrialSamples};
-      SceneCache cache(small, CasterUpdate::rebuild);
-      std::array<TrialBatches, 2> found;
-      for (const int t : {0, 1}) {
-        found[t] = run_trial(trial, t == 1, batches, budget, stream, cache);
-        budget -= found[t].work * found[t].count;
-        work += found[t].work * found[t].count;
-      }
-      return found;
-    };
     // What connections take differs between scenes: a tiny image tells.
     const Scene tiny = reduced(scene, kTinyPixels);
-    const auto first = run(tiny, 1, 0);
+    const auto first = run(tiny, 1, {0, 0}, stream, work);
     const double both = first[0].work + first[1].work, least = std::min(first[0].work, first[1].work);
-    const double of_sample = least / (kTrialSamples * pixels_of(tiny)), budget = samples * of_sample - both;
+    const double budget = samples * least / (kTrialSamples * pixels_of(tiny)) - both;
     const double affordable = budget / both * pixels_of(tiny);  // pixels times batches
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
     if (!(affordable >= 2 * fewest)) return by_width;
@@ -107,14 +110,17 @@ struct Choice {
     const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
     const auto batches = static_cast<int>(std::min<double>(kMostBatches, affordable / pixels_of(small)));
-    const auto [standard, by_connections] = run(small, batches, budget);
-    const auto cost = [](const TrialBatches& of) {
-      // Nothing seen says nothing: a technique that never hit the gates is no good one.
-      return of.variance > 0 ? of.variance * of.work : std::numeric_limits<double>::infinity();
-    };
-    const double gain = sums || options.numbers != Numbers::low_discrepancy ? 1 : kGainOfStandard;
-    const double costs[] = {cost(standard) / gain, standard.has_others ? std::numeric_limits<double>::infinity() : cost(by_connections)};
-    return std::isinf(costs[0]) && std::isinf(costs[1]) ? by_width : costs[1] < costs[0];
+    const auto [standard, by_connections] =
+        run(small, batches, {budget * first[0].work / both, budget * first[1].work / both}, stream, work);
+    if (standard.count < 2 || by_connections.count < 2) return by_width;
+    if (standard.has_others) return false;
+    // Nothing seen says nothing: a technique that never hit the gates is no good one.
+    constexpr double kNone = std::numeric_limits<double>::infinity();
+    const auto cost = [](const TrialBatches& of) { return of.variance > 0 ? of.variance * of.work : kNone; };
+    const bool loses_evenness = block_of(small) == 1 && options.numbers == Numbers::low_discrepancy;
+    const double of_standard = cost(standard) / (loses_evenness ? kGainOfStandard : 1),
+                 of_connections = cost(by_connections);
+    return std::min(of_standard, of_connections) == kNone ? by_width : of_connections < of_standard;
   }
 };
 
@@ -134,7 +140,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   plain.mix.reset();
   const SamplingMix by_width = sampling_mix(plain, gates, scene);
   SamplingMix best;
-  // Next-event estimation finds light of one bounce. Standard sampling must have a part.
+  // Next-event estimation finds light of one bounce.
   const bool light_is_open = !options.light && options.max_bounces > 1;
   const double part = kTrialPart - (light_is_open ? kLightTrialPart : 0);
   const auto choose_light = [&](const TrialWidths& widths, double samples, const TangentBasis* column) {
@@ -150,7 +156,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     if (width > widths.above_is_standard) return false;
     EstimatorOptions trial = options;
     if (!trial.light) trial.light = column ? best.interior_light : best.image_light;
-    return Choice{scene, gates, trial, purpose, samples, part}.connections(otherwise, column, stream, work);
+    const bool sums = column && purpose == Purpose::gradients;
+    return TechniqueChoice{scene, gates, trial, column, sums, samples, part}.connections(otherwise, stream, work);
   };
   best.image_light = choose_light(kImage, job.image, nullptr);
   best.image_connections = choose(kImage, by_width.image_connections, job.image, nullptr);

@@ -1,4 +1,4 @@
-// How `sampling: auto` decides how often standard sampling, light subpaths and ellipsoidal connections are used.
+// How `sampling: auto` decides between standard sampling and ellipsoidal connections, and on light subpaths.
 #pragma once
 #include <limits>
 
@@ -20,7 +20,7 @@ struct Job {
 
 /// The mix of techniques with the least variance x work, found by trials on small images (at most 4096 pixels), and, where `basis` has
 /// columns, on the interior term of the derivative along a random combination of them. Depends only on the arguments. For
-/// gradients, variance is that of sums over blocks of a quarter of the image's width. How often light subpaths are used is
+/// gradients, variance is that of sums over blocks of a quarter of the image's width. Whether light subpaths are used is
 /// decided first (light_subpaths_pay), then whether connections find the paths (run_trial). Gates much wider or narrower than where
 /// techniques cross need no trial of the latter; other sampling than automatic none either. Together trials take about a
 /// tenth of the work of what they decide about at most; where that is too little to tell techniques apart there is none, and the

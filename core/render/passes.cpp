@@ -138,9 +138,10 @@ void Passes::prepare(Term term) const {
 
 void Passes::run_images(const Pass& pass, Partition partition, Sink& sink) const {
   Worker worker(scene, gates, options, every_gate, sink);
-  std::optional<GatePass> lengths;
-  if (mix.image_connections) lengths = {.value = true};
-  run_paths(worker, lengths, mix.image_light, pass, partition);
+  if (mix.image_connections)
+    run_connections(worker, {.value = true}, mix.image_light, pass, partition);
+  else
+    run_standard(worker, mix.image_light, pass, partition);
   count(worker);
 }
 
@@ -148,15 +149,15 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
   Worker worker(scene, gates, options, pick, sink);
   if (term == Term::visibility) {
     run_visibility(worker, pass, partition);
+  } else if (term == Term::path_length) {
+    const GatePass jumps{.pairs = true, .part = PairPart::dirac, .coupled = options.antithetic};
+    run_connections(worker, jumps, mix.interior_light, pass, partition);
+  } else if (mix.interior_connections) {
+    const bool pairs = options.antithetic && scene.differentiable.lengths && any_slope();
+    const GateUse use = pairs ? GateUse::value_only : GateUse::value_and_slope;
+    run_connections(worker, {.value = true, .use = use, .pairs = pairs}, mix.interior_light, pass, partition);
   } else {
-    std::optional<GatePass> lengths;
-    if (term == Term::path_length) {
-      lengths = {.pairs = true, .part = PairPart::dirac, .coupled = options.antithetic};
-    } else if (mix.interior_connections) {
-      const bool pairs = options.antithetic && scene.differentiable.lengths && any_slope();
-      lengths = {.value = true, .use = pairs ? GateUse::value_only : GateUse::value_and_slope, .pairs = pairs};
-    }
-    run_paths(worker, lengths, mix.interior_light, pass, partition);
+    run_standard(worker, mix.interior_light, pass, partition);
   }
   count(worker);
 }
@@ -185,37 +186,39 @@ void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pas
   });
 }
 
-void Passes::run_paths(Worker& worker, const std::optional<GatePass>& lengths, double light, const Pass& pass,
-                       Partition partition) const {
-  worker.balance.rates = {light_rate(light), light > 0 && options.max_bounces > 1};
-  if (!lengths) {
-    StandardPaths standard(worker);
-    LightSubpaths light_subpaths(worker);
-    const TechniqueUse uses[] = {
-        {Technique::standard, 1 - light, true,
-         [&](int pixel, double scale, Rng& rng) { standard.start(pixel, scale, rng); }},
-        {Technique::light_subpath, light, true,
-         [&](int pixel, double scale, Rng& rng) { light_subpaths.sample(pixel, scale, rng); }},
-    };
-    visit(uses, worker, pass, partition);
-    worker.sink.note_technique(Technique::standard);
-    const CountedWork counted(worker, Technique::standard);
-    standard.finish();
-    return;
-  }
-  GatePass single_lengths = *lengths, pairs = *lengths;
+void Passes::run_standard(Worker& worker, double light, const Pass& pass, Partition partition) const {
+  worker.balance.rates.light = light_rate(light);
+  StandardPaths standard(worker);
+  LightSubpaths light_subpaths(worker);
+  const TechniqueUse uses[] = {
+      {Technique::standard, 1 - light, true,
+       [&](int pixel, double scale, Rng& rng) { standard.start(pixel, scale, rng); }},
+      {Technique::light_subpath, light, true,
+       [&](int pixel, double scale, Rng& rng) { light_subpaths.sample(pixel, scale, rng); }},
+  };
+  visit(uses, worker, pass, partition);
+  worker.sink.note_technique(Technique::standard);
+  const CountedWork counted(worker, Technique::standard);
+  standard.finish();
+}
+
+void Passes::run_connections(Worker& worker, const GatePass& lengths, double light, const Pass& pass,
+                             Partition partition) const {
+  worker.balance.rates.light_connections = light > 0 && options.max_bounces > 1;
+  GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
-  const GatePass& of_walks = mix.keep_length ? single_lengths : *lengths;
+  const GatePass& of_walks = mix.keep_length ? single_lengths : lengths;
   EllipsoidalConnections connections(worker, of_walks), camera_lengths(worker, single_lengths),
       camera_pairs(worker, pairs);
+  const auto if_so = [](bool used) { return used ? 1.0 : 0.0; };
   const bool from_camera = !scene.captures();
   const TechniqueUse uses[] = {
-      {Technique::camera_lengths, from_camera && lengths->value ? 1.0 : 0.0, false,
+      {Technique::camera_lengths, if_so(from_camera && lengths.value), false,
        [&](int, double scale, Rng& rng) { camera_lengths.sample_from_camera(scale, rng); }},
-      {Technique::camera_pairs, from_camera && lengths->pairs ? 1.0 : 0.0, false,
+      {Technique::camera_pairs, if_so(from_camera && lengths.pairs), false,
        [&](int, double scale, Rng& rng) { camera_pairs.sample_from_camera(scale, rng); }},
-      {Technique::walk, of_walks.value || of_walks.pairs ? 1.0 : 0.0, true,
+      {Technique::walk, if_so(of_walks.value || of_walks.pairs), true,
        [&](int pixel, double scale, Rng& rng) { connections.sample_walk(pixel, scale, rng); }},
   };
   visit(uses, worker, pass, partition);
@@ -227,8 +230,8 @@ struct Passes::Searches {
   SecondaryBoundary secondary;
 
   Searches(const Passes& passes, Worker& worker, const BoundaryGuide& guide)
-      : primary(worker, passes.edges(), guide, passes.narrow()),
-        secondary(worker, passes.edges(), guide, passes.narrow()) {}
+      : primary(worker, passes.edges(), guide, passes.mix.interior_connections),
+        secondary(worker, passes.edges(), guide, passes.mix.interior_connections) {}
 
   /// Segments between surfaces or to a light: a capture's serve the pixel that they are drawn for, a camera's whichever sees
   /// them.

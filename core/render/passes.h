@@ -73,10 +73,7 @@ class Passes {
   }
 
   /// Whether the term draws lengths from the gates.
-  bool draws_lengths(Term term) const {
-    if (term == Term::path_length) return true;
-    return term == Term::interior ? mix.interior_connections : narrow();
-  }
+  bool draws_lengths(Term term) const { return term == Term::path_length || mix.interior_connections; }
 
   /// To be called before a term is run: the visibility term needs its edges, and its guiding learns. What is learned depends
   /// on scene, gates, basis and options alone.
@@ -140,16 +137,14 @@ class Passes {
   /// Throws InputError where Dirac gates ask for what no technique finds.
   void check_dirac() const;
 
-  /// Whether the visibility term uses techniques that draw lengths.
-  bool narrow() const { return mix.interior_connections; }
-
   /// Whether derivatives may act on the gates: where paths keep their lengths, those do by which the camera sees an emitter.
   bool any_slope() const { return !mix.keep_length || scene.emitters.seen_by_camera; }
 
-  /// Camera paths by ellipsoidal connections for such lengths, or, without `lengths`, by standard sampling and light subpaths. `light`:
-  /// see SamplingMix::interior_light.
-  void run_paths(Worker& worker, const std::optional<GatePass>& lengths, double light, const Pass& pass,
-                 Partition partition) const;
+  /// Camera paths by standard sampling and, this part of the samples, with light subpaths.
+  void run_standard(Worker& worker, double light, const Pass& pass, Partition partition) const;
+  /// Camera paths by ellipsoidal connections for such lengths; with light subpaths where `light` is not zero.
+  void run_connections(Worker& worker, const GatePass& lengths, double light, const Pass& pass,
+                       Partition partition) const;
   struct Searches;
   void run_visibility(Worker& worker, const Pass& pass, Partition partition) const;
   /// All samples of a partition by techniques; their work counts as theirs.

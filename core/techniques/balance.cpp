@@ -1,6 +1,5 @@
 #include "core/techniques/balance.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/techniques/light_walk.h"

@@ -99,9 +99,10 @@ void PrimaryBoundary::sample(double scale, Rng& rng) {
         worker_.sink.add(pixel, light.value * (-sign * factor), light.whole_length(before.length), GateUse::value_only);
       }
     }
-    follow(
-        *x1, pixel, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng,
-        [&](const Rgb& value, double length) { worker_.sink.add(pixel, value * (sign * factor), length, GateUse::value_only); });
+    follow(*x1, pixel, edge->face[0], n_b * (r / length(x1->p - eye_.p)), walk_rng,
+           [&](const Rgb& value, double length) {
+             worker_.sink.add(pixel, value * (sign * factor), length, GateUse::value_only);
+           });
     if (moves) worker_.sink.bind(differential);
   }
   worker_.sink.note_guide(table, x);

@@ -67,7 +67,8 @@ class StandardWalk {
     const SurfacePoint y = scene.point_on_emitter(light_, u1, u2);
     const Scattering s(x, w_o_, distance_o_, y.p);
     const bool goes_on = bounce_ < max_bounces_;
-    const double hidden = goes_on && !scene.transparent(x.triangle) ? scene.hidden.step(hidden_share_, bounce_ + 1 == max_bounces_) : 0;
+    const double hidden =
+        goes_on && !scene.transparent(x.triangle) ? scene.hidden.step(hidden_share_, bounce_ + 1 == max_bounces_) : 0;
     const bool has_extent = !is_light(light_);
     const double cos_y = has_extent ? -dot(y.n, s.w_i) : 1;
     if (cos_y > 0 && reach_.holds(path_.length.back() + s.distance_i * scene.index_between(x, y))) {

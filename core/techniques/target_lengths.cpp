@@ -32,8 +32,6 @@ void draw_targets(const GatePass& pass, const GateSet& gates, const GatePick& pi
   t.tau[1] = gates.center(t.gate) + pair.minus;
   t.present[0] = pair.has_plus && t.tau[0] > 0;
   t.present[1] = pair.has_minus && t.tau[1] > 0;
-  t.jump[0] = pair.plus_is_jump;
-  t.jump[1] = pair.minus_is_jump;
   if (pass.coupled) {
     targets.push_back(t);
     return;

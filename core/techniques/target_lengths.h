@@ -14,7 +14,8 @@ namespace isochron {
 /// Which lengths a pass draws for its connections.
 struct GatePass {
   bool value = false;  ///< lengths drawn from W
-  GateUse use = GateUse::value_and_slope;  ///< how the gate enters contributions of those
+  /// How the gate enters contributions of those.
+  GateUse use = GateUse::value_and_slope;
   bool pairs = false;  ///< lengths drawn in pairs from dW
   PairPart part = PairPart::smooth;
   bool coupled = true;
@@ -24,7 +25,6 @@ struct GatePass {
 struct TargetLength {
   double tau[2] = {0, 0};
   bool present[2] = {false, false};
-  bool jump[2] = {false, false};  ///< at a jump of the gate
   bool pair = false;
   int gate = 0;   ///< of a pair
   int index = 0;  ///< among the lengths gathered for

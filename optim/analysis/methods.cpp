@@ -101,9 +101,12 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
 std::vector<Method> methods_without(const Experiment& experiment) {
   std::vector<Method> methods{automatic_method()};
   EstimatorOptions options = changed(experiment, methods[0]).estimator;
-  if (experiment.gates.unbounded()) leave_out("ellipsoidal", options);
-  for (const std::string& technique : used_techniques(options)) {
-    if (technique == "standard" && experiment.gates.unbounded()) continue;
+  const std::vector<std::string> used = used_techniques(options);
+  const GateShape shape = make_gates(experiment.gates).shape();
+  for (const std::string& technique : used) {
+    // One of the two alone can find such paths.
+    const bool finds_paths = technique == "standard" || technique == "ellipsoidal";
+    if (finds_paths && (shape.is_unbounded() || shape.is_dirac())) continue;
     methods.push_back({"without_" + technique, [technique](Experiment& e) {
                          set_automatic(e);
                          leave_out(technique, e.estimator);

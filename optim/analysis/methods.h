@@ -32,8 +32,8 @@ Method automatic_method();
 std::vector<Method> methods_for(const Experiment& experiment, const std::vector<double>& steps,
                                 std::vector<std::string>& notes);
 
-/// `auto`, and without_TECHNIQUE for each that it may use (experiment key `estimator.techniques`; where gates have no ends or are steady
-/// there are no connections).
+/// `auto`, and without_TECHNIQUE for each that it may use (experiment key `estimator.techniques`; of standard sampling and
+/// connections where either finds paths).
 std::vector<Method> methods_without(const Experiment& experiment);
 
 /// finite_difference_STEP_independent: finite differences of images whose random numbers have nothing in common, as a

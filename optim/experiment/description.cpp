@@ -145,7 +145,7 @@ void describe_estimator(Keys& keys, Experiment& e) {
              "the part of the samples (but for ellipsoidal connections) with light subpaths: walks from the emitters, "
              "joined with the "
              "paths from the camera. For light that leaves its case by a slit. Not of captures",
-             {.unset = !options.light, .otherwise = "`auto`: measured; else `0`"});
+             {.unset = !options.light, .otherwise = "`auto`: `0.5` or `0`, as measured; else `0`"});
   keys.value("techniques", techniques(options),
              "which techniques may be used, to measure what each brings. Of the visibility term's the mean does not "
              "depend on them, but "

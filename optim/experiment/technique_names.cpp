@@ -74,8 +74,8 @@ Field techniques(EstimatorOptions& options) {
     }
     use_only(names, value, options);
   };
-  return {"list of words", allowed, read, [&options] { return fmt::format("[{}]", fmt::join(used_techniques(options), ", ")); },
-          meanings};
+  return {"list of words", allowed, read,
+          [&options] { return fmt::format("[{}]", fmt::join(used_techniques(options), ", ")); }, meanings};
 }
 
 bool leaves_out_techniques(const EstimatorOptions& options) {

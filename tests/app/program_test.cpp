@@ -179,8 +179,8 @@ TEST_F(Program, ChartComparesTheMethods) {
   const Result techniques = run({"chart", file, "-o", out, "--seconds", "0.4", "--techniques", "--quiet"});
   EXPECT_EQ(techniques.status, 0) << techniques.errors;
   const std::string without = folder_.read("out/chart_table.csv");
-  for (const char* method : {"auto", "without_standard", "without_ellipsoidal", "without_light", "without_wedge", "without_aimed",
-                             "without_from_camera", "without_at_length", "without_light_arcs"})
+  for (const char* method : {"auto", "without_standard", "without_ellipsoidal", "without_light", "without_wedge",
+                             "without_aimed", "without_from_camera", "without_at_length", "without_light_arcs"})
     EXPECT_NE(without.find(std::string("\n") + method + ","), std::string::npos) << method;
   EXPECT_EQ(without.find("paper"), std::string::npos);
   // A parameter without any influence has no gradient to compare.

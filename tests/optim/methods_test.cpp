@@ -62,6 +62,24 @@ TEST(Methods, AllOfThemKnowTheSlopeOfALikelihood) {
   }
 }
 
+TEST(Methods, LeaveOutOneTechniqueEach) {
+  TemporaryFolder folder;
+  write_tiny_scene(folder);
+  folder.write("tiny.yaml", tiny_experiment());
+  const auto names = [&](const std::vector<std::string>& settings) {
+    std::string all;
+    for (const Method& method : methods_without(load_experiment(folder.file("tiny.yaml"), settings)))
+      all += method.name + " ";
+    return all;
+  };
+  const std::string rest = "without_wedge without_aimed without_from_camera without_at_length without_light_arcs ";
+  EXPECT_EQ(names({}), "auto without_standard without_ellipsoidal without_light " + rest);
+  for (const char* gates : {"gates={kind: steady}", "gates={kind: dirac, centers: [5]}"})
+    EXPECT_EQ(names({gates}), "auto without_light " + rest) << gates;
+  EXPECT_EQ(names({"estimator={techniques: [standard, ellipsoidal, wedge]}"}),
+            "auto without_standard without_ellipsoidal without_light without_wedge ");
+}
+
 TEST(Methods, TrialsHaveRandomNumbersOfTheirOwn) {
   for (const std::uint32_t gates : {1u, 2u, 10u}) {
     std::set<std::uint32_t> numbers;

@@ -5,7 +5,7 @@
 // image's mean is an integral that quadrature gives to 0.2 % for gates with jumps, better for others.
 //
 // Statistics: z-tests at 4.5 standard errors, plus those 0.2 %, with fixed seeds (false alarms: 7e-6 each,
-// below 1e-3 for the file). Standard sampling, connections and both combined are compared; the best of them
+// below 1e-3 for the file). Standard sampling and connections are compared; the best of them
 // must have a standard error below 2 % of the image and 8 % of a derivative's scale (root of the terms'
 // summed squares).
 #include <gtest/gtest.h>
@@ -179,7 +179,8 @@ TEST_P(HardLight, MatchesQuadrature) {
     const Renderer renderer(scene, gates, options, &basis);
     const Estimate image = image_means(renderer, 1, kSamples, kBatches, {61, 0, 0})[0];
     EXPECT_LT(std::abs(image.mean - exact_image), 4.5 * image.standard_error + kQuadrature * exact_image)
-        << "connections " << connections << ": " << image.mean << " +- " << image.standard_error << ", exact " << exact_image;
+        << "connections " << connections << ": " << image.mean << " +- " << image.standard_error << ", exact "
+        << exact_image;
     least_error = std::min(least_error, image.standard_error);
     std::vector<std::vector<Estimate>> terms[3];
     for (int t = 0; t < 3; ++t)
@@ -194,7 +195,8 @@ TEST_P(HardLight, MatchesQuadrature) {
       }
       const double wanted = m < 2 ? exact[m] : 0;  // the wall has no part in it
       EXPECT_LE(std::abs(total - wanted), 4.5 * error + kQuadrature * std::abs(wanted))
-          << "connections " << connections << " motion " << m << ": " << total << " +- " << error << ", exact " << wanted;
+          << "connections " << connections << " motion " << m << ": " << total << " +- " << error << ", exact "
+          << wanted;
       if (m < 2) least_relative[m] = std::min(least_relative[m], scale > 0 ? error / scale : 0);
     }
   }

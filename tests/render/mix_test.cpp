@@ -240,6 +240,22 @@ TEST(MeasureMix, LooksAtWhatAllGatesCover) {
   }
 }
 
+/// Connections need the last segments outside of glass, and nothing seen is no reason for light subpaths.
+TEST(MeasureMix, TakesStandardSamplingWhereOnlyThatFindsLight) {
+  Scene scene = glossy_validation_scene(16, 0.5, glass(0.3, 1.5));
+  const Shape& block = scene.shapes[scene.find_shape("block")];
+  Vec3 middle{0, 0, 0};
+  for (int v = block.first_vertex; v < block.first_vertex + block.vertex_count; ++v)
+    middle = middle + scene.positions[v] / block.vertex_count;
+  scene.lights.push_back({.name = "inside", .position = middle, .intensity = Rgb(1)});
+  const auto mix = [&](double center) {
+    return measure_mix(scene, GateSet(GateShape::gaussian(0.05 * center), {center}), {.max_bounces = 3}, nullptr,
+                       {1, 0, 0}, Purpose::images);
+  };
+  EXPECT_FALSE(mix(5.0).image_connections);
+  EXPECT_EQ(mix(90).image_light, 0);
+}
+
 /// Under gates where techniques are about equal, an image of 64 samples was rendered five times as long as it took to see
 /// by which. What it takes now is counted in rays, the same on every machine; a few per cent more than a tenth is what
 /// rounding to whole samples of whole pixels may cost.

@@ -48,8 +48,8 @@ TEST(GatePick, LeavesMixedGradientsUnbiased) {
       options.mix = SamplingMix{connections, connections};
       const Estimate ours = gradient(options, 48, 54);
       EXPECT_LT(std::abs(z_score(ours, exact)), 4.5)
-          << (connections ? "connections" : "standard") << ", light " << light << ": " << ours.mean << " +- " << ours.standard_error << ", standard "
-          << exact.mean << " +- " << exact.standard_error;
+          << (connections ? "connections" : "standard") << ", light " << light << ": " << ours.mean << " +- "
+          << ours.standard_error << ", standard " << exact.mean << " +- " << exact.standard_error;
       EXPECT_LT(std::hypot(ours.standard_error, exact.standard_error), 0.02 * std::abs(exact.mean));
     }
   }

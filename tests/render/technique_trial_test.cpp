@@ -51,7 +51,7 @@ TEST_P(TechniqueTrials, TellWhatEachCosts) {
     for (std::size_t i = 0; i < images.mean().data.size(); ++i) variance += images.variance(i) * kBatches;
     const double sums = double{1} * block * block * block * block;  // blocks() averages
     EXPECT_NEAR(found.variance * found.work / (variance * sums * renderer.work() / kBatches), 1, 0.25) << connections;
-    // As many batches as the work allows, but one.
+    // As many batches as the work allows, but at least one.
     EXPECT_EQ(run_trial(trial, connections, kBatches, 3.5 * found.work, {1, 2, 3}, cache).count, 3);
     EXPECT_EQ(run_trial(trial, connections, kBatches, 0, {1, 2, 3}, cache).count, 1);
   }

@@ -98,11 +98,10 @@ double part_of_connections(const Finder& f, const PathSink::Found& found, Target
   return sum;
 }
 
-TargetLength pair_target(int gate, bool jump = false) {
+TargetLength pair_target(int gate) {
   TargetLength target;
   target.pair = true;
   target.gate = gate;
-  target.jump[0] = jump;
   return target;
 }
 
@@ -133,7 +132,7 @@ TEST_P(Weights, AddUpToOne) {
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
     for (const bool light : {false, true}) {
       f.worker.balance.rates.light_connections = light;
-      for (const TargetLength& target : {TargetLength{}, pair_target(0), pair_target(1), pair_target(2, true)})
+      for (const TargetLength& target : {TargetLength{}, pair_target(0), pair_target(1), pair_target(2)})
         EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
     }
     f.worker.balance.rates.light_connections = false;
@@ -151,7 +150,8 @@ TEST_P(Weights, OfBordersAddUpToOne) {
   for (const PathSink::Found& found : f.sink.found) {
     const int last = found.path.size() - 1;
     const double pdf = pdf_on_arc(f.prepared, found.path, last - 1);
-    if (last < 2 || !(pdf > 0) || !f.prepared.outside(found.path.vertex[last - 2], found.path.vertex[last - 1])) continue;
+    if (last < 2 || !(pdf > 0) || !f.prepared.outside(found.path.vertex[last - 2], found.path.vertex[last - 1]))
+      continue;
     const Vec3 tangent = normalize(f.prepared.edges(found.path.back().triangle)[0]);
     const auto part = [&](std::optional<double> pdf_of_arc) {
       return f.worker.balance.border(found.path, found.pixel, found.path.length.back(), tangent, 0.7, pdf_of_arc);

@@ -87,8 +87,8 @@ void measure(const Setting& setting, int batches, std::FILE* csv) {
         const double start = cpu_seconds();
         const PixelEstimate e = pixel_estimate(samples, batches, image);
         const double cost = e.variance * (cpu_seconds() - start);
-        std::fprintf(csv, "%s,%g,\"%s\",%s,%d,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity, connections,
-                     e.mean, e.variance, cost);
+        std::fprintf(csv, "%s,%g,\"%s\",%s,%d,%.6g,%.6g,%.6g\n", setting.name, width, method.name, quantity,
+                     connections, e.mean, e.variance, cost);
         std::printf("%-5s %6g  %-28s %-9s connections %d mean % .4e   variance x seconds %.2e\n", setting.name, width,
                     method.name, quantity, connections, e.mean, cost);
         std::fflush(stdout);

@@ -44,7 +44,8 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
       });
   for (std::FILE* out : {csv, stdout}) {
     std::fprintf(out, "%s,%s,%d,%g", c.name.c_str(), derivative ? "derivative" : "image",
-                 derivative ? chosen.interior_connections : chosen.image_connections, derivative ? chosen.interior_light : chosen.image_light);
+                 derivative ? chosen.interior_connections : chosen.image_connections,
+                 derivative ? chosen.interior_light : chosen.image_light);
     write_costs(costs, out);
   }
 }

@@ -1,4 +1,4 @@
-#include "core/render/light_share.h"
+#include "core/render/light_trial.h"
 
 #include <algorithm>
 #include <array>
@@ -44,8 +44,7 @@ class MomentSink final : public Sink {
       gates_.for_each_derivative(length, [&](int, double w, double slope) {
         double most = 0;
         for (int c = 0; c < 3; ++c)
-          most =
-              std::max(most, std::abs(value[c] * (w * rates.log_f[c] + slope_factor(use) * slope * rates.length)));
+          most = std::max(most, std::abs(value[c] * (w * rates.log_f[c] + slope_factor(use) * slope * rates.length)));
         squares += most * most;
       });
     }
@@ -89,7 +88,8 @@ bool light_subpaths_pay(const Scene& scene, const GateSet& gates, EstimatorOptio
     work += work_of[i];
   }
   // Of as many samples, of which the others are standard.
-  return moments.of[1] / (1 - kLightShare) * work_of[1] <= kMaxCostRatio[column != nullptr] * moments.of[0] * work_of[0];
+  const double cost = moments.of[1] / (1 - kLightShare) * work_of[1], without = moments.of[0] * work_of[0];
+  return cost < kMaxCostRatio[column != nullptr] * without;
 }
 
 }  // namespace isochron
