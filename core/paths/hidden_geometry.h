@@ -28,6 +28,7 @@ class HiddenGeometry {
   void update(const PreparedScene& scene);
 
   bool empty() const { return triangles_.empty(); }
+  /// Not of empty geometry.
   bool holds(int triangle) const { return triangle >= 0 && on_it_[triangle]; }
   /// Whether area sampling can draw every point that a sensor point sees.
   bool is_all() const { return is_all_; }
@@ -35,8 +36,8 @@ class HiddenGeometry {
   /// EstimatorOptions::hidden where it is of use: in derivatives, to which paths that miss these shapes add nothing, and, of later
   /// steps, where there are other shapes.
   AreaSteps steps(const EstimatorOptions& options, bool derivatives) const;
-  /// Of a step of that probability; `last`: that can lead to what changes. If nothing else does, all, for else the path adds nothing to
-  /// derivatives.
+  /// The probability of area sampling for one step, given that of its kind. It becomes 1 for the `last` step that can lead to what changes,
+  /// where only area-sampled shapes do: without it the path adds nothing to derivatives.
   double step(double probability, bool last) const {
     return last && alone_changes_ ? std::ceil(probability) : probability;
   }

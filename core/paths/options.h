@@ -32,7 +32,7 @@ struct BoundaryTechniques {
 /// What finds the paths of images and of the interior term: ellipsoidal connections, or standard sampling.
 struct SamplingMix {
   bool image_connections = false, interior_connections = false;
-  /// The part of the samples, 0 to below 1, that are with light subpaths (LightSubpaths), the others are standard. Connections have light
+  /// The part of the samples, 0 to below 1, with light subpaths (LightSubpaths); the others are standard. Connections have light
   /// subpaths where it is not zero.
   double image_light = 0, interior_light = 0;
   /// Paths keep their lengths (VertexFlows::keep_length), so that derivatives do not act on the gates, but for light that the camera

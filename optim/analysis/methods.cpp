@@ -100,13 +100,11 @@ std::vector<Method> methods_for(const Experiment& experiment, const std::vector<
 
 std::vector<Method> methods_without(const Experiment& experiment) {
   std::vector<Method> methods{automatic_method()};
-  EstimatorOptions options = changed(experiment, methods[0]).estimator;
-  const std::vector<std::string> used = used_techniques(options);
   const GateShape shape = make_gates(experiment.gates).shape();
-  for (const std::string& technique : used) {
-    // One of the two alone can find such paths.
-    const bool finds_paths = technique == "standard" || technique == "ellipsoidal";
-    if (finds_paths && (shape.is_unbounded() || shape.is_dirac())) continue;
+  // Only standard sampling finds paths of any length, only connections those of one.
+  const bool either_finds_paths = !shape.is_unbounded() && !shape.is_dirac();
+  for (const std::string& technique : used_techniques(changed(experiment, methods[0]).estimator)) {
+    if (!either_finds_paths && (technique == "standard" || technique == "ellipsoidal")) continue;
     methods.push_back({"without_" + technique, [technique](Experiment& e) {
                          set_automatic(e);
                          leave_out(technique, e.estimator);

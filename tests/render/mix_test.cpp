@@ -242,12 +242,7 @@ TEST(MeasureMix, LooksAtWhatAllGatesCover) {
 
 /// Connections need the last segments outside of glass, and nothing seen is no reason for light subpaths.
 TEST(MeasureMix, TakesStandardSamplingWhereOnlyThatFindsLight) {
-  Scene scene = glossy_validation_scene(16, 0.5, glass(0.3, 1.5));
-  const Shape& block = scene.shapes[scene.find_shape("block")];
-  Vec3 middle{0, 0, 0};
-  for (int v = block.first_vertex; v < block.first_vertex + block.vertex_count; ++v)
-    middle = middle + scene.positions[v] / block.vertex_count;
-  scene.lights.push_back({.name = "inside", .position = middle, .intensity = Rgb(1)});
+  const Scene scene = scene_with_light_in_glass();
   const auto mix = [&](double center) {
     return measure_mix(scene, GateSet(GateShape::gaussian(0.05 * center), {center}), {.max_bounces = 3}, nullptr,
                        {1, 0, 0}, Purpose::images);

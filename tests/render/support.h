@@ -107,6 +107,17 @@ inline Scene glossy_validation_scene(int width, double roughness, const Material
   return scene;
 }
 
+/// The same with a block of glass and a light inside of it, whose paths connections do not find.
+inline Scene scene_with_light_in_glass() {
+  Scene scene = glossy_validation_scene(16, 0.5, glass(0.3, 1.5));
+  const Shape& block = scene.shapes[scene.find_shape("block")];
+  Vec3 middle{0, 0, 0};
+  for (int v = block.first_vertex; v < block.first_vertex + block.vertex_count; ++v)
+    middle = middle + scene.positions[v] / block.vertex_count;
+  scene.lights.push_back({.name = "inside", .position = middle, .intensity = Rgb(1)});
+  return scene;
+}
+
 struct Estimate {
   double mean = 0, standard_error = 0;
 };

@@ -1,6 +1,7 @@
 // What the trial of automatic sampling chooses, and what that costs: isochron_technique_trial CSV [SEEDS]. Variance x CPU seconds over
 // the mean square of standard sampling and of ellipsoidal connections, and how often of so many trials connections were chosen, with
-// the trials' mean cost over that of the better technique. Images, and the interior term of a derivative in pixels and in sums over blocks of pixels.
+// the trials' mean cost over that of the better technique. Images, and the interior term of a derivative in pixels and in sums over
+// blocks of pixels.
 #include <fmt/format.h>
 
 #include <algorithm>
