@@ -230,6 +230,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
   const auto remesh = [&](Keys& inner) {
     inner.value("levels", field::integer(spec.remesh.levels, 1, kMostLevels), "optimisations one after the other",
                 {.required = true});
+    inner.value("more_levels", field::integer(spec.remesh.more_levels, 0, kMostLevels),
+                "that may follow, as long as the fit of a capture's counts is `unexplained`",
+                {.unset = spec.remesh.more_levels == 0});
     inner.value("edge_length", field::positive(spec.remesh.edge_length),
                 "of the first level's triangles; those of each further level have half of it",
                 {.unit = "scene units", .unset = spec.remesh.edge_length == 0, .otherwise = "the mesh as it is"});

@@ -39,6 +39,7 @@ struct Selection {
 /// A run in levels: on a mesh, then on the surface that was found in triangles of half the size, and so on.
 struct RemeshSpec {
   int levels = 0;          ///< 0: the mesh stays as it is
+  int more_levels = 0;     ///< that may follow, as long as the fit of counts is rejected (FitVerdict::unexplained)
   int coarse_levels = 1;   ///< so many have the first one's edge length, at most all
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
   /// Of albedos by vertex: the surface ends where the first level finds less than this share of their mean (within_outline). 0: where it is.
@@ -49,6 +50,7 @@ struct RemeshSpec {
   double adam_rate = 0;       ///< their OptimizerSpec::learning_rate
   double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 
+  int most_levels() const { return levels + more_levels; }
   bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
   /// Whether level `level` comes before the last coarse one, which evidence is taken from.
   bool comes_early(int level) const { return level < coarse_levels; }

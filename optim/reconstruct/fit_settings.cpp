@@ -109,9 +109,10 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   const double area = surface_area(start);
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
   settings.levels = settings.coarse_levels = kCoarseLevels;
-  for (double edge = settings.edge_length / 2;
-       edge > std::numbers::sqrt2 / 4 * resolution && vertices_of(area, edge) <= kMostVertices; edge /= 2)
-    ++settings.levels;
+  double edge = settings.edge_length / 2;
+  const auto fits = [&] { return vertices_of(area, edge) <= kMostVertices; };
+  for (; edge > std::numbers::sqrt2 / 4 * resolution && fits(); edge /= 2) ++settings.levels;
+  settings.more_levels = fits() ? 1 : 0;
   const double each = kLevelSamplesPerSecond * seconds / (settings.levels * histograms);
   settings.samples = static_cast<int>(std::clamp(each, 1.0 * kLeastSamples, 1.0 * kMostSamples)) / 2 * 2;
   settings.coarse_histograms =

@@ -19,6 +19,7 @@ struct TimeWindow {
 struct FitSettings {
   int samples = 16;  ///< of images, per histogram
   int levels = 1, coarse_levels = 1;
+  int more_levels = 0;  ///< while counts are not explained
   double edge_length = 1;     ///< of the first level
   double bending = 0.3;       ///< first weight: a nat per unit of curvature (a sphere has 50, the border of a disc 11)
   int coarse_histograms = 0;  ///< that coarse levels are fitted to; 0: all
@@ -37,7 +38,7 @@ struct FitSettings {
 };
 
 /// Levels, the coarse ones with edges as long as the resolution (of a surface much larger than that, longer) and the last one with edges of
-/// half of it, and samples for a fit of so many seconds on two cores.
+/// half of it (one with a quarter may follow), and samples for a fit of so many seconds on two cores.
 FitSettings fit_settings(const Mesh& start, double resolution, int histograms, double seconds);
 
 /// Times, as optical paths, at which light of the mesh may be counted at any point, and a quarter as much before and after, for the

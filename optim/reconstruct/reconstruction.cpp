@@ -39,7 +39,7 @@ std::string response_text(const ReconstructionSpec& spec, double bin) {
 
 std::string experiment_text(const ReconstructionSpec& spec, const FitSettings& set) {
   return fmt::format(
-      R"(# The surface behind the light of a capture, from what filtered back-projection shows; written by isochron reconstruct.
+      R"(# The surface that a capture's light came from; written by isochron reconstruct.
 name: {name}
 scene: scene.yaml
 max_bounces: 1
@@ -53,7 +53,7 @@ parameters:
     initial: 0
     scale: {edge:.4g}   # so that steps of adam are shares of the edges
     smoothing: {{bending: {bending}, slopes: {motion:.4g}, evidence: true}}
-    remesh: {{levels: {levels}, coarse_levels: {coarse}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
+    remesh: {{levels: {levels}, more_levels: {more}, coarse_levels: {coarse}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
   - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo
     shape: surface
@@ -73,7 +73,7 @@ output: {{histogram_samples: {primal}}}
 )",
       fmt::arg("name", fs::path(spec.capture).stem().string()), fmt::arg("seed", spec.seed),
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),
-      fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("coarse", set.coarse_levels),
+      fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("more", set.more_levels), fmt::arg("coarse", set.coarse_levels),
       fmt::arg("histograms", set.coarse_histograms), fmt::arg("steps", set.adam_iterations),
       fmt::arg("rate", set.adam_rate), fmt::arg("free", set.adam_motion), fmt::arg("share", set.outline_share),
       fmt::arg("slopes", set.outline_slopes), fmt::arg("edge", set.edge_length), fmt::arg("albedo", set.albedo),

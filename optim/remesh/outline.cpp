@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "core/base/disjoint_sets.h"
@@ -33,6 +34,56 @@ DisjointSets joined(const Mesh& mesh, F&& together) {
     for (int k = 0; k < 3; ++k)
       if (together(face[k], face[(k + 1) % 3])) sets.join(face[k], face[(k + 1) % 3]);
   return sets;
+}
+
+/// Of each vertex: the area of its connected part.
+std::vector<double> part_areas(const Mesh& mesh) {
+  const std::vector<double> area = areas_of(mesh);
+  DisjointSets parts = joined(mesh, [](int, int) { return true; });
+  std::vector<double> sums(area.size(), 0.0), result(area.size());
+  for (int v = 0; v < std::ssize(area); ++v) sums[parts.root(v)] += area[v];
+  for (int v = 0; v < std::ssize(area); ++v) result[v] = sums[parts.root(v)];
+  return result;
+}
+
+/// Of a mesh: its edges in the directions of their faces, as pairs of vertices.
+std::set<std::pair<int, int>> directed_edges(const Mesh& mesh) {
+  std::set<std::pair<int, int>> edges;
+  for (const auto& face : mesh.faces)
+    for (int k = 0; k < 3; ++k) edges.emplace(face[k], face[(k + 1) % 3]);
+  return edges;
+}
+
+/// Its borders, each as a loop of vertices in the direction of the faces that would close it.
+std::vector<std::vector<int>> borders(const std::set<std::pair<int, int>>& edges) {
+  std::map<int, int> next;
+  for (const auto& [from, to] : edges)
+    if (!edges.contains({to, from})) next.emplace(to, from);
+  std::vector<std::vector<int>> loops;
+  while (!next.empty()) {
+    std::vector<int>& loop = loops.emplace_back();
+    for (auto at = next.begin(); at != next.end(); at = next.find(loop.back())) {
+      loop.push_back(at->second);
+      next.erase(at);
+    }
+  }
+  return loops;
+}
+
+/// Triangles from one of a loop's vertices to its others, whose diagonals the mesh has not yet; none where it has some of all.
+std::vector<std::array<int, 3>> fan(const std::vector<int>& loop, const std::set<std::pair<int, int>>& edges) {
+  const std::size_t n = loop.size();
+  for (std::size_t first = 0; first < n; ++first) {
+    const auto at = [&](std::size_t i) { return loop[(first + i) % n]; };
+    std::vector<std::array<int, 3>> faces;
+    bool is_free = true;
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+      faces.push_back({at(0), at(i), at(i + 1)});
+      if (i > 1) is_free = is_free && !edges.contains({at(0), at(i)}) && !edges.contains({at(i), at(0)});
+    }
+    if (is_free) return faces;
+  }
+  return {};
 }
 
 /// Regions of vertices on the `inner` side that have less than that area change sides.
@@ -133,6 +184,22 @@ Remeshed without_small_parts(const Mesh& mesh, double least_area) {
   std::vector<double> above(mesh.positions.size(), 1.0);
   drop_small(mesh, areas_of(mesh), least_area, true, above);
   return Cut(mesh, above).left();
+}
+
+Remeshed without_small_holes(const Mesh& mesh, double least_area) {
+  Remeshed result = Cut(mesh, std::vector<double>(mesh.positions.size(), 1.0)).left();
+  const std::vector<Vec3>& p = result.mesh.positions;
+  const std::vector<double> areas = part_areas(result.mesh);
+  const std::set<std::pair<int, int>> edges = directed_edges(result.mesh);
+  const double border = 6 * std::sqrt(least_area / std::sqrt(3.0));
+  for (const std::vector<int>& loop : borders(edges)) {
+    double length_of_loop = length(p[loop.front()] - p[loop.back()]);
+    for (std::size_t i = 1; i < loop.size(); ++i) length_of_loop += length(p[loop[i]] - p[loop[i - 1]]);
+    if (!(length_of_loop < border) || areas[loop.front()] < least_area) continue;
+    const auto faces = fan(loop, edges);
+    result.mesh.faces.insert(result.mesh.faces.end(), faces.begin(), faces.end());
+  }
+  return result;
 }
 
 Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area) {

@@ -21,4 +21,8 @@ Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, dou
 /// The connected parts of a mesh whose area is at least that; without a face where none is.
 Remeshed without_small_parts(const Mesh& mesh, double least_area);
 
+/// An oriented manifold's holes are closed whose borders are shorter than that of a regular triangle of `least_area`, with triangles between
+/// the vertices there are. Parts of less than that area stay as they are.
+Remeshed without_small_holes(const Mesh& mesh, double least_area);
+
 }  // namespace isochron

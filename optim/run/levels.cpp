@@ -19,6 +19,7 @@
 #include "core/scene/scene_loader.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/evidence.h"
+#include "optim/problem/goodness_of_fit.h"
 #include "optim/remesh/remesh.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/level_log.h"
@@ -59,8 +60,8 @@ void write_surface(const std::string& file, const Mesh& mesh) {
 /// Of a part or a hole that the outline makes, in squares of the edges: three vertices have more, one or two mean nothing.
 constexpr double kLeastPart = 2;
 
-/// Area of a regular triangle, in squares of its edges. Parts that a fit has shrunk below it are left out: they would shrink with every level,
-/// and penalties relative to the distance of their vertices would grow without bound.
+/// Area of a regular triangle, in squares of its edges. Parts that a fit has shrunk below it are left out, and such holes closed: they would
+/// shrink with every level, and penalties relative to the distance of their vertices would grow without bound.
 constexpr double kTriangle = 0.43;
 
 /// A number, or null where it is none.
@@ -101,7 +102,7 @@ class Levels {
         if (!ready) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
         status_ = run(level);
         const bool ended = status_ != RunStatus::interrupted && status_ != RunStatus::diverged;
-        const bool more = ended && level < remeshed_.remesh.levels;
+        const bool more = ended && is_followed(level);
         on_first_rank([&] { publish(level, more); });
         if (!more) break;
       }
@@ -148,7 +149,7 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      if (!first) surface = without_small_parts(*surface, kTriangle * edge_length * edge_length);
+      if (!first) surface = without_small_features(*surface, kTriangle * edge_length * edge_length);
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,
                                  kLeastPart * edge_length * edge_length);
@@ -212,19 +213,28 @@ class Levels {
 
   /// Runs the level unless that is done.
   RunStatus run(int level) {
-    if (level < remeshed_.remesh.levels && has_ended(folder(level) + "/summary.yaml")) return ended_as(level);
+    if (has_ended(folder(level) + "/summary.yaml") && is_followed(level)) return ended_as(level);
     RunOptions options = options_;
     options.folder = folder(level);
-    options.errors = level == remeshed_.remesh.levels;
+    options.errors = level >= remeshed_.remesh.levels;
     options.report = [this](const std::string& text) { report_ = text; };
     // Losses of a level by adam scatter by design. The levels that follow show what came of it.
     if (remeshed_.remesh.steps_by_adam(level)) options.warning = {};
     options.progress = [this, level](Progress progress) {
       progress.level = level;
-      progress.levels = remeshed_.remesh.levels;
+      progress.levels = std::max(level, remeshed_.remesh.levels);
       if (options_.progress) options_.progress(progress);
     };
     return run_level_(options);
+  }
+
+  /// Of a level that has ended.
+  bool is_followed(int level) const {
+    if (level < remeshed_.remesh.levels) return true;
+    if (level >= remeshed_.remesh.most_levels()) return false;
+    YamlMap summary = open_yaml(folder(level) + "/summary.yaml").map();
+    const std::optional<YamlValue> fit = summary.find("fit");
+    return fit && fit->map().require("verdict").text() == name(FitVerdict::unexplained);
   }
 
   RunStatus ended_as(int level) const {
@@ -335,7 +345,7 @@ void require_levels(const Problem& problem) {
   }
   const Mesh loaded = mesh_of(problem.scene(), remeshed->shape);
   try {
-    require_remeshable(loaded, edge_length_of(remeshed->remesh.levels, remeshed->remesh, loaded));
+    require_remeshable(loaded, edge_length_of(remeshed->remesh.most_levels(), remeshed->remesh, loaded));
   } catch (const InputError& error) {
     remeshed->fail("remesh", fmt::format("the mesh of '{}' {}", remeshed->shape, error.what()));
   }

@@ -133,10 +133,13 @@ LevelSurface within_outline(const LevelSurface& surface, const std::vector<Param
   return result;
 }
 
-LevelSurface without_small_parts(const LevelSurface& surface, double least_area) {
-  const Remeshed left = without_small_parts(surface.mesh, least_area);
-  const bool any_dropped = left.mesh.positions.size() < surface.mesh.positions.size();
-  return left.mesh.faces.empty() || !any_dropped ? surface : carried_over(surface, left);
+LevelSurface without_small_features(const LevelSurface& surface, double least_area) {
+  const auto carried_where_changed = [](const LevelSurface& old, const Remeshed& left) {
+    const bool changed = left.mesh.faces.size() != old.mesh.faces.size();
+    return left.mesh.faces.empty() || !changed ? old : carried_over(old, left);
+  };
+  const LevelSurface parts = carried_where_changed(surface, without_small_parts(surface.mesh, least_area));
+  return carried_where_changed(parts, without_small_holes(parts.mesh, least_area));
 }
 
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {

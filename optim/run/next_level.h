@@ -39,8 +39,9 @@ LevelSurface found_surface(const Problem& problem, const std::vector<double>& th
 LevelSurface within_outline(const LevelSurface& surface, const std::vector<ParameterSpec>& parameters, double share,
                             double least_area);
 
-/// The same without connected parts of less than that area, unless all are: a fit shrinks what is not there towards a point.
-LevelSurface without_small_parts(const LevelSurface& surface, double least_area);
+/// The same without connected parts of less than that area, unless all are, and with holes closed that are smaller: a fit shrinks parts and
+/// holes that are not there towards points.
+LevelSurface without_small_features(const LevelSurface& surface, double least_area);
 
 /// The same in triangles of that size. Throws InputError where it is no manifold.
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length);

@@ -98,6 +98,8 @@ TEST_F(Reconstruct, FindsAPlate) {
   EXPECT_GT(histograms("2"), 0);
   EXPECT_EQ(2 * histograms("3"), histograms("2")) << "by adam";
   EXPECT_EQ(histograms("8"), 0);
+  EXPECT_NE(folder_.read("out/levels/9/summary.yaml").find("verdict: explained"), std::string::npos);
+  EXPECT_FALSE(folder_.has("out/levels/10"));
   EXPECT_EQ(run({"run", folder_.file("out/experiment.yaml"), "-o", folder_.file("again"), "--quiet", "--no-plots",
                  "--set", "optimizer.iterations=0"})
                 .status,
@@ -121,6 +123,22 @@ TEST_F(Reconstruct, TheSameBitsForAnyThreadsAndAfterAKill) {
     expect_same("one", out);
     EXPECT_NE(folder_.read(out + "/summary.yaml").find("\nstart: {"), std::string::npos);
   }
+}
+
+/// A response that is half a bin wide and two late is none that any surface explains.
+TEST_F(Reconstruct, AnotherLevelFollowsWhereCountsAreNotExplained) {
+  folder_.write("late.csv", "offset,value\n0,0\n96,1\n192,1\n288,0\n");
+  const std::vector<std::string> late = {"--response", folder_.file("late.csv")};
+  ASSERT_EQ(run(command("whole", late)).status, 0);
+  EXPECT_NE(folder_.read("whole/levels/9/summary.yaml").find("verdict: unexplained"), std::string::npos);
+  EXPECT_TRUE(folder_.has("whole/levels/10/summary.yaml"));
+  EXPECT_FALSE(folder_.has("whole/levels/11"));
+  EXPECT_EQ(folder_.read("whole/geometry/final_surface.ply"),
+            folder_.read("whole/levels/10/geometry/final_surface.ply"));
+  EXPECT_EQ(run(command("killed", late), SIGKILL, [&] { return folder_.has("killed/levels/9/summary.yaml"); }).status,
+            -SIGKILL);
+  ASSERT_EQ(run({"resume", folder_.file("killed"), "--quiet", "--no-plots"}).status, 0);
+  expect_same("whole", "killed");
 }
 
 TEST_F(Reconstruct, SaysHowMuchLightIsMissing) {

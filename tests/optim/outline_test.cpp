@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 
@@ -106,6 +108,44 @@ TEST(Outline, SmallPartsGo) {
   EXPECT_NEAR(area_left(left), 1, 1e-12);
   EXPECT_EQ(left.mesh.positions.size(), 25u);
   EXPECT_TRUE(without_small_parts(mesh, 1.01).mesh.faces.empty());
+}
+
+/// A square of 5 x 5 cells without one triangle, or without one cell: holes are closed below the border of a triangle with that area.
+TEST(Outline, SmallHolesAreClosed) {
+  for (const std::size_t missing : {1, 2}) {
+    Mesh mesh;
+    add_square(mesh, {0, 0, 0}, 5);
+    mesh.faces.erase(mesh.faces.begin() + 24, mesh.faces.begin() + 24 + static_cast<std::ptrdiff_t>(missing));
+    const double border = missing == 1 ? (2 + std::sqrt(2.0)) / 5 : 4.0 / 5, area = border * border * std::sqrt(3.0) / 36;
+    EXPECT_NEAR(area_left(without_small_holes(mesh, 0.999 * area)), 1 - 0.02 * static_cast<double>(missing), 1e-12);
+    EXPECT_NEAR(area_left(without_small_holes(mesh, 1.001 * area)), 1, 1e-12);
+  }
+}
+
+/// Borders of a part by itself are no holes, however short they are.
+TEST(Outline, SmallPartsAreNotClosed) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 1);
+  EXPECT_EQ(without_small_holes(mesh, 2).mesh.faces.size(), 2u);
+}
+
+/// A fit that pulls a hole together to a point leaves edges of no length, which remeshing takes away once it is closed.
+TEST(Outline, RemeshingMendsAClosedHole) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 5);
+  const std::array<int, 3> hole = mesh.faces[24];
+  mesh.faces.erase(mesh.faces.begin() + 24);
+  const Vec3 middle = (mesh.positions[hole[0]] + mesh.positions[hole[1]] + mesh.positions[hole[2]]) / 3.0;
+  for (const int v : hole) mesh.positions[v] = middle + 1e-10 * (mesh.positions[v] - middle);
+  const auto shortest = [](const Mesh& found) {
+    double least = 1;
+    for (const Edge& edge : build_edges(found))
+      least = std::min(least, length(found.positions[edge.vertex[1]] - found.positions[edge.vertex[0]]));
+    return least;
+  };
+  EXPECT_LT(shortest(remesh(mesh, 0.2).mesh), 1e-6) << "as it is";
+  const Remeshed closed = without_small_holes(mesh, 0.01);
+  EXPECT_GT(shortest(remesh(closed.mesh, 0.2).mesh), 0.05);
 }
 
 }  // namespace

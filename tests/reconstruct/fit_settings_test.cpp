@@ -40,6 +40,7 @@ TEST(FitSettings, EdgesOfAResolutionAndOneLevelWithHalfOfThat) {
   const FitSettings small = settings_for(0.04, 0.0137);
   EXPECT_DOUBLE_EQ(small.edge_length, 0.0137);
   EXPECT_EQ(small.levels, small.coarse_levels + 1);
+  EXPECT_EQ(small.more_levels, 1);
 }
 
 /// 500 triangles' pairs of 4.8 cm make a square metre.
@@ -47,6 +48,7 @@ TEST(FitSettings, LargeSurfacesBeginCoarser) {
   const FitSettings large = settings_for(1, 0.0137);
   EXPECT_NEAR(large.edge_length, 0.048, 0.0005);
   EXPECT_EQ(large.levels, large.coarse_levels + 2) << "2.4 and 1.2 cm; 0.6 would make 32000 vertices";
+  EXPECT_EQ(large.more_levels, 0);
   EXPECT_EQ(settings_for(1, 0.03).levels, large.coarse_levels + 2) << "2.4 and 1.2 cm, which is no finer than half";
   EXPECT_EQ(settings_for(0.5, 0.0137).levels, large.coarse_levels + 2) << "1.7 and 0.8 cm";
 }
