@@ -5,6 +5,17 @@
 
 namespace isochron {
 
+std::vector<Vec3> vertex_normals(const Scene& scene) {
+  std::vector<Vec3> sums(scene.positions.size());
+  for (const Triangle& triangle : scene.triangles) {
+    const auto& v = triangle.vertex;
+    const Vec3& a = scene.positions[v[0]];
+    const Vec3 normal = cross(scene.positions[v[1]] - a, scene.positions[v[2]] - a);
+    for (const int corner : v) sums[corner] += normal;
+  }
+  return sums;
+}
+
 bool coordinates_fit(const Scene& scene) {
   return coordinates_fit(scene.camera.position) &&
          std::all_of(scene.lights.begin(), scene.lights.end(),

@@ -107,6 +107,9 @@ struct Scene {
   int find_light(const std::string& name) const;     ///< -1 when there is none
 };
 
+/// Of all vertices: sums of their faces' normals, each as long as twice the area; zero where no face of positive area meets.
+std::vector<Vec3> vertex_normals(const Scene& scene);
+
 /// Of the camera, lights and all vertices.
 bool coordinates_fit(const Scene& scene);
 

@@ -39,7 +39,7 @@ double determined_unknowns(const Problem& problem, const GatedImage& target, con
     const auto count = static_cast<double>(std::count(begin, begin + block.count, 1));
     double trace = 0;
     for (const std::vector<double>& sample : samples)
-      trace += problem.penalty().curved(block, sample, scale) / static_cast<double>(samples.size());
+      trace += problem.prior().curved(block, sample, scale) / static_cast<double>(samples.size());
     determined += std::max(0.0, count - trace);  // a trace that samples know is rarely above
   }
   return determined;

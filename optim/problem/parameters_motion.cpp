@@ -19,18 +19,6 @@ Vec3 rotate(const Vec3& p, const Vec3& axis, double radians) {
   return c * p + s * cross(axis, p) + (1 - c) * dot(axis, p) * axis;
 }
 
-/// Area-weighted sums of face normals at the vertices of a shape; zero where no face of positive area meets.
-std::vector<Vec3> vertex_normals(const Scene& scene, const Shape& shape) {
-  std::vector<Vec3> sum(shape.vertex_count);
-  for (int t = shape.first_triangle; t < shape.first_triangle + shape.triangle_count; ++t) {
-    const auto& v = scene.triangles[t].vertex;
-    const Vec3& a = scene.positions[v[0]];
-    const Vec3 area = cross(scene.positions[v[1]] - a, scene.positions[v[2]] - a);
-    for (int k : v) sum[k - shape.first_vertex] += area;
-  }
-  return sum;
-}
-
 /// Gives each vertex that is selected its place in the selection, and returns these, or -1, for every vertex of the file that
 /// the selection names: those that lie at one position move as one, those without a face do not.
 std::vector<int> select(const ParameterSpec& spec, const Scene& scene, const Shape& shape, std::vector<int>& slot) {
@@ -125,16 +113,17 @@ void Parameters::bind_motion(const ParameterSpec& spec, Motion& motion, int shap
   for (const int place : places)
     for (int axis = 0; axis < stride; ++axis) unknowns.listed.push_back(place < 0 ? -1 : stride * place + axis);
   if (spec.direction_kind != VertexDirection::normal) return;
-  const std::vector<Vec3> sums = vertex_normals(scene_, shape);
+  const std::vector<Vec3> sums = vertex_normals(scene_);
   motion.normals.resize(selected);
   for (int v = 0; v < shape.vertex_count; ++v) {
     if (motion.slot[v] < 0) continue;
-    const double norm = length(sums[v]);
+    const Vec3& sum = sums[shape.first_vertex + v];
+    const double norm = length(sum);
     if (!(norm > 0))
       spec.fail("direction",
                 fmt::format("vertex {} of shape '{}' has no normal", shape.numbers_in_file()[v], shape.name),
                 "leave it out by selection");
-    motion.normals[motion.slot[v]] = sums[v] / norm;
+    motion.normals[motion.slot[v]] = sum / norm;
   }
 }
 

@@ -14,6 +14,7 @@
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
 #include "optim/problem/loss.h"
+#include "optim/problem/penalties.h"
 
 namespace isochron {
 namespace {
@@ -132,20 +133,12 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     const ParameterSpec& spec = experiment_.parameters[i];
     const Parameters::Block& block = parameters_->blocks()[i];
     if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
-    if (spec.slopes > 0) penalty_.add_slopes(scene_, parameters_->vertex_field(block), spec.slopes);
     const bool smooth_prior = spec.bending > 0 || spec.tangential > 0 || spec.evidence;
     if ((spec.prior_width > 0 || smooth_prior) && experiment_.loss.kind != LossKind::poisson)
       spec.fail(smooth_prior ? "smoothing" : "prior_width", "the loss is no likelihood", "loss: {kind: poisson}");
-    if (spec.bending > 0)
-      penalty_.add_forms(bending_forms(*parameters_, parameters_->vertex_field(block), parameters_->initial()),
-                         spec.bending);
-    if (spec.tangential > 0)
-      penalty_.add_forms(tangential_forms(*parameters_, parameters_->vertex_field(block), parameters_->initial()),
-                         spec.tangential);
-    if (spec.prior_width > 0) {
-      penalty_.add_prior(block, parameters_->initial(), spec.prior_width);
-    }
   }
+  penalty_ = penalty_of(experiment_.parameters, *parameters_, scene_);
+  prior_ = prior_of(experiment_.parameters, *parameters_, scene_);
   if (!can_render(parameters_->initial()) || (parameters_->target_known() && !can_render(parameters_->target())))
     throw InputError(
         fmt::format("{}: parameters: initial or target values put a vertex too far away (allowed: "

@@ -69,6 +69,7 @@ class Problem {
   const Parameters& parameters() const { return *parameters_; }
   const Preconditioner& preconditioner() const { return preconditioner_; }
   const QuadraticPenalty& penalty() const { return penalty_; }
+  const QuadraticPenalty& prior() const { return prior_; }  ///< see prior_of
   /// Of slopes: the target's mean square; of priors: one over the number of readings, as the loss is a mean. 0 where
   /// there is no penalty.
   PenaltyScale penalty_scale(const GatedImage& target) const;
@@ -210,7 +211,7 @@ class Problem {
   CasterUpdate caster_update_;
   std::unique_ptr<SceneCache> cache_;
   Preconditioner preconditioner_;
-  QuadraticPenalty penalty_;
+  QuadraticPenalty penalty_, prior_;
   int evaluations_;  ///< of the loss gradient
   mutable ChosenEstimators chosen_;
   using Choice = std::tuple<std::array<int, 4>, std::uint64_t, int>;

@@ -10,18 +10,6 @@ bool has_errors(const ParameterSpec& spec) {
   return spec.type == ParameterType::vertices && spec.bending > 0;
 }
 
-/// By area and angle, not of unit length.
-std::vector<Vec3> vertex_normals(const Scene& scene) {
-  std::vector<Vec3> normals(scene.positions.size());
-  for (const Triangle& triangle : scene.triangles) {
-    const auto& v = triangle.vertex;
-    const Vec3 normal =
-        cross(scene.positions[v[1]] - scene.positions[v[0]], scene.positions[v[2]] - scene.positions[v[0]]);
-    for (const int corner : v) normals[corner] += normal;
-  }
-  return normals;
-}
-
 }  // namespace
 
 bool has_surface_errors(const Problem& problem) {

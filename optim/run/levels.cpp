@@ -20,6 +20,7 @@
 #include "optim/experiment/files.h"
 #include "optim/problem/evidence.h"
 #include "optim/problem/goodness_of_fit.h"
+#include "optim/problem/penalties.h"
 #include "optim/remesh/remesh.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/level_log.h"
@@ -181,9 +182,8 @@ class Levels {
   /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back. Inner vertices
   /// keep to their normals: of motion within a surface of one albedo the gradient is all noise, which adam would follow until triangles fold.
   void free_borders(ParameterSpec& spec) const {
-    constexpr double kHeld = 200;  // a standard deviation of a twentieth of the vertices' distance
     spec.slopes = remeshed_.remesh.adam_slopes;
-    if (experiment_.loss.kind == LossKind::poisson) spec.tangential = std::max(kHeld, spec.tangential);
+    if (experiment_.loss.kind == LossKind::poisson) spec.tangential = std::max(kHeldTangents, spec.tangential);
   }
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
@@ -217,6 +217,7 @@ class Levels {
     RunOptions options = options_;
     options.folder = folder(level);
     options.errors = level >= remeshed_.remesh.levels;
+    options.earlier = {remeshed_.shape, options.errors ? earlier_surfaces(level) : std::vector<std::string>{}};
     options.report = [this](const std::string& text) { report_ = text; };
     // Losses of a level by adam scatter by design. The levels that follow show what came of it.
     if (remeshed_.remesh.steps_by_adam(level)) options.warning = {};
@@ -226,6 +227,15 @@ class Levels {
       if (options_.progress) options_.progress(progress);
     };
     return run_level_(options);
+  }
+
+  /// What levels before `level` have found, from the first one by adam on: those before it still have far to go.
+  std::vector<std::string> earlier_surfaces(int level) const {
+    int first = 1;
+    while (first < level && !remeshed_.remesh.steps_by_adam(first)) ++first;
+    std::vector<std::string> meshes;
+    for (int next = first + 1; next <= level; ++next) meshes.push_back(folder(next) + "/scene/surface.ply");
+    return meshes;
   }
 
   /// Of a level that has ended.

@@ -200,6 +200,7 @@ class Run {
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
     std::vector<double> of_surfaces;
     if (options_.errors && !options_.loss) of_surfaces = find_errors(*optimizer, final);
+    add_level_scatter(options_.earlier, parameters_.apply(state_.theta), of_surfaces);
     geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);

@@ -13,6 +13,7 @@
 
 #include "optim/experiment/experiment.h"
 #include "optim/problem/own_loss.h"
+#include "optim/run/level_scatter.h"
 #include "optim/run/log.h"
 #include "optim/run/loop.h"
 
@@ -45,6 +46,8 @@ struct RunOptions {
   /// Whether standard errors of what was found are stated, and expected counts rendered until their noise does not decide the verdict; of
   /// a level that others follow they are not.
   bool errors = true;
+  /// Their distances from what is found add to the errors of its vertices.
+  EarlierSurfaces earlier;
   std::function<void(const std::string&)> warning;  ///< one line
   std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
 };

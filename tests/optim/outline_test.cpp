@@ -116,7 +116,8 @@ TEST(Outline, SmallHolesAreClosed) {
     Mesh mesh;
     add_square(mesh, {0, 0, 0}, 5);
     mesh.faces.erase(mesh.faces.begin() + 24, mesh.faces.begin() + 24 + static_cast<std::ptrdiff_t>(missing));
-    const double border = missing == 1 ? (2 + std::sqrt(2.0)) / 5 : 4.0 / 5, area = border * border * std::sqrt(3.0) / 36;
+    const double border = missing == 1 ? (2 + std::sqrt(2.0)) / 5 : 4.0 / 5,
+                 area = border * border * std::sqrt(3.0) / 36;
     EXPECT_NEAR(area_left(without_small_holes(mesh, 0.999 * area)), 1 - 0.02 * static_cast<double>(missing), 1e-12);
     EXPECT_NEAR(area_left(without_small_holes(mesh, 1.001 * area)), 1, 1e-12);
   }
