@@ -18,24 +18,36 @@ import time
 import numpy as np
 
 import use_package
-from isochron.mesh_files import read_mesh
+from isochron.mesh_files import read_mesh, read_vertex_values
 from isochron.pictures.raster import Seen
 
 SCENE = pathlib.Path(__file__).resolve().parents[1] / "scenes/rabbit"
 STEP = 0.002  # metres
 HALF = 0.3
+LINES = np.arange(-HALF, HALF, STEP)  # at right angles to the wall, each way
 
 
 def depths(vertices, triangles):
-    """Distance from the wall on a grid of lines at right angles to it; NaN where nothing is met."""
-    along = np.arange(-HALF, HALF, STEP)
-    return Seen(vertices, triangles, along, along).depth
+    """Distance from the wall on a grid of lines; NaN where nothing is met."""
+    return Seen(vertices, triangles, LINES, LINES).depth
 
 
 def errors_of_depths(off):
     """Of differences in millimetres; NaN where there are none."""
     median, most = np.quantile(np.abs(off), [0.5, 0.8]) if off.size else (np.nan, np.nan)
     return {"median_mm": median, "within_80_mm": most}
+
+
+def covered(path, true, along):
+    """The share of true depths, on lines at right angles to the wall at all `along` each way, that lie within three standard errors of
+    a reconstruction's surface; those are along its normals."""
+    vertices, triangles = (np.asarray(array) for array in read_mesh(path))
+    seen, corners = Seen(vertices, triangles, along, along), vertices[triangles]
+    normals = np.zeros_like(vertices)
+    np.add.at(normals, triangles, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, None])
+    cosine = np.abs(seen.of(normals[:, 2] / np.linalg.norm(normals, axis=1)))
+    errors = np.abs(seen.depth - true) * cosine / seen.of(read_vertex_values(path, "standard_error"))
+    return (errors[np.isfinite(errors)] <= 3).mean()
 
 
 def errors(vertices, triangles):

@@ -9,6 +9,7 @@ light-cone transform (light_cone.py). Each sweep writes a table, experiments/mea
     silhouette                    intersection over union of what is seen
     seconds                       wall, of the whole method
     verdict                       of the fit
+    covered                       share of the true depths within three standard errors of the fit's
 
 The transform has two settings, its filter's ratio of signal to noise and how bright a surface has to be. They are chosen by the truth, in
 its favour: of all whose silhouette is within a tenth of the best, those with the least 80 % error.
@@ -39,7 +40,7 @@ RATIOS, BRIGHTNESSES = (0.1, 1, 10, 100), (0.1, 0.15, 0.2, 0.25, 0.3)
 METHODS = ("fit", "back_projection", "light_cone")
 USUAL = {"photons": 2000, "points": 64, "seconds": 300}
 COLUMNS = ("method", "photons", "points", "limit", "seed", "median_mm", "within_80_mm", "shared_median_mm", "shared_within_80_mm",
-           "silhouette", "seconds", "verdict")
+           "silhouette", "seconds", "verdict", "covered")
 
 
 def by_light_cone(capture):
@@ -56,26 +57,27 @@ def by_light_cone(capture):
 
 
 def by_fit(path, limit, seed, folder):
-    """Vertices and triangles, or None where there is no signal; and the verdict."""
+    """Vertices and triangles, or None where there is no signal; the verdict, and what is covered."""
     shutil.rmtree(folder, ignore_errors=True)  # nothing of another run may be taken for this one's
     try:
         program("reconstruct", path, "-o", folder, "--response", RESPONSE, "--seconds", limit, "--seed", seed)
     except Failure:
         if not (folder / "summary.yaml").exists() or summary(folder)["fit"]["verdict"] != "no_signal":
             raise
-        return None, "no_signal"
-    return read_mesh(folder / "geometry/final_surface.ply"), summary(folder)["fit"]["verdict"]
+        return None, "no_signal", ""
+    surface, true = folder / "geometry/final_surface.ply", rabbit_errors.depths(*read_mesh(rabbit_errors.SCENE / "rabbit.obj"))
+    return read_mesh(surface), summary(folder)["fit"]["verdict"], f"{rabbit_errors.covered(surface, true, rabbit_errors.LINES):.3f}"
 
 
-def row_of(found, seen, seconds, verdict=""):
+def row_of(found, seen, seconds, verdict="", covered=""):
     """The last columns; `seen`: depths of back-projection."""
     if found is None or not len(found[1]):
-        return ("",) * 5 + (f"{seconds:.3g}", verdict)
+        return ("",) * 5 + (f"{seconds:.3g}", verdict, covered)
     errors, true = rabbit_errors.errors(*found), rabbit_errors.depths(*read_mesh(rabbit_errors.SCENE / "rabbit.obj"))
     off = 1000 * (rabbit_errors.depths(*found) - true)
     shared = rabbit_errors.errors_of_depths(off[np.isfinite(off) & np.isfinite(seen)])
     numbers = (errors["median_mm"], errors["within_80_mm"], shared["median_mm"], shared["within_80_mm"], errors["silhouette"], seconds)
-    return (*(f"{value:.3g}" for value in numbers), verdict)
+    return (*(f"{value:.3g}" for value in numbers), verdict, covered)
 
 
 def measure(options, photons, points, limits, seed, folder):
@@ -93,8 +95,8 @@ def measure(options, photons, points, limits, seed, folder):
         yield "light_cone", *start, *row_of(found, seen, seconds)
     for limit in limits if "fit" in options.methods else ():
         began = time.monotonic()
-        found, verdict = by_fit(path, limit, seed, folder / "run")
-        yield "fit", f"{photons:g}", points, f"{limit:g}", seed, *row_of(found, seen, time.monotonic() - began, verdict)
+        found, *verdict = by_fit(path, limit, seed, folder / "run")
+        yield "fit", f"{photons:g}", points, f"{limit:g}", seed, *row_of(found, seen, time.monotonic() - began, *verdict)
 
 
 def sweep(options, name):

@@ -9,6 +9,7 @@ wall of 2 m with bins of 32 ps. Writes experiments/measured/shapes.csv after eve
     silhouette                    intersection over union of what is seen
     seconds                       wall, of the whole method
     verdict, deviance_over_floor  of the fit
+    covered                       share of the true depths within three standard errors of the fit's
 """
 
 import argparse
@@ -30,7 +31,7 @@ from reproduction.tables import markdown, read_rows, write_rows
 from scenes import mesh
 from scenes.implicit import Blobs, polygonise
 
-COLUMNS = "shape", "method", "median_mm", "within_80_mm", "silhouette", "seconds", "verdict", "deviance_over_floor"
+COLUMNS = "shape", "method", "median_mm", "within_80_mm", "silhouette", "seconds", "verdict", "deviance_over_floor", "covered"
 
 
 def blobs(parts, low, high, cell=0.006):
@@ -92,8 +93,11 @@ def shapes():
 
 def seen(surface, shape):
     """Depths on 301 x 301 lines at right angles to the wall, over a fifth more than its width."""
-    along = np.linspace(-0.6 * shape.side, 0.6 * shape.side, 301)
-    return Seen(*surface, along, along).depth
+    return Seen(*surface, lines(shape), lines(shape)).depth
+
+
+def lines(shape):
+    return np.linspace(-0.6 * shape.side, 0.6 * shape.side, 301)
 
 
 def together(parts):
@@ -141,9 +145,11 @@ def rows(name, shape, options, folder):
     program("reconstruct", path, "-o", folder / name, "--response", rabbit_errors.SCENE / "response.csv", "--seconds", options.seconds,
             "--seed", options.seed, "--force")
     seconds = time.monotonic() - start
-    found, fit = seen(read_mesh(folder / name / "geometry/final_surface.ply"), shape), summary(folder / name)["fit"]
-    for method, depths, took, *verdict in (("back_projection", shown, spent["seconds"], "", ""),
-                                           ("fit", found, seconds, fit["verdict"], f"{fit['deviance'] / fit['floor']:.4f}")):
+    surface, fit = folder / name / "geometry/final_surface.ply", summary(folder / name)["fit"]
+    found, covered = seen(read_mesh(surface), shape), rabbit_errors.covered(surface, true, lines(shape))
+    verdict_of_fit = fit["verdict"], f"{fit['deviance'] / fit['floor']:.4f}", f"{covered:.3f}"
+    for method, depths, took, *verdict in (("back_projection", shown, spent["seconds"], "", "", ""),
+                                           ("fit", found, seconds, *verdict_of_fit)):
         off = 1000 * (depths - true)
         errors = rabbit_errors.errors_of_depths(off[np.isfinite(off) & np.isfinite(shown)])
         both, either = np.isfinite(depths) & np.isfinite(true), np.isfinite(depths) | np.isfinite(true)
@@ -154,12 +160,12 @@ def rows(name, shape, options, folder):
 def table_of(rows):
     """For experiments/README.md: reconstruction / back-projection in each cell."""
     by = {(row["shape"], row["method"]): row for row in rows}
-    lines = []
+    table = []
     for shape in dict.fromkeys(shape for shape, _ in by):
         fit, other = by[shape, "fit"], by[shape, "back_projection"]
         cells = [f"{fit[key]} / {other[key]}" for key in ("median_mm", "within_80_mm", "silhouette", "seconds")]
-        lines.append([shape.replace("_", " "), *cells, fit["verdict"]])
-    return markdown(["shape", "median, mm", "80 %, mm", "silhouette", "seconds", "verdict"], lines)
+        table.append([shape.replace("_", " "), *cells, fit["verdict"], f"{100 * float(fit['covered']):.1f} %"])
+    return markdown(["shape", "median, mm", "80 %, mm", "silhouette", "seconds", "verdict", "within 3 errors"], table)
 
 
 def main():
@@ -168,8 +174,8 @@ def main():
     parser.add_argument("--shapes", nargs="+", choices=known, default=list(known), help="default: all")
     parser.add_argument("--photons", type=float, default=2000, help="per histogram, on average (default 2000)")
     parser.add_argument("--background", type=float, default=0.5, help="photons per bin beside them (default 0.5)")
-    parser.add_argument("--samples", type=int, default=2**29,
-                        help="of the expected counts in all: their noise has to be far below that of the photons (default 2^29)")
+    parser.add_argument("--samples", type=int, default=2**28,
+                        help="of the expected counts in all: their noise has to be far below that of the photons (default 2^28)")
     parser.add_argument("--seconds", type=float, default=300, help="of each reconstruction (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for captures and runs; default: a temporary one")
