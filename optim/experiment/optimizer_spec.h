@@ -28,6 +28,7 @@ struct RateDecay {
 };
 
 inline constexpr int kStopOfMethod = -1;
+inline constexpr int kMostSampleParts = 1024;
 
 struct OptimizerSpec {
   OptimizerMethod method = OptimizerMethod::adam;
@@ -38,6 +39,7 @@ struct OptimizerSpec {
   double tolerance = 0;  ///< converged once the image's RMSE is at most this times the target's RMS; 0: never
   int stop_window = kStopOfMethod;  ///< see window()
   RateDecay decay = {};             ///< adam
+  int sample_parts = 8;             ///< adam: of which an iteration takes one at least, see sample_share.h
   int inner_iterations = 5;         ///< lbfgs, quasi_newton: steps on the random numbers of one iteration
 
   /// Converged once the loss has settled over so many iterations (safeguard.h); 0: never. Unless given: 5 where an iteration
@@ -77,6 +79,11 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   };
   keys.map("decay", halving, "steps shrink, so that their noise averages out",
            {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
+  keys.value("sample_parts", field::integer(optimizer.sample_parts, 1, kMostSampleParts),
+             "as long as successive gradients agree an iteration takes a half, a quarter and so on of `samples`, one "
+             "of so many "
+             "parts at least; 1: all, always",
+             {.only = of(OptimizerMethod::adam)});
   keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
              "line searches of an iteration, all on the same random numbers",
              {.only = only(optimizer.method, {OptimizerMethod::lbfgs, OptimizerMethod::quasi_newton})});

@@ -46,7 +46,11 @@ class Objective {
   /// Loss and gradient; `loss` is that of the function above. Residual and derivative come from independent
   /// random numbers.
   virtual Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
-  /// The same with curvatures.
+  /// The same of the first of so many equal parts of the samples, where the objective has samples; `loss` may be another.
+  virtual Evaluation evaluate_part(const std::vector<double>& theta, std::uint32_t iteration, int /*parts*/) const {
+    return evaluate(theta, iteration);
+  }
+  /// As evaluate, with curvatures.
   virtual Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const = 0;
   /// Estimates, >= 0, of the diagonal of the Gauss-Newton matrix J'WJ at theta: (J' W^(1/2) z)^2 with a random sign z for each
   /// reading, others for each probe, and W from the image of `now`, which is evaluate(theta, iteration). Noise of the Jacobian

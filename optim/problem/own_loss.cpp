@@ -87,6 +87,10 @@ Evaluation OwnLossObjective::evaluate(const std::vector<double>& theta, std::uin
   return result;
 }
 
+Evaluation OwnLossObjective::evaluate_part(const std::vector<double>& theta, std::uint32_t iteration, int) const {
+  return evaluate(theta, iteration);
+}
+
 Evaluation OwnLossObjective::linearise(const std::vector<double>&, std::uint32_t) const {
   throw std::logic_error("a loss of one's own has no curvature");
 }

@@ -33,6 +33,8 @@ class OwnLossObjective : public RenderedObjective {
   double loss(const std::vector<double>& theta, std::uint32_t iteration) const override;
   /// The standard error of the loss is that of its first derivative: too large, by up to 1.4 times, where that is noise.
   Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
+  /// Of all samples.
+  Evaluation evaluate_part(const std::vector<double>& theta, std::uint32_t iteration, int parts) const override;
   /// Not for such losses: throw std::logic_error.
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
   std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,

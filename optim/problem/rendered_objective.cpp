@@ -50,6 +50,15 @@ Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::ui
   return problem_.evaluate(theta, target_, iteration, poll_);
 }
 
+Evaluation RenderedObjective::evaluate_part(const std::vector<double>& theta, std::uint32_t iteration,
+                                            int parts) const {
+  const SampleSpec& samples = problem_.experiment().samples;
+  int most = samples.primal / 2;
+  for (const Term term : kTerms)
+    if (samples.term(term) > 0) most = std::min(most, samples.term(term));
+  return problem_.evaluate(theta, target_, iteration, poll_, {0, std::clamp(parts, 1, std::max(1, most))});
+}
+
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
   if (!problem_.can_render(theta)) return problem_.no_evaluation(target_);
   const ReadingLoss rho = problem_.reading_loss(target_);

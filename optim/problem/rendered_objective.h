@@ -26,6 +26,8 @@ class RenderedObjective : public Objective {
   /// From two halves of the image's samples, as all losses here; see loss.h.
   double loss(const std::vector<double>& theta, std::uint32_t iteration) const override;
   Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override;
+  /// No fewer than two samples of the image and one of each term.
+  Evaluation evaluate_part(const std::vector<double>& theta, std::uint32_t iteration, int parts) const override;
   /// See jacobian.h.
   Evaluation linearise(const std::vector<double>& theta, std::uint32_t iteration) const override;
   std::vector<std::vector<double>> probe_curvature(const std::vector<double>& theta, std::uint32_t iteration,

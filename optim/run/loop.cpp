@@ -77,7 +77,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
         result.choice = FinalChoice::average;
         chosen = descent.settled_theta();
       }
-      if (chosen != state.theta) options.row(optimizer.evaluate(objective, chosen, iteration + 1), chosen, true);
+      if (chosen != state.theta) options.row(objective.evaluate(chosen, iteration + 1), chosen, true);
       state.safeguard = safeguard.state();
       state.descent = descent.state();
       state.theta = chosen;

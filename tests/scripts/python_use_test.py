@@ -202,7 +202,7 @@ class ProgressTest(UseTest):
 
     def long(self, **more):
         """Takes half a second or more."""
-        return self.experiment.render(samples=10000, **more)
+        return self.experiment.render(samples=50000, **more)
 
     def on(self, stream):
         return unittest.mock.patch.object(sys, "stderr", stream)

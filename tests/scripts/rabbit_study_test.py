@@ -82,13 +82,28 @@ class StudyTest(unittest.TestCase):
     def test_the_rabbit_has_no_errors(self):
         vertices, triangles = read_mesh(rabbit_errors.SCENE / "rabbit.obj")
         true = rabbit_errors.depths(vertices, triangles)
-        self.assertEqual(rabbit_study.row_of((vertices, triangles), true, 2.0, "explained"), ("0", "0", "0", "0", "1", "2", "explained"))
+        self.assertEqual(rabbit_study.row_of((vertices, triangles), true, 2.0, "explained"), ("0", "0", "0", "0", "1", "2", "explained", ""))
         half = np.where(np.arange(len(true)) < len(true) / 2, true, np.nan)  # where the other method sees something
         moved = vertices + [0, 0, 0.004] * (vertices[:, :1] > 0)
         row = rabbit_study.row_of((moved, triangles), half, 2.0)
         self.assertEqual(row[1], "4")
         self.assertEqual((row[2], row[3]), ("0", "0"))
-        self.assertEqual(rabbit_study.row_of(None, true, 1.0, "no_signal"), ("", "", "", "", "", "1", "no_signal"))
+        self.assertEqual(rabbit_study.row_of(None, true, 1.0, "no_signal"), ("", "", "", "", "", "1", "no_signal", ""))
+
+    def test_depths_are_covered_within_three_errors(self):
+        """Of a plate that leans by 60 degrees, errors along its normal are half of those in depth."""
+        lean = np.sqrt(3)
+        text = ("ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
+                "property double standard_error\nelement face 2\nproperty list uchar int vertex_indices\nend_header\n")
+        text += "".join(f"{x} {y} {0.5 + lean * x} 0.001\n" for x, y in ((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)))
+        lines = np.linspace(-0.12, 0.12, 25)
+        true = np.tile(0.5 + lean * lines, (25, 1))
+        with tempfile.TemporaryDirectory() as temporary:
+            path = pathlib.Path(temporary) / "plate.ply"
+            path.write_text(text + "3 0 2 1\n3 0 3 2\n", encoding="ascii")
+            self.assertEqual(rabbit_errors.covered(path, true + 0.0059, lines), 1)
+            self.assertEqual(rabbit_errors.covered(path, true - 0.0061, lines), 0)
+            self.assertAlmostEqual(rabbit_errors.covered(path, np.where(lines < 0.001, true, true + 0.1), lines), 11 / 21, delta=0.05)
 
     def test_the_transform_settles_on_what_sees_most(self):
         surfaces = {(1, 0.1): (0.9, 9), (1, 0.2): (0.5, 1), (2, 0.1): (0.85, 5), (2, 0.2): (0.82, 7)}  # silhouette, 80 % error
@@ -111,23 +126,25 @@ class StudyTest(unittest.TestCase):
             if verdict in (None, "no_signal"):
                 raise Failure("status 1")
 
-        with tempfile.TemporaryDirectory() as temporary, unittest.mock.patch.object(rabbit_study, "program", program):
+        with tempfile.TemporaryDirectory() as temporary, unittest.mock.patch.object(rabbit_study, "program", program), \
+                unittest.mock.patch.object(rabbit_errors, "covered", lambda *arguments: 0.96):
             for verdict in ("explained", "no_signal", None):
                 with self.subTest(verdict=verdict):
                     if verdict is None:
                         with self.assertRaises(Failure):
                             rabbit_study.by_fit("c.h5", 300, 1, pathlib.Path(temporary) / "run")
                         continue
-                    found, said = rabbit_study.by_fit("c.h5", 300, 1, pathlib.Path(temporary) / "run")
+                    found, said, covered = rabbit_study.by_fit("c.h5", 300, 1, pathlib.Path(temporary) / "run")
                     self.assertEqual((said, found is None), (verdict, verdict == "no_signal"))
+                    self.assertEqual(covered, "0.960" if found else "")
 
     def test_pictures(self):
         with tempfile.TemporaryDirectory() as temporary:
             folder = pathlib.Path(temporary)
             self.assertEqual(plot_rabbit_study.main([str(folder)]), 2)
-            rows = [("back_projection", 2000, 64, "", 1, 2, 7, 2, 7, 0.7, 10, ""), ("light_cone", 2000, 64, "", 1, 2, 6, 2, 5, 0.7, 5, ""),
-                    ("fit", 2000, 64, 30, 1, "", "", "", "", "", 5, "no_signal"),
-                    *(("fit", 2000, 64, limit, seed, 1, 3 + seed, 1, 3, 0.9, limit + seed, verdict) for limit, seed, verdict in
+            rows = [("back_projection", 2000, 64, "", 1, 2, 7, 2, 7, 0.7, 10, "", ""), ("light_cone", 2000, 64, "", 1, 2, 6, 2, 5, 0.7, 5, "", ""),
+                    ("fit", 2000, 64, 30, 1, "", "", "", "", "", 5, "no_signal", ""),
+                    *(("fit", 2000, 64, limit, seed, 1, 3 + seed, 1, 3, 0.9, limit + seed, verdict, "") for limit, seed, verdict in
                       ((60, 1, "explained"), (60, 2, "explained"), (60, 3, "unexplained"), (120, 1, "explained")))]
             write_rows(folder / "rabbit_seconds.csv", rabbit_study.COLUMNS, rows)
             self.assertEqual(plot_rabbit_study.main([str(folder), str(folder / "a.png")]), 0)
@@ -160,9 +177,9 @@ class ShapesTest(unittest.TestCase):
                 self.assertLess(2 * np.hypot(np.nanmax(depths), shape.side), shape.bin * shape.bins * 0.299792458e-3)
 
     def test_the_table_has_both_methods(self):
-        rows = [dict(zip(shape_study.COLUMNS, ("plates", method, *numbers, verdict, ""))) for method, numbers, verdict in
+        rows = [dict(zip(shape_study.COLUMNS, ("plates", method, *numbers, verdict, "", "0.987"))) for method, numbers, verdict in
                 (("back_projection", ("0.9", "2.2", "0.7", "4"), ""), ("fit", ("0.4", "1", "0.9", "213"), "explained"))]
-        self.assertIn("| plates | 0.4 / 0.9 | 1 / 2.2 | 0.9 / 0.7 | 213 / 4 | explained |", shape_study.table_of(rows))
+        self.assertIn("| plates | 0.4 / 0.9 | 1 / 2.2 | 0.9 / 0.7 | 213 / 4 | explained | 98.7 % |", shape_study.table_of(rows))
 
 
 class BoundTest(unittest.TestCase):
