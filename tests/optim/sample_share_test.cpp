@@ -6,6 +6,10 @@
 #include <cmath>
 #include <random>
 
+#include "optim/problem/rendered_objective.h"
+#include "optim/run/loop.h"
+#include "tests/optim/synthetic_objective.h"
+#include "tests/optim/tiny_scene.h"
 #include "tests/seed.h"
 
 namespace isochron {
@@ -76,6 +80,65 @@ TEST(SampleShare, GoesOnFromItsState) {
     second.observe(gradient);
     EXPECT_EQ(first.parts(), second.parts());
   }
+}
+
+/// Remembers which parts it was asked for.
+class Recording : public ExponentialFit {
+ public:
+  Evaluation evaluate(const std::vector<double>& theta, std::uint32_t iteration) const override {
+    return evaluate_part(theta, iteration, 1);
+  }
+  Evaluation evaluate_part(const std::vector<double>& theta, std::uint32_t iteration, int parts) const override {
+    asked.push_back(parts);
+    return linearise(theta, iteration);
+  }
+  mutable std::vector<int> asked;
+};
+
+std::vector<int> parts_of_a_run(Checkpoint& state, int iterations) {
+  const Recording fit;
+  OptimizerSpec spec;
+  spec.learning_rate = 0.01;
+  spec.iterations = iterations;
+  const Preconditioner none;
+  const auto optimizer = make_optimizer(spec, none);
+  LoopOptions options;
+  options.iterations = iterations;
+  options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
+  options.save = [] {};
+  run_loop(fit, *optimizer, 0, options, state);
+  return fit.asked;
+}
+
+TEST(SampleShare, AdamAsksForItAndEndsWithAllSamples) {
+  Checkpoint whole, half;
+  whole.theta = half.theta = {1, 0.2};
+  const std::vector<int> asked = parts_of_a_run(whole, 24);
+  std::vector<int> expected(10, 1);
+  expected.insert(expected.end(), 14, 8);
+  expected.push_back(1);  // of the result
+  EXPECT_EQ(asked, expected);
+  parts_of_a_run(half, 15);
+  const std::vector<int> rest = parts_of_a_run(half, 24);
+  EXPECT_EQ(rest, std::vector<int>(expected.begin() + 15, expected.end())) << "resumed";
+  EXPECT_EQ(half.theta, whole.theta);
+}
+
+TEST(SampleShare, PartsAreTheFirstSamples) {
+  TemporaryFolder folder;
+  write_tiny_scene(folder);
+  const Problem problem(load_experiment(folder.write(
+      "tiny.yaml", replaced(tiny_experiment(), "interior: 16, visibility: 16", "interior: 8, visibility: 16"))));
+  const GatedImage target = problem.make_target(kGoOn);
+  const RenderedObjective objective(problem, target, kGoOn);
+  const std::vector<double> theta = problem.parameters().initial();
+  const auto expect_same = [](const Evaluation& a, const Evaluation& b) {
+    EXPECT_EQ(a.gradient, b.gradient);
+    EXPECT_EQ(a.loss, b.loss);
+  };
+  expect_same(objective.evaluate_part(theta, 3, 1), objective.evaluate(theta, 3));
+  expect_same(objective.evaluate_part(theta, 3, 4), problem.evaluate(theta, target, 3, kGoOn, {0, 4}));
+  expect_same(objective.evaluate_part(theta, 3, 64), problem.evaluate(theta, target, 3, kGoOn, {0, 8}));
 }
 
 }  // namespace
