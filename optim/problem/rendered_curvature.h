@@ -7,7 +7,8 @@
 
 namespace isochron {
 
-/// From random numbers that no iteration of a run has. Weights of the readings are those of an image of its own.
+/// H of the readings and P of Problem::prior(), from random numbers that no iteration of a run has. Weights of the readings are those of an
+/// image of its own.
 class RenderedCurvature : public CurvatureProducts {
  public:
   /// All must outlive this; theta is one that can be rendered.
@@ -25,8 +26,8 @@ class RenderedCurvature : public CurvatureProducts {
   /// Some of the loss, penalty included, each from random numbers of its own; 0 for unknowns that a bound keeps from following
   /// it.
   std::vector<std::vector<double>> gradients() const;
-  /// How the unknowns scatter about the optimum, `count` times: by the noise of the readings, and by what the penalty, taken for a
-  /// prior, leaves open. Their covariance is (H + P)^-1, which is that of the unknowns but for variance_scale(). The Jacobian's
+  /// How the unknowns scatter about the optimum, `count` times: by the noise of the readings, and by what the prior leaves
+  /// open. Their covariance is (H + P)^-1, which is that of the unknowns but for variance_scale(). The Jacobian's
   /// own noise adds to it. Unknowns that lie at a bound, or that nothing depends on, stay. Not for finite differences.
   std::vector<std::vector<double>> samples(int count) const;
   /// Diagonals of H + P, estimated and on average too large by the noise of the Jacobian (see Objective::probe_curvature), and of

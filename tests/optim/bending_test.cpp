@@ -9,6 +9,7 @@
 #include <random>
 
 #include "core/scene/mesh.h"
+#include "optim/problem/penalties.h"
 #include "optim/problem/smoothing.h"
 #include "tests/seed.h"
 
@@ -197,6 +198,38 @@ TEST(Tangential, IsMotionOfInnerVerticesWithinTheSurface) {
   EXPECT_EQ(forms.size(), 2u * 25u);
   EXPECT_NEAR(energy(forms, parameters.initial()), 0, 1e-20);
   EXPECT_NEAR(energy(forms, theta) / expected, 1, 1e-9);
+}
+
+/// A tilt has slopes and no bending. As a prior only bending counts, and motion within the surface is held; without bending slopes stay a prior.
+TEST(Prior, SlopesOfASurfaceThatBendsAreNone) {
+  const auto plane = surface(sheet(6, 0), VertexDirection::free);
+  const Parameters& parameters = *plane->parameters;
+  const Parameters::VertexField field = parameters.vertex_field(parameters.blocks()[0]);
+  std::vector<double> tilt = parameters.initial(), shift = tilt;
+  for (std::size_t i = 0; i < field.vertices.size(); ++i)
+    tilt[field.begin + 3 * static_cast<int>(i) + 2] = 0.1 * parameters.scene().positions[field.vertices[i]].x;
+  const int middle = 3 * (3 * 7 + 3);
+  ASSERT_EQ(field.vertices[3 * 7 + 3], 3 * 7 + 3);
+  shift[field.begin + middle] = 0.01;
+  ParameterSpec spec;
+  spec.slopes = 5;
+  spec.bending = 3;
+  const auto value = [&](const QuadraticPenalty& penalty, const std::vector<double>& theta) {
+    return penalty.value(theta, {1, 1});
+  };
+  const QuadraticPenalty penalty = penalty_of({spec}, parameters, plane->scene),
+                         prior = prior_of({spec}, parameters, plane->scene);
+  const double border = value(prior, parameters.initial());
+  EXPECT_NEAR(value(prior, shift) - border, kHeldTangents * 0.0001 * 36, 1e-9);  // of 36 cells of the unit square
+  const double all = value(penalty, tilt);
+  spec.slopes = 0;
+  const double bends = value(penalty_of({spec}, parameters, plane->scene), tilt);
+  EXPECT_GT(all, bends + 0.01);
+  EXPECT_NEAR(value(prior, tilt), bends, 1e-9);
+  spec.slopes = 5;
+  spec.bending = 0;
+  EXPECT_EQ(value(prior_of({spec}, parameters, plane->scene), tilt),
+            value(penalty_of({spec}, parameters, plane->scene), tilt));
 }
 
 }  // namespace
