@@ -144,22 +144,23 @@ TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
 
 /// Of vertices that move freely, along their normals, here z: by the whole matrix. The mean over 81 vertices of four samples, neighbours of
 /// which go together, is known to some 10 %, its root to 5; 0.3 is six of these. Conjugate gradients of twelve steps end below, and the
-/// Jacobian's noise adds. Without the scale, or with one axis of three, the ratio is far off.
+/// Jacobian's noise adds. Without the scale, or with one axis of three, the ratio is far off. The matrix is that of all samples, which is
+/// semidefinite: without slopes noise hides the sign of what holds motion of the border within the plane.
 TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
   std::string text = folder_.read("painted.yaml");
   const std::size_t paint = text.find("  - {name: paint");
   text.replace(paint, text.find("  - {name: gain") - paint,
                "  - {name: dent, type: vertices, shape: plane, direction: free, initial: 0, target: 0, "
-               "smoothing: {bending: 0.3, slopes: 0.01}}\n");
+               "smoothing: {bending: 30, slopes: 0.01}}\n");
   const std::string shape = folder_.write("bent.yaml", text);
-  const Problem problem(load_experiment(shape));
+  const Problem problem(load_experiment(shape, {"samples.interior=4096"}));
   const GatedImage target = problem.make_target([] {});
   const std::vector<double>& theta = problem.parameters().initial();
   ASSERT_TRUE(has_surface_errors(problem));
   const RenderedCurvature curvature(problem, target, theta, [] {});
   const Curvatures all = curvature.all();
   const std::size_t n = theta.size(), m = n - 1;  // without the gain
-  const std::vector<double> factor = cholesky(all.data, all.prior, n);
+  const std::vector<double> factor = cholesky(all.bound, all.prior, n);
   const double scale = 1e-4;
   double expected = 0, determined = static_cast<double>(m);
   std::vector<std::vector<double>> inverse;  // of L, column by column
@@ -172,15 +173,17 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
       if (i % 3 == 2) expected += scale * x[r] * x[r];
     }
   }
+  std::vector<double> prior(n * n, 0.0);
+  problem.prior().add_curvature(static_cast<int>(n), problem.penalty_scale(target), prior);
   for (std::size_t i = 0; i < m; ++i)
     for (std::size_t j = 0; j < m; ++j)
       determined -=
-          all.prior[i * n + j] * std::inner_product(inverse[i].begin(), inverse[i].end(), inverse[j].begin(), 0.0);
+          prior[i * n + j] * std::inner_product(inverse[i].begin(), inverse[i].end(), inverse[j].begin(), 0.0);
   double found = 0;
   const std::vector<std::vector<double>> samples = curvature.samples(kErrorSamples);
   for (const double error : surface_errors(problem, samples, theta, scale)) found += error * error;
   EXPECT_NEAR(std::sqrt(found / expected), 1, 0.3) << found << " " << expected;
-  // Of the gain, which nothing holds, all is determined. Sixteen samples know the trace of what the prior leaves, here 196, to sqrt(2 x 196 / 16) = 5;
+  // Of the gain, which nothing holds, all is determined. Sixteen samples know the trace of what the prior leaves, here 155, to sqrt(2 x 155 / 16) = 4.4;
   // false alarms at 4 of these: 6e-5. Conjugate gradients end 5 % off.
   constexpr int kSamples = 16;
   const double found_determined =
