@@ -79,11 +79,11 @@ inline void describe(Keys& keys, OptimizerSpec& optimizer) {
   };
   keys.map("decay", halving, "steps shrink, so that their noise averages out",
            {.only = of(OptimizerMethod::adam), .unset = decay.half_life == 0});
-  keys.value("sample_parts", field::integer(optimizer.sample_parts, 1, kMostSampleParts),
-             "as long as successive gradients agree an iteration takes a half, a quarter and so on of `samples`, one "
-             "of so many "
-             "parts at least; 1: all, always",
-             {.only = of(OptimizerMethod::adam)});
+  keys.value(
+      "sample_parts", field::integer(optimizer.sample_parts, 1, kMostSampleParts),
+      "while successive gradients agree an iteration takes 1/2, 1/4 and so on of `samples`, at least 1 over this; "
+      "1: always all",
+      {.only = of(OptimizerMethod::adam)});
   keys.value("inner_iterations", field::integer(optimizer.inner_iterations, 1, 1000),
              "line searches of an iteration, all on the same random numbers",
              {.only = only(optimizer.method, {OptimizerMethod::lbfgs, OptimizerMethod::quasi_newton})});

@@ -33,13 +33,14 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
 double determined_unknowns(const Problem& problem, const GatedImage& target, const std::vector<char>& free,
                            const std::vector<std::vector<double>>& samples) {
   const PenaltyScale scale = problem.penalty_scale(target);
+  const QuadraticPenalty prior = problem.prior();
   double determined = 0;
   for (const Parameters::Block& block : problem.parameters().blocks()) {
     const auto begin = free.begin() + block.begin;
     const auto count = static_cast<double>(std::count(begin, begin + block.count, 1));
     double trace = 0;
     for (const std::vector<double>& sample : samples)
-      trace += problem.prior().curved(block, sample, scale) / static_cast<double>(samples.size());
+      trace += prior.curved(block, sample, scale) / static_cast<double>(samples.size());
     determined += std::max(0.0, count - trace);  // a trace that samples know is rarely above
   }
   return determined;

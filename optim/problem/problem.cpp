@@ -14,7 +14,6 @@
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
 #include "optim/problem/loss.h"
-#include "optim/problem/penalties.h"
 
 namespace isochron {
 namespace {
@@ -138,7 +137,6 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
       spec.fail(smooth_prior ? "smoothing" : "prior_width", "the loss is no likelihood", "loss: {kind: poisson}");
   }
   penalty_ = penalty_of(experiment_.parameters, *parameters_, scene_);
-  prior_ = prior_of(experiment_.parameters, *parameters_, scene_);
   if (!can_render(parameters_->initial()) || (parameters_->target_known() && !can_render(parameters_->target())))
     throw InputError(
         fmt::format("{}: parameters: initial or target values put a vertex too far away (allowed: "

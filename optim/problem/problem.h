@@ -21,6 +21,7 @@
 #include "optim/problem/loss.h"
 #include "optim/problem/objective.h"
 #include "optim/problem/parameters.h"
+#include "optim/problem/penalties.h"
 #include "optim/problem/readings.h"
 #include "optim/problem/smoothing.h"
 
@@ -69,7 +70,8 @@ class Problem {
   const Parameters& parameters() const { return *parameters_; }
   const Preconditioner& preconditioner() const { return preconditioner_; }
   const QuadraticPenalty& penalty() const { return penalty_; }
-  const QuadraticPenalty& prior() const { return prior_; }  ///< see prior_of
+  /// See prior_of. Made when it is asked for, which is at the end of a run.
+  QuadraticPenalty prior() const { return prior_of(experiment_.parameters, *parameters_, scene_); }
   /// Of slopes: the target's mean square; of priors: one over the number of readings, as the loss is a mean. 0 where
   /// there is no penalty.
   PenaltyScale penalty_scale(const GatedImage& target) const;
@@ -211,7 +213,7 @@ class Problem {
   CasterUpdate caster_update_;
   std::unique_ptr<SceneCache> cache_;
   Preconditioner preconditioner_;
-  QuadraticPenalty penalty_, prior_;
+  QuadraticPenalty penalty_;
   int evaluations_;  ///< of the loss gradient
   mutable ChosenEstimators chosen_;
   using Choice = std::tuple<std::array<int, 4>, std::uint64_t, int>;

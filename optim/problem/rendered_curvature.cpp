@@ -37,6 +37,7 @@ RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& t
       target_(target),
       theta_(theta),
       poll_(poll),
+      prior_(problem.prior()),
       smoothing_{problem.penalty_scale(target).slopes, 0},
       priors_{0, problem.penalty_scale(target).priors},
       scene_(problem.parameters().apply(theta)),
@@ -59,13 +60,13 @@ std::vector<double> RenderedCurvature::diagonal() const {
   for (const std::vector<double>& found :
        probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbes}, poll_))
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbes;
-  for (const PenaltyScale& scale : {smoothing_, priors_}) problem_.prior().add_diagonal(scale, mean);
+  for (const PenaltyScale& scale : {smoothing_, priors_}) prior_.add_diagonal(scale, mean);
   return mean;
 }
 
 std::vector<double> RenderedCurvature::prior_diagonal() const {
   std::vector<double> diagonal(theta_.size(), 0.0);
-  problem_.prior().add_diagonal(smoothing_, diagonal);
+  prior_.add_diagonal(smoothing_, diagonal);
   return diagonal;
 }
 
@@ -80,9 +81,8 @@ Curvatures RenderedCurvature::all() const {
   Curvatures result = readings(basis_, kMatrixIteration);
   result.prior.resize(result.data.size());
   const int unknowns = static_cast<int>(theta_.size());
-  problem_.prior().add_curvature(unknowns, smoothing_, result.prior);
-  for (std::vector<double>* matrix : {&result.data, &result.bound})
-    problem_.prior().add_curvature(unknowns, priors_, *matrix);
+  prior_.add_curvature(unknowns, smoothing_, result.prior);
+  for (std::vector<double>* matrix : {&result.data, &result.bound}) prior_.add_curvature(unknowns, priors_, *matrix);
   return result;
 }
 
@@ -103,8 +103,8 @@ Curvatures RenderedCurvature::within(const std::vector<std::vector<double>>& col
 std::vector<double> RenderedCurvature::penalty_product(PenaltyScale scale, const std::vector<double>& vector) const {
   std::vector<double> product(vector.size(), 0.0), nothing = product,
                                                    constant = product;  // the gradient is linear but for a constant
-  problem_.prior().add_gradient(vector, scale, product);
-  problem_.prior().add_gradient(nothing, scale, constant);
+  prior_.add_gradient(vector, scale, product);
+  prior_.add_gradient(nothing, scale, constant);
   for (std::size_t i = 0; i < product.size(); ++i) product[i] -= constant[i];
   return product;
 }
@@ -114,14 +114,14 @@ std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
   std::vector<std::vector<double>> gradients =
       probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, poll_);
   for (int k = 0; k < count; ++k)
-    problem_.prior().add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration),
-                                 static_cast<std::uint32_t>(kProbes + k), gradients[k]);
+    prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration), static_cast<std::uint32_t>(kProbes + k),
+                     gradients[k]);
   const std::vector<double> at_first = diagonal(), &low = problem_.parameters().lower(),
                             &high = problem_.parameters().upper();
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < theta_.size(); ++i)
     if (at_first[i] > 0 && theta_[i] > low[i] && theta_[i] < high[i]) free.push_back(i);
-  const std::vector<Coupling> couplings = problem_.prior().couplings(scale);
+  const std::vector<Coupling> couplings = prior_.couplings(scale);
   const Metric metric(at_first, couplings, std::move(free));
   return solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
                [&](const std::vector<double>& residual) { return metric.solve(residual); },

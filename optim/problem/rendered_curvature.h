@@ -43,6 +43,7 @@ class RenderedCurvature : public CurvatureProducts {
   const GatedImage& target_;
   const std::vector<double>& theta_;
   const Poll& poll_;
+  const QuadraticPenalty prior_;
   PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
   Scene scene_;
   TangentBasis basis_;

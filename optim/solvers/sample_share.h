@@ -12,7 +12,7 @@ namespace isochron {
 
 class SampleShare {
  public:
-  /// `most`: parts that an iteration may take one of; a power of two.
+  /// `most`: an iteration takes one of so many parts at least.
   explicit SampleShare(int most) : most_(most) {}
 
   /// The next gradient is to be made of one of so many equal parts of the samples: a power of two.
