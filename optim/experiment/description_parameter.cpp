@@ -241,6 +241,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
         "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
         "even size",
         {.unset = spec.remesh.coarse_levels == 1});
+    inner.value("fine_from", field::integer(spec.remesh.fine_from, 0, kMostLevels),
+                "of the coarse levels, the first that has half the edges already; 0: none",
+                {.unset = spec.remesh.fine_from == 0});
     const auto outline = [&spec](Keys& keys_of_outline) {
       keys_of_outline.value(
           "albedo", field::number(spec.remesh.outline, {.low = 0, .high = 1, .low_open = true, .high_open = true}),
@@ -255,10 +258,11 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
               "are, so that gaps open "
               "and webs tear",
               {.unset = spec.remesh.outline == 0});
-    inner.value("coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
-                "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
-                "evenly, those by adam to half as many, others in each iteration; 0: to all",
-                {.unset = spec.remesh.coarse_histograms == 0});
+    inner.value(
+        "coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
+        "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
+        "evenly, those by adam to half as many (from `fine_from` on to as many), others in each iteration; 0: to all",
+        {.unset = spec.remesh.coarse_histograms == 0});
     const auto adam = [&spec](Keys& keys_of_adam) {
       keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
                          "of each such level", {.required = true});

@@ -1,5 +1,6 @@
 // Parameters: what an experiment says of each, and the names of their types.
 #pragma once
+#include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
@@ -40,7 +41,8 @@ struct Selection {
 struct RemeshSpec {
   int levels = 0;          ///< 0: the mesh stays as it is
   int more_levels = 0;     ///< that may follow, as long as the fit of counts is rejected (FitVerdict::unexplained)
-  int coarse_levels = 1;   ///< so many have the first one's edge length, at most all
+  int coarse_levels = 1;   ///< so many have the first one's edge length, but for those from `fine_from` on; at most all
+  int fine_from = 0;       ///< the first with half of that length; 0: the first after the coarse ones
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
   /// Of albedos by vertex: the surface ends where the first level finds less than this share of their mean (within_outline). 0: where it is.
   double outline = 0;
@@ -51,6 +53,10 @@ struct RemeshSpec {
   double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 
   int most_levels() const { return levels + more_levels; }
+  /// How often edges are halved before level `level`.
+  int halvings(int level) const {
+    return std::max({0, level - coarse_levels, fine_from > 0 && level >= fine_from ? 1 : 0});
+  }
   bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
   /// Whether level `level` comes before the last coarse one, which evidence is taken from.
   bool comes_early(int level) const { return level < coarse_levels; }

@@ -10,6 +10,9 @@
 namespace isochron {
 namespace {
 
+/// Of the root of the surface's area, see bending_forms.
+constexpr double kBorderShare = 0.1;
+
 /// What a vertex has around it: weights of its neighbours, and sums over its triangles.
 struct Around {
   std::map<int, double> weight;  ///< half the cotangents of the angles opposite to each edge
@@ -133,7 +136,7 @@ std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parame
       parameters, field, theta,
       [](const Forms& forms, int v, const Around& here, double area, std::vector<LinearForm>& result) {
         if (here.along.size() == 2)
-          add_border_curvature(forms, v, here, std::sqrt(area), result);
+          add_border_curvature(forms, v, here, kBorderShare * std::sqrt(area), result);
         else if (here.along.empty() && here.area > 0)
           result.push_back(mean_curvature(forms, v, here));
       });

@@ -21,9 +21,9 @@ struct LinearForm {
 /// Of each vertex of the field that has triangles all around: 2 H sqrt(A), H being the mean curvature, by cotangents of the
 /// angles, and A a third of the area of its triangles. The sum of their squares is the integral of (2 H)^2 over the surface,
 /// which has no unit: 16 pi for any sphere, 0 for any plane, however uneven its mesh. Of each vertex of the field on a border: the
-/// border's curvature as a vector, so that the sum of squares is the integral of its square along the border times the root of the
-/// surface's area, without a unit, too: 2 pi^1.5 for any disc. Angles, areas, lengths and normals are those at theta, where the forms
-/// are exact.
+/// border's curvature as a vector, so that the sum of squares is the integral of its square along the border times a tenth of the root
+/// of the surface's area, without a unit, too: 0.2 pi^1.5 for any disc. With the whole root borders of thin parts are drawn back
+/// (optim/README.md, Bending). Angles, areas, lengths and normals are those at theta, where the forms are exact.
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta);
 

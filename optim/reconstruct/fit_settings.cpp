@@ -13,12 +13,12 @@
 namespace isochron {
 namespace {
 
-/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in nine levels, has 512 for 300 s. It takes some 200 s.
-constexpr double kLevelSamplesPerSecond = 63000;
+/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 512 for 300 s. It takes some 170 s.
+constexpr double kLevelSamplesPerSecond = 70000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// The first finds the outline and the second the albedo; five of adam move borders; the last has all histograms. Silhouettes of a rabbit
-/// after each: 0.81, 0.82, 0.87, 0.89, 0.91, 0.91, 0.91, 0.91 (optim/README.md, Borders).
-constexpr int kCoarseLevels = 8;
+/// The first finds the outline and the second the albedo; six of adam move borders, the last of these with half the edges, as a rim that
+/// turns away is finer than the others' triangles; the last has all histograms.
+constexpr int kCoarseLevels = 9, kFineFrom = 8;
 /// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
@@ -109,6 +109,7 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   const double area = surface_area(start);
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
   settings.levels = settings.coarse_levels = kCoarseLevels;
+  settings.fine_from = kFineFrom;
   double edge = settings.edge_length / 2;
   const auto fits = [&] { return vertices_of(area, edge) <= kMostVertices; };
   for (; edge > std::numbers::sqrt2 / 4 * resolution && fits(); edge /= 2) ++settings.levels;

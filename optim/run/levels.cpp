@@ -40,10 +40,10 @@ struct Level {
   std::string status;
 };
 
-/// Of the first level, 1, what the experiment says, or else what the mesh has; of those after the coarse ones half of the one before.
+/// Of the first level, 1, what the experiment says, or else what the mesh has.
 double edge_length_of(int level, const RemeshSpec& remesh, const Mesh& loaded) {
   const double first = remesh.edge_length > 0 ? remesh.edge_length : mean_edge_length(loaded);
-  return std::ldexp(first, -std::max(0, level - remesh.coarse_levels));
+  return std::ldexp(first, -remesh.halvings(level));
 }
 
 /// Levels that fitted the noise of the same random numbers would not find each other's errors.
@@ -65,23 +65,29 @@ constexpr double kLeastPart = 2;
 /// shrink with every level, and penalties relative to the distance of their vertices would grow without bound.
 constexpr double kTriangle = 0.43;
 
+/// Of albedos where the levels by adam begin. Borders are drawn back more easily than they are extended, and whatever light is missing extends them
+/// (optim/README.md, Borders).
+constexpr double kDimmed = 0.94;
+
 /// A number, or null where it is none.
 double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
 }
 
 /// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Half of the histograms, of
-/// which each iteration has others, with twice the samples of the gradient (optim/README.md, Histograms).
-void step_by_adam(const RemeshSpec& remesh, Experiment& experiment) {
+/// which each iteration has others, with twice the samples of the gradient (optim/README.md, Histograms). Where edges are halved, steps are
+/// as well, and all histograms are drawn from: four times as many vertices share the photons.
+void step_by_adam(const RemeshSpec& remesh, int level, Experiment& experiment) {
+  const int halvings = remesh.halvings(level);
   OptimizerSpec& adam = experiment.optimizer;
   adam = {};
   adam.method = OptimizerMethod::adam;
-  adam.learning_rate = remesh.adam_rate;
+  adam.learning_rate = std::ldexp(remesh.adam_rate, -halvings);
   adam.iterations = remesh.adam_iterations;
   adam.stop_window = 0;
   adam.decay = {.start = remesh.adam_iterations * 6 / 10, .half_life = remesh.adam_iterations / 15.0};
   experiment.samples.interior *= 2;
-  experiment.target.histograms = (experiment.target.histograms + 1) / 2;
+  if (halvings == 0) experiment.target.histograms = (experiment.target.histograms + 1) / 2;
 }
 
 class Levels {
@@ -138,7 +144,7 @@ class Levels {
     if (!next.target.measured()) next.target.images = file("target.exr");
     next.seed = seed_of(level, experiment_.seed);
     if (remeshed_.remesh.spares_histograms(level)) next.target.histograms = remeshed_.remesh.coarse_histograms;
-    if (remeshed_.remesh.steps_by_adam(level)) step_by_adam(remeshed_.remesh, next);
+    if (remeshed_.remesh.steps_by_adam(level)) step_by_adam(remeshed_.remesh, level, next);
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
@@ -160,6 +166,7 @@ class Levels {
       set_weights(level, follows, next.parameters);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
       if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
+      if (remeshed_.remesh.steps_by_adam(level) && !remeshed_.remesh.steps_by_adam(level - 1)) dim(next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
@@ -177,6 +184,13 @@ class Levels {
         spec.slopes = remesh.outline_slopes;
       if (remesh.steps_by_adam(level) && spec.name == remeshed_.name) free_borders(spec);
     }
+  }
+
+  void dim(std::vector<ParameterSpec>& next) const {
+    for (ParameterSpec& spec : next)
+      for (std::size_t i = 0;
+           spec.type == ParameterType::texture && spec.shape == remeshed_.shape && i < spec.initial.size(); ++i)
+        if (spec.lower.empty()) spec.initial[i] *= kDimmed;
   }
 
   /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back. Inner vertices
@@ -346,6 +360,10 @@ void require_levels(const Problem& problem) {
   if (remeshed->remesh.coarse_histograms > 0 && !problem.scene().capture)
     remeshed->fail("remesh", "coarse_histograms: belongs to captures; a camera's pixels are all used", "0");
   const RemeshSpec& remesh = remeshed->remesh;
+  if (remesh.fine_from == 1 || remesh.fine_from > remesh.coarse_levels)
+    remeshed->fail("remesh",
+                   fmt::format("fine_from: {} is none of the coarse levels behind the first", remesh.fine_from),
+                   fmt::format("2 to coarse_levels, {}; 0: none", remesh.coarse_levels));
   if (remesh.adam_iterations > 0) {
     int by_adam = 0;
     for (int level = 1; level <= remesh.levels; ++level) by_adam += remesh.steps_by_adam(level);

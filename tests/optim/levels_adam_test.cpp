@@ -1,11 +1,15 @@
 // Coarse levels that adam fits.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <string>
 #include <vector>
 
 #include "core/base/yaml_reader.h"
+#include "core/scene/scene_loader.h"
+#include "optim/remesh/remesh.h"
 #include "optim/run/levels.h"
+#include "optim/run/next_level.h"
 #include "tests/optim/levels_fixture.h"
 
 namespace isochron {
@@ -88,6 +92,67 @@ TEST(Remesh, AdamWaitsForAlbedosBehindAnOutline) {
   EXPECT_EQ(by_adam(), "345") << "the last of all is the optimiser's";
   spec.adam_iterations = 0;
   EXPECT_EQ(by_adam(), "");
+}
+
+TEST(Remesh, EdgesAreHalvedFromTheFirstFineLevelOn) {
+  RemeshSpec spec{.levels = 6, .coarse_levels = 4};
+  const auto halvings = [&] {
+    std::string each;
+    for (int level = 1; level <= spec.levels; ++level) each += std::to_string(spec.halvings(level));
+    return each;
+  };
+  EXPECT_EQ(halvings(), "000012");
+  spec.fine_from = 3;
+  EXPECT_EQ(halvings(), "001112");
+}
+
+/// The fine level by adam has edges and steps of half the length, and as many histograms as there are.
+TEST_F(LevelsTest, AFineLevelByAdamTakesShorterSteps) {
+  const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
+  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  start_run(load_experiment(experiment("flat",
+                                       "remesh: {levels: 4, coarse_levels: 4, fine_from: 3, edge_length: 0.5, adam: "
+                                       "{iterations: 2, learning_rate: 0.01, slopes: 1e-9}}",
+                                       "{images: target.exr}")),
+            options());
+  const auto rate = [&](int level) {
+    return load_experiment(folder_.file(fmt::format("out/levels/{}/experiment.yaml", level))).optimizer.learning_rate;
+  };
+  EXPECT_EQ(rate(2), 0.01);
+  EXPECT_EQ(rate(3), 0.005);
+  const auto edge = [&](int level) {
+    return mean_edge_length(
+        mesh_of(load_scene(folder_.file(fmt::format("out/levels/{}/scene/scene.yaml", level))), "hill"));
+  };
+  EXPECT_NEAR(edge(3) / edge(2), 0.5, 0.1);
+  EXPECT_NEAR(edge(4) / edge(3), 1, 0.1);
+}
+
+/// The first level by adam begins with albedos that are 6 % lower than what the level before has found, unless they have a bound.
+TEST_F(LevelsTest, AlbedosAreDimmedOnceForAdam) {
+  const std::string remesh =
+      "target: 0, remesh: {levels: 4, coarse_levels: 4, edge_length: 0.5, adam: {iterations: 1, "
+      "learning_rate: 1e-9, slopes: 1e-9}}";
+  const auto initial = [&](const std::string& more) {
+    Experiment asked = load_experiment(experiment(
+        "flat", remesh, "{samples: 4}",
+        "  - {name: paint, type: albedo, shape: hill, per: vertex, initial: 0.5, target: 0.5" + more + "}\n"));
+    asked.optimizer.iterations = 0;
+    RunOptions run = options();
+    run.force = true;
+    start_run(asked, run);
+    std::vector<double> firsts;
+    for (int level = 1; level <= 4; ++level)
+      firsts.push_back(
+          load_experiment(folder_.file(fmt::format("out/levels/{}/experiment.yaml", level))).parameters[1].initial[0]);
+    return firsts;
+  };
+  const std::vector<double> found = initial("");
+  EXPECT_EQ(found[0], 0.5);
+  EXPECT_NEAR(found[1], 0.94 * 0.5, 1e-6);
+  EXPECT_NEAR(found[2], 0.94 * 0.5, 1e-6);
+  EXPECT_NEAR(found[3], 0.94 * 0.5, 1e-6);
+  EXPECT_NEAR(initial(", lower: 0.48")[1], 0.5, 1e-6);
 }
 
 }  // namespace
