@@ -266,7 +266,8 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     const auto adam = [&spec](Keys& keys_of_adam) {
       keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
                          "of each such level", {.required = true});
-      keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate), "see `optimizer`",
+      keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate),
+                         "see `optimizer`; from `fine_from` on half of it",
                          {.required = true, .unit = "the parameter's `scale`"});
       keys_of_adam.value("slopes", field::non_negative(spec.remesh.adam_slopes),
                          "weight of the offsets' slopes in these levels, in place of their own `smoothing`",
@@ -275,7 +276,8 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.map(
         "adam", adam,
         "coarse levels are fitted by adam, with steps that shrink towards the end of each, so that borders go all of "
-        "their way, and with twice `samples.interior`. The first (with `outline` two) and the last are not",
+        "their way, and with twice `samples.interior`. The first (with `outline` two) and the last are not. Albedos by "
+        "vertex without `lower` begin 6 % lower",
         {.unset = spec.remesh.adam_iterations == 0});
   };
   keys.map("remesh", remesh,

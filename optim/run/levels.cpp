@@ -65,8 +65,8 @@ constexpr double kLeastPart = 2;
 /// shrink with every level, and penalties relative to the distance of their vertices would grow without bound.
 constexpr double kTriangle = 0.43;
 
-/// Of albedos where the levels by adam begin. Borders are drawn back more easily than they are extended, and whatever light is missing extends them
-/// (optim/README.md, Borders).
+/// Factor of the albedos that the levels by adam begin with. Borders are drawn back more easily than they are extended, and light that is missing
+/// extends them. By trials with the rabbit (optim/README.md, Dim albedos).
 constexpr double kDimmed = 0.94;
 
 /// A number, or null where it is none.
@@ -186,11 +186,12 @@ class Levels {
     }
   }
 
+  /// The shape's albedos by vertex, unless a bound says how low they may be.
   void dim(std::vector<ParameterSpec>& next) const {
-    for (ParameterSpec& spec : next)
-      for (std::size_t i = 0;
-           spec.type == ParameterType::texture && spec.shape == remeshed_.shape && i < spec.initial.size(); ++i)
-        if (spec.lower.empty()) spec.initial[i] *= kDimmed;
+    for (ParameterSpec& spec : next) {
+      if (spec.type != ParameterType::texture || spec.shape != remeshed_.shape || !spec.lower.empty()) continue;
+      for (double& albedo : spec.initial) albedo *= kDimmed;
+    }
   }
 
   /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back. Inner vertices
