@@ -106,7 +106,7 @@ TEST(Remesh, EdgesAreHalvedFromTheFirstFineLevelOn) {
   EXPECT_EQ(halvings(), "001112");
 }
 
-/// The fine level by adam has edges and steps of half the length, and as many histograms as there are.
+/// The fine level by adam has edges and steps of half the length. Its histograms: Reconstruct.FindsAPlate.
 TEST_F(LevelsTest, AFineLevelByAdamTakesShorterSteps) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
   write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
