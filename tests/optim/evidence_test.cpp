@@ -145,7 +145,8 @@ TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
 /// Of vertices that move freely, along their normals, here z: by the whole matrix. The mean over 81 vertices of four samples, neighbours of
 /// which go together, is known to some 10 %, its root to 5; 0.3 is six of these. Conjugate gradients of twelve steps end below, and the
 /// Jacobian's noise adds. Without the scale, or with one axis of three, the ratio is far off. The matrix is that of all samples, which is
-/// semidefinite: without slopes noise hides the sign of what holds motion of the border within the plane.
+/// semidefinite: without slopes noise hides the sign of what holds motion of the border within the plane. Products are indefinite: with a
+/// quarter of the samples, noise ends conjugate gradients early, and of 95 unknowns that are determined they find 40 to 65.
 TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
   std::string text = folder_.read("painted.yaml");
   const std::size_t paint = text.find("  - {name: paint");
@@ -153,7 +154,7 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
                "  - {name: dent, type: vertices, shape: plane, direction: free, initial: 0, target: 0, "
                "smoothing: {bending: 30, slopes: 0.01}}\n");
   const std::string shape = folder_.write("bent.yaml", text);
-  const Problem problem(load_experiment(shape, {"samples.interior=4096"}));
+  const Problem problem(load_experiment(shape, {"samples.interior=16384"}));
   const GatedImage target = problem.make_target([] {});
   const std::vector<double>& theta = problem.parameters().initial();
   ASSERT_TRUE(has_surface_errors(problem));
