@@ -16,9 +16,19 @@ constexpr double kBetterTogether = 10;
 /// A combination and how it depends on the unknowns, component by component and on average.
 struct Functions {
   const Parameters::Block& other;
+  int pivot;
   Combination combination;
-  std::vector<std::vector<double>> components;
+  /// Derivatives of each component by the pivot and by the other parameter's component.
+  std::vector<double> by_pivot, by_other;
   std::vector<double> mean;
+
+  /// Weights of all unknowns; kept for no component, as fields have thousands.
+  std::vector<double> component(int i) const {
+    std::vector<double> weights(mean.size(), 0.0);
+    weights[pivot] = by_pivot[i];
+    weights[other.begin + i] = by_other[i];
+    return weights;
+  }
 };
 
 Functions functions_of(const NullDirection& direction, const NullDirection::Partner& partner,
@@ -27,15 +37,14 @@ Functions functions_of(const NullDirection& direction, const NullDirection::Part
   const auto is_pivot = [&](const Parameters::Block& b) { return b.begin == direction.pivot; };
   const std::string& name = std::find_if(blocks.begin(), blocks.end(), is_pivot)->name;
   const double pivot = theta[direction.pivot], p = partner.power;
-  Functions result{
-      other, {combination_name(name, other.name, partner), {}, {}, 0, 0}, {}, std::vector<double>(theta.size())};
+  Functions result{other, direction.pivot, {combination_name(name, other.name, partner), {}, {}, 0, 0}, {}, {}, {}};
+  result.mean.resize(theta.size());
   for (int i = other.begin; i < other.begin + other.count; ++i) {
     const double x = theta[i], factor = partner.product ? std::pow(x, p) : 1;
-    std::vector<double> weights(theta.size(), 0.0);
-    weights[direction.pivot] = factor;
-    weights[i] = partner.product ? pivot * p * std::pow(x, p - 1) : p;
-    for (const int k : {direction.pivot, i}) result.mean[k] += weights[k] / other.count;
-    result.components.push_back(std::move(weights));
+    result.by_pivot.push_back(factor);
+    result.by_other.push_back(partner.product ? pivot * p * std::pow(x, p - 1) : p);
+    result.mean[direction.pivot] += factor / other.count;
+    result.mean[i] += result.by_other.back() / other.count;
     result.combination.values.push_back(partner.product ? pivot * factor : pivot + p * x);
     result.combination.mean += result.combination.values.back() / other.count;
   }
@@ -111,7 +120,7 @@ ParameterErrors Determined::errors(const NoiseLevel& noise, const std::vector<bo
       functions.push_back(functions_of(directions_[d], partner, blocks_, theta_));
       near_pivots.push_back(d < exact_ ? -1 : directions_[d].pivot);
       const Functions& last = functions.back();
-      if (asked[last.other.begin]) weights.insert(weights.end(), last.components.begin(), last.components.end());
+      for (int i = 0; asked[last.other.begin] && i < last.other.count; ++i) weights.push_back(last.component(i));
       weights.push_back(last.mean);
     }
 
@@ -141,9 +150,8 @@ ParameterErrors Determined::errors(const NoiseLevel& noise, const std::vector<bo
     const Functions& of = functions[c];
     Combination combination = of.combination;
     for (int i = 0; i < of.other.count; ++i)
-      combination.errors.push_back(asked[of.other.begin]
-                                       ? next_error()
-                                       : std::abs(of.components[i][of.other.begin + i]) * least[of.other.begin + i]);
+      combination.errors.push_back(asked[of.other.begin] ? next_error()
+                                                         : std::abs(of.by_other[i]) * least[of.other.begin + i]);
     combination.mean_error = next_error();
     if (near_pivots[c] < 0 || kBetterTogether * combination.mean_error < values[near_pivots[c]])
       result.combinations.push_back(std::move(combination));
