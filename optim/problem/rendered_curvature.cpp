@@ -55,13 +55,14 @@ std::vector<std::vector<double>> RenderedCurvature::gradients() const {
   return gradients;
 }
 
-std::vector<double> RenderedCurvature::diagonal() const {
+const std::vector<double>& RenderedCurvature::diagonal() const {
+  if (!diagonal_.empty()) return diagonal_;
   std::vector<double> mean(theta_.size(), 0.0);
   for (const std::vector<double>& found :
        probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbes}, poll_))
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbes;
   for (const PenaltyScale& scale : {smoothing_, priors_}) prior_.add_diagonal(scale, mean);
-  return mean;
+  return diagonal_ = std::move(mean);
 }
 
 std::vector<double> RenderedCurvature::prior_diagonal() const {
@@ -116,8 +117,8 @@ std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
   for (int k = 0; k < count; ++k)
     prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration), static_cast<std::uint32_t>(kProbes + k),
                      gradients[k]);
-  const std::vector<double> at_first = diagonal(), &low = problem_.parameters().lower(),
-                            &high = problem_.parameters().upper();
+  const std::vector<double>&at_first = diagonal(), &low = problem_.parameters().lower(),
+        &high = problem_.parameters().upper();
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < theta_.size(); ++i)
     if (at_first[i] > 0 && theta_[i] > low[i] && theta_[i] < high[i]) free.push_back(i);

@@ -31,8 +31,8 @@ class RenderedCurvature : public CurvatureProducts {
   /// own noise adds to it. Unknowns that lie at a bound, or that nothing depends on, stay. Not for finite differences.
   std::vector<std::vector<double>> samples(int count) const;
   /// Diagonals of H + P, estimated and on average too large by the noise of the Jacobian (see Objective::probe_curvature), and of
-  /// P, that of smoothing.
-  std::vector<double> diagonal() const;
+  /// P, that of smoothing. The former is rendered when it is first asked for.
+  const std::vector<double>& diagonal() const;
   std::vector<double> prior_diagonal() const;
 
  private:
@@ -48,6 +48,7 @@ class RenderedCurvature : public CurvatureProducts {
   Scene scene_;
   TangentBasis basis_;
   std::vector<double> weights_;
+  mutable std::vector<double> diagonal_;
 };
 
 }  // namespace isochron

@@ -24,11 +24,13 @@ void Arrivals::set(const VoxelBlock& block, const Histograms& histograms, std::s
   const float per_length = static_cast<float>(1 / histograms.bin);
   for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
     const float bins = (back_.distance[i] + to.distance[i]) * per_length + first;
-    const bool counts = bins >= 0 && bins < last;
-    const float at = counts ? bins : last;
-    entry[i] = static_cast<int>(at);
-    along[i] = at - static_cast<float>(entry[i]);
-    weight[i] = counts ? back_.factor[i] * to.factor[i] : 0;
+    // Numbers in place of branches, which compilers do not vectorise.
+    const float counts = static_cast<float>(bins >= 0) * static_cast<float>(bins < last);
+    const float at = counts * bins + (1 - counts) * last;
+    const int whole = static_cast<int>(at);
+    entry[i] = whole;
+    along[i] = at - static_cast<float>(whole);
+    weight[i] = counts * (back_.factor[i] * to.factor[i]);
   }
 }
 
