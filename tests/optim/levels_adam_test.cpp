@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <string>
 #include <vector>
 
@@ -126,6 +127,46 @@ TEST_F(LevelsTest, AFineLevelByAdamTakesShorterSteps) {
   };
   EXPECT_NEAR(edge(3) / edge(2), 0.5, 0.1);
   EXPECT_NEAR(edge(4) / edge(3), 1, 0.1);
+}
+
+/// The last property of a binary PLY file's vertices, doubles all of them, and their number per vertex.
+std::vector<double> last_property(const std::string& ply, int doubles) {
+  const std::string vertices = "element vertex ", end = "end_header\n";
+  std::vector<double> values(std::stoi(ply.substr(ply.find(vertices) + vertices.size())));
+  const char* data = ply.data() + ply.find(end) + end.size();
+  for (std::size_t v = 0; v < values.size(); ++v)
+    std::memcpy(&values[v], data + 8 * (doubles * (v + 1) - 1), sizeof(double));
+  return values;
+}
+
+/// Errors of the last level, by itself and after the others: what is more is how far the surfaces are apart that levels by adam have found.
+TEST_F(LevelsTest, ErrorsCountHowFarLevelsAreApart) {
+  const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
+  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  RunOptions run = options();
+  start_run(load_experiment(experiment("flat",
+                                       "smoothing: {bending: 0.01}, remesh: {levels: 4, coarse_levels: 4, edge_length: "
+                                       "0.5, adam: {iterations: 5, learning_rate: 0.02, slopes: 1e-4}}",
+                                       "{images: target.exr}", "loss: {kind: poisson}\n")),
+            run);
+  run.folder = folder_.file("alone");
+  start_run(load_experiment(folder_.file("out/levels/4/experiment.yaml")), run);
+  const std::string file = "/geometry/final_hill.ply";
+  const Mesh found = read_mesh(folder_.file("out" + file));
+  ASSERT_EQ(found.positions.size(), read_mesh(folder_.file("alone" + file)).positions.size());
+  const std::vector<double> all = last_property(folder_.read("out" + file), 4),
+                            own = last_property(folder_.read("alone" + file), 4);
+  const std::vector<Vec3> normals = vertex_normals(scene_of(found));
+  std::vector<double> apart(all.size(), 0.0);
+  for (const char* level : {"3", "4"}) {  // where they begin: what 2 and 3 have found
+    const Surface surface(read_mesh(folder_.file(std::string("out/levels/") + level + "/scene/surface.ply")));
+    for (std::size_t v = 0; v < apart.size(); ++v)
+      apart[v] += length_squared(surface.closest(found.positions[v], normals[v]).position - found.positions[v]) / 2;
+  }
+  for (std::size_t v = 0; v < apart.size(); ++v) {
+    EXPECT_GT(apart[v], 0.0) << v;
+    EXPECT_NEAR(all[v] * all[v], own[v] * own[v] + apart[v], 1e-9 * all[v] * all[v]) << v;
+  }
 }
 
 /// The first level by adam begins with albedos that are 6 % lower than what the level before has found, unless they have a bound.
