@@ -114,10 +114,12 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   const auto fits = [&] { return vertices_of(area, edge) <= kMostVertices; };
   for (; edge > std::numbers::sqrt2 / 4 * resolution && fits(); edge /= 2) ++settings.levels;
   settings.more_levels = fits() ? 1 : 0;
-  const double each = kLevelSamplesPerSecond * seconds / (settings.levels * histograms);
+  // Of few histograms coarse levels, with their many iterations, take all or as few as they may.
+  const double of_coarse_image = kCoarseSamplesPerSecond * seconds,
+               each = std::min(kLevelSamplesPerSecond * seconds / (settings.levels * histograms),
+                               of_coarse_image / std::min(histograms, kLeastCoarseHistograms));
   settings.samples = static_cast<int>(std::clamp(each, 1.0 * kLeastSamples, 1.0 * kMostSamples)) / 2 * 2;
-  settings.coarse_histograms =
-      std::max(kLeastCoarseHistograms, static_cast<int>(kCoarseSamplesPerSecond * seconds / settings.samples));
+  settings.coarse_histograms = std::max(kLeastCoarseHistograms, static_cast<int>(of_coarse_image / settings.samples));
   return settings;
 }
 

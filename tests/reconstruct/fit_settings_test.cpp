@@ -69,8 +69,10 @@ TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   EXPECT_NEAR(many.coarse_histograms * many.samples, 1024 * 512, 64);
   const FitSettings quick = settings_for(0.04, 0.0137, 4096, 60), small = settings_for(0.04, 0.0137, 576, 60);
   EXPECT_NEAR(quick.coarse_histograms, 1024, 20) << "a fifth of the work by a fifth of the samples";
-  EXPECT_GT(small.samples, 500);
-  EXPECT_EQ(small.coarse_histograms, 256) << "few have enough samples";
+  const FitSettings tiny = settings_for(0.04, 0.0137, 64, 60);
+  EXPECT_NEAR(small.coarse_histograms, 256, 1) << "no fewer";
+  EXPECT_NEAR(small.coarse_histograms * small.samples, quick.coarse_histograms * quick.samples, 600);
+  EXPECT_NEAR(64 * tiny.samples, quick.coarse_histograms * quick.samples, 600) << "all that there are";
 }
 
 }  // namespace
