@@ -106,6 +106,52 @@ TEST_P(TechniquePairs, OfBoundarySegmentsAgree) {
   expect_pairs_agree("visibility derivative", derivatives);
 }
 
+/// Two boards behind a wall's points that light each other; apart, as derivatives are heavy-tailed where surfaces meet.
+Scene captured_corner(bool confocal) {
+  Scene scene;
+  scene.capture.emplace();
+  Capture& capture = *scene.capture;
+  capture.columns = 4;
+  capture.rows = 1;
+  const Vec3 normal{0, 0, 1};
+  for (const double x : {-0.25, -0.1, 0.05, 0.2}) capture.sensor.push_back({{x, 0.1 + x / 2, 0}, normal});
+  if (!confocal) capture.spots = {{{0.1, -0.1, 0}, normal}};
+  scene.camera.width = 4;
+  scene.camera.height = 1;
+  scene.camera.look_at = normal;
+  add_shape(scene, "left", quad({-0.4, -0.3, 0.35}, {-0.4, 0.3, 0.35}, {-0.1, 0.3, 0.6}, {-0.1, -0.3, 0.6}),
+            diffuse(Rgb(0.9), true));
+  add_shape(scene, "right", quad({0.1, -0.3, 0.6}, {0.1, 0.3, 0.6}, {0.4, 0.3, 0.35}, {0.4, -0.3, 0.35}),
+            diffuse(Rgb(0.9), true));
+  scene.shapes[0].hidden = true;
+  return scene;
+}
+
+/// Of captures, when most light of one bounce has come.
+TEST(TechniquePairsOfCaptures, OfTwoBouncesAgree) {
+  constexpr int kBatches = 48, kSamples = 4096;
+  const GateSet gates(GateShape::gaussian(0.06), {1.56});
+  std::uint32_t seed = 120;
+  for (const bool confocal : {true, false}) {
+    const Scene scene = captured_corner(confocal);
+    const TangentBasis basis = make_basis(scene, {translate(scene, "left", {1, 0, 0.2})});
+    std::vector<BySet> images, derivatives;
+    for (const Sampling sampling : {Sampling::standard, Sampling::ellipsoidal}) {
+      const EstimatorOptions options{.max_bounces = 2, .sampling = sampling, .keep_length = false};
+      const char* name = sampling == Sampling::standard ? "standard sampling" : "connections";
+      const Renderer renderer(scene, gates, options, &basis);
+      images.push_back({name, image_means(renderer, 1, kSamples, kBatches, {test_seed(seed++), 0, 0})[0]});
+      derivatives.push_back(
+          {name, term_means(renderer, Term::interior, 1, 1, kSamples, kBatches, {test_seed(seed++), 0, 0})[0][0]});
+    }
+    const EstimatorOptions single{.max_bounces = 1};
+    EXPECT_LT(image_means(Renderer(scene, gates, single), 1, kSamples, 8, {test_seed(seed++), 0, 0})[0].mean,
+              0.4 * images[0].estimate.mean);
+    expect_pairs_agree(confocal ? "confocal image" : "image by one spot", images);
+    expect_pairs_agree(confocal ? "confocal derivative" : "derivative by one spot", derivatives);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Gates, TechniquePairs, ::testing::Bool(),
                          [](const auto& test) { return test.param ? "narrow" : "wide"; });
 
