@@ -63,9 +63,9 @@ struct RemeshSpec {
   bool spares_histograms(int level) const { return coarse_histograms > 0 && comes_early(level); }
   /// The others are the experiment's optimiser's, the first with all of its smoothing among them: what is far off, as a typical albedo
   /// is, is out of reach for adam's steps, which would shrink the surface instead.
-  bool steps_by_adam(int level) const {
-    return adam_iterations > 0 && comes_early(level) && level > (finds_outline(1) ? 2 : 1);
-  }
+  bool steps_by_adam(int level) const { return adam_iterations > 0 && comes_early(level) && level >= first_by_adam(); }
+  /// If there is one.
+  int first_by_adam() const { return finds_outline(1) ? 3 : 2; }
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene

@@ -166,7 +166,7 @@ class Levels {
       set_weights(level, follows, next.parameters);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
       if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
-      if (remeshed_.remesh.steps_by_adam(level) && !remeshed_.remesh.steps_by_adam(level - 1)) dim(next.parameters);
+      if (remeshed_.remesh.steps_by_adam(level) && level == remeshed_.remesh.first_by_adam()) dim(next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
@@ -246,9 +246,9 @@ class Levels {
 
   /// What levels before `level` have found, from the first one by adam on: those before it still have far to go.
   std::vector<std::string> earlier_surfaces(int level) const {
-    int first = 1;
-    while (first < level && !remeshed_.remesh.steps_by_adam(first)) ++first;
+    const int first = remeshed_.remesh.first_by_adam();
     std::vector<std::string> meshes;
+    if (!remeshed_.remesh.steps_by_adam(first)) return meshes;
     for (int next = first + 1; next <= level; ++next) meshes.push_back(folder(next) + "/scene/surface.ply");
     return meshes;
   }

@@ -24,7 +24,7 @@ class Reconstruct : public Program {
   }
 
   std::vector<std::string> command(const std::string& out, std::vector<std::string> more = {},
-                                   const std::string& capture = "plate.h5", const std::string& seconds = "0.5") const {
+                                   const std::string& capture = "plate.h5", const std::string& seconds = "2") const {
     std::vector<std::string> arguments{"reconstruct", folder_.file(capture), "-o",        folder_.file(out),
                                        "--quiet",     "--no-plots",          "--seconds", seconds};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -60,7 +60,7 @@ TEST_F(Reconstruct, PointsOfAFileAreInMetres) {
 /// The plate's depth, middle and size; counts are those of 1000 photons at each of 100 points, so that depths are known to a fraction
 /// of a millimetre, and what is left is the fit, of few samples here.
 TEST_F(Reconstruct, FindsAPlate) {
-  const Result result = run(command("out", {}, "plate.h5", "4"));
+  const Result result = run(command("out", {}, "plate.h5", "16"));
   ASSERT_EQ(result.status, 0) << result.errors;
   const Mesh mesh = read_mesh(folder_.file("out/geometry/final_surface.ply"));
   double area = 0, depth = 0;
