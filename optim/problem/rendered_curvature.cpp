@@ -117,8 +117,8 @@ std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
   for (int k = 0; k < count; ++k)
     prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration), static_cast<std::uint32_t>(kProbes + k),
                      gradients[k]);
-  const std::vector<double>&at_first = diagonal(), &low = problem_.parameters().lower(),
-        &high = problem_.parameters().upper();
+  const std::vector<double>& at_first = diagonal();
+  const std::vector<double>&low = problem_.parameters().lower(), &high = problem_.parameters().upper();
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < theta_.size(); ++i)
     if (at_first[i] > 0 && theta_[i] > low[i] && theta_[i] < high[i]) free.push_back(i);

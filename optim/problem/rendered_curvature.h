@@ -48,7 +48,7 @@ class RenderedCurvature : public CurvatureProducts {
   Scene scene_;
   TangentBasis basis_;
   std::vector<double> weights_;
-  mutable std::vector<double> diagonal_;
+  mutable std::vector<double> diagonal_;  ///< empty until it is asked for
 };
 
 }  // namespace isochron

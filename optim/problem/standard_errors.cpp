@@ -22,7 +22,7 @@ struct Functions {
   std::vector<double> by_pivot, by_other;
   std::vector<double> mean;
 
-  /// Weights of all unknowns; kept for no component, as fields have thousands.
+  /// Weights of all unknowns. Made when needed: those of all components of a field would be a matrix of gigabytes.
   std::vector<double> component(int i) const {
     std::vector<double> weights(mean.size(), 0.0);
     weights[pivot] = by_pivot[i];

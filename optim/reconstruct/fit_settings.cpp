@@ -114,7 +114,7 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   const auto fits = [&] { return vertices_of(area, edge) <= kMostVertices; };
   for (; edge > std::numbers::sqrt2 / 4 * resolution && fits(); edge /= 2) ++settings.levels;
   settings.more_levels = fits() ? 1 : 0;
-  // Of few histograms coarse levels, with their many iterations, take all or as few as they may.
+  // An image of a coarse level has kLeastCoarseHistograms at least, or all that there are: more samples of each would take too long.
   const double of_coarse_image = kCoarseSamplesPerSecond * seconds,
                each = std::min(kLevelSamplesPerSecond * seconds / (settings.levels * histograms),
                                of_coarse_image / std::min(histograms, kLeastCoarseHistograms));

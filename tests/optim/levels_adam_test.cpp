@@ -129,7 +129,7 @@ TEST_F(LevelsTest, AFineLevelByAdamTakesShorterSteps) {
   EXPECT_NEAR(edge(4) / edge(3), 1, 0.1);
 }
 
-/// The last property of a binary PLY file's vertices, doubles all of them, and their number per vertex.
+/// The last property of a binary PLY file's vertices, which have so many, all of them doubles.
 std::vector<double> last_property(const std::string& ply, int doubles) {
   const std::string vertices = "element vertex ", end = "end_header\n";
   std::vector<double> values(std::stoi(ply.substr(ply.find(vertices) + vertices.size())));
@@ -139,7 +139,8 @@ std::vector<double> last_property(const std::string& ply, int doubles) {
   return values;
 }
 
-/// Errors of the last level, by itself and after the others: what is more is how far the surfaces are apart that levels by adam have found.
+/// The last level alone states smaller errors than after the others. The difference of the squares is the mean square of the distances to the
+/// surfaces that the levels from the first one by adam on have found.
 TEST_F(LevelsTest, ErrorsCountHowFarLevelsAreApart) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
   write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});

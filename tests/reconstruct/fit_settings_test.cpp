@@ -70,7 +70,7 @@ TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   const FitSettings quick = settings_for(0.04, 0.0137, 4096, 60), small = settings_for(0.04, 0.0137, 576, 60);
   EXPECT_NEAR(quick.coarse_histograms, 1024, 20) << "a fifth of the work by a fifth of the samples";
   const FitSettings tiny = settings_for(0.04, 0.0137, 64, 60);
-  EXPECT_NEAR(small.coarse_histograms, 256, 1) << "no fewer";
+  EXPECT_NEAR(small.coarse_histograms, 256, 1) << "the least, as samples are even";
   EXPECT_NEAR(small.coarse_histograms * small.samples, quick.coarse_histograms * quick.samples, 600);
   EXPECT_NEAR(64 * tiny.samples, quick.coarse_histograms * quick.samples, 600) << "all that there are";
 }
