@@ -124,6 +124,25 @@ double log_determinant(const std::vector<double>& a, const std::vector<double>& 
   return sum;
 }
 
+/// Of what preconditions, by twelve probes. Over 31 seeds the ratio has a mean of 1.01 and a deviation of 0.08: false alarms at five of
+/// these, 6e-7. A factor of 1.5 would show.
+TEST_F(Painted, TheDiagonalIsThatOfTheWholeMatrix) {
+  const Fit fit = this->fit(1e-6);
+  const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta, [] {});
+  const std::vector<double>& diagonal = curvature.diagonal();
+  const Curvatures all = curvature.all();
+  const std::size_t n = fit.theta.size();
+  ASSERT_EQ(diagonal.size(), n);
+  double found = 0, expected = 0;
+  for (std::size_t i = 0; i + 1 < n; ++i) {  // without the gain
+    found += diagonal[i];
+    expected += all.bound[i * n + i] + all.prior[i * n + i];
+  }
+  RecordProperty("ratio", std::to_string(found / expected));
+  EXPECT_NEAR(found / expected, 1, 5 * 0.078);
+  EXPECT_EQ(&curvature.diagonal(), &diagonal) << "rendered once";
+}
+
 /// Forty samples know the trace to a standard error of sqrt(2 x 80 / 40) = 2; false alarms at 5 of them: 6e-7. Conjugate gradients end 5 %
 /// below, and the noise of the Jacobian adds to the samples.
 TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {

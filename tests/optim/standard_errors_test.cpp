@@ -201,24 +201,9 @@ TEST(StandardErrors, OfWhatNoReadingSeesOrNoiseHides) {
   EXPECT_TRUE(std::isinf(found.values[1]));
 }
 
-/// A random Jacobian: two single unknowns, each of which acts like the sum of some of many others, but for a part.
-class Synthetic : public CurvatureProducts {
+/// A model whose matrix is written out.
+class OfMatrix : public CurvatureProducts {
  public:
-  Synthetic(int many, double part) {
-    model.add("first", {1});
-    model.add("second", {2});
-    model.add("many", std::vector<double>(static_cast<std::size_t>(many), 0.5));
-    Rng rng({71, 0, 0}, 0, 0);
-    Rows jacobian;
-    for (int k = 0; k < 4 * many; ++k) {
-      std::vector<double> row(model.theta.size());
-      for (std::size_t i = 2; i < row.size(); ++i) row[i] = rng.uniform() < 0.1 ? rng.uniform() : 0;
-      for (std::size_t i = 2; i < row.size(); ++i) row[i % 2] += row[i] / many;
-      for (const int i : {0, 1}) row[i] += part * (rng.uniform() - 0.5);
-      jacobian.push_back(row);
-    }
-    matrix = information(jacobian);
-  }
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override {
     std::vector<std::vector<double>> result;
     for (const auto& v : vectors) {
@@ -243,6 +228,26 @@ class Synthetic : public CurvatureProducts {
   std::vector<double> matrix;
 };
 
+/// A random Jacobian: two single unknowns, each of which acts like the sum of some of many others, but for a part.
+class Synthetic : public OfMatrix {
+ public:
+  Synthetic(int many, double part) {
+    model.add("first", {1});
+    model.add("second", {2});
+    model.add("many", std::vector<double>(static_cast<std::size_t>(many), 0.5));
+    Rng rng({71, 0, 0}, 0, 0);
+    Rows jacobian;
+    for (int k = 0; k < 4 * many; ++k) {
+      std::vector<double> row(model.theta.size());
+      for (std::size_t i = 2; i < row.size(); ++i) row[i] = rng.uniform() < 0.1 ? rng.uniform() : 0;
+      for (std::size_t i = 2; i < row.size(); ++i) row[i % 2] += row[i] / many;
+      for (const int i : {0, 1}) row[i] += part * (rng.uniform() - 0.5);
+      jacobian.push_back(row);
+    }
+    matrix = information(jacobian);
+  }
+};
+
 TEST(StandardErrors, ByEliminationAreThoseOfTheInverse) {
   const Synthetic synthetic(80, 0.02);
   const Model& model = synthetic.model;
@@ -259,6 +264,31 @@ TEST(StandardErrors, ByEliminationAreThoseOfTheInverse) {
     EXPECT_GT(eliminated.values[i], 0.95 * whole.values[i]);
   }
   EXPECT_NEAR(eliminated.values[5], 1 / std::sqrt(diagonal[5]), 1e-9);
+}
+
+/// A field's products with a gain have the errors of its own diagonal, in units of the product, and their mean that of all readings.
+TEST(StandardErrors, ByEliminationOfAProductWithAField) {
+  constexpr int kEach = 9;
+  const double gain = 40;
+  const std::vector<double> paint = {0.2, 0.5, 0.9, 0.4, 0.7};
+  OfMatrix of;
+  of.model.add("gain", {gain});
+  of.model.add("paint", paint);
+  of.model.add("background", {1});
+  of.matrix = information(products(gain, paint, kEach));
+  const std::size_t n = of.model.theta.size();
+  std::vector<double> diagonal(n);
+  for (std::size_t i = 0; i < n; ++i) diagonal[i] = of.matrix[i * n + i];
+  const ParameterErrors found = eliminated_errors(of, diagonal, std::vector<double>(n, 0.0), {}, {1, false},
+                                                  of.model.blocks, of.model.names, of.model.theta);
+  ASSERT_EQ(found.combinations.size(), 1u);
+  const Combination& combination = found.combinations[0];
+  ASSERT_EQ(combination.errors.size(), paint.size());
+  for (std::size_t i = 0; i < paint.size(); ++i) {
+    EXPECT_NEAR(combination.values[i], gain * paint[i], 1e-9);
+    EXPECT_NEAR(combination.errors[i], 1 / std::sqrt(kEach), 1e-9);
+  }
+  EXPECT_NEAR(combination.mean_error, 1 / std::sqrt(1.0 * kEach * paint.size()), 1e-3);
 }
 
 }  // namespace
