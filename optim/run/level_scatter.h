@@ -1,8 +1,8 @@
 // How far surfaces are apart that the levels of a run have found, as an error of where it ends.
 //
 // Errors from the curvature of the loss are those of one minimum. Levels end in others: each begins on the surface of the one before, with
-// other random numbers and triangles, and what is undecided between them moves from level to level. Of six shapes and three numbers of
-// photons both errors together cover what they should; those of the curvature alone are too small by up to 3 (optim/README.md, Standard errors).
+// other random numbers and triangles. Where outlines are undecided the surface moves most, and there the curvature's errors are too small by
+// up to 3 (optim/README.md, Standard errors). So an error is no less than the way that the surface has come there.
 #pragma once
 #include <string>
 #include <vector>
@@ -17,8 +17,8 @@ struct EarlierSurfaces {
   std::vector<std::string> meshes;  ///< files
 };
 
-/// Adds to the squares of a scene's errors by vertex (surface_errors) the mean square of the distances between the shape's vertices and the
-/// earlier surfaces. Throws InputError where one of them cannot be read.
+/// Adds to the squares of a scene's errors by vertex (surface_errors) the square of the distance between the shape's vertex and the earlier
+/// surface that is farthest from it. Throws InputError where one of them cannot be read.
 void add_level_scatter(const EarlierSurfaces& earlier, const Scene& scene, std::vector<double>& errors);
 
 }  // namespace isochron

@@ -244,12 +244,11 @@ class Levels {
     return run_level_(options);
   }
 
-  /// What levels before `level` have found, from the first one by adam on: those before it still have far to go.
+  /// What levels before `level` have found, where some of them search for the outline. Others refine one minimum.
   std::vector<std::string> earlier_surfaces(int level) const {
-    const int first = remeshed_.remesh.first_by_adam();
     std::vector<std::string> meshes;
-    if (!remeshed_.remesh.steps_by_adam(first)) return meshes;
-    for (int next = first + 1; next <= level; ++next) meshes.push_back(folder(next) + "/scene/surface.ply");
+    if (!remeshed_.remesh.steps_by_adam(remeshed_.remesh.first_by_adam())) return meshes;
+    for (int next = 2; next <= level; ++next) meshes.push_back(folder(next) + "/scene/surface.ply");
     return meshes;
   }
 
