@@ -13,8 +13,8 @@
 namespace isochron {
 namespace {
 
-/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 512 for 300 s. It takes some 150 s.
-constexpr double kLevelSamplesPerSecond = 70000;
+/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 438 for 300 s. It takes some 130 s.
+constexpr double kLevelSamplesPerSecond = 60000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// The first finds the outline and the second the albedo; six of adam move borders, the last of these with half the edges, as a rim that
 /// turns away is finer than the others' triangles; the last has all histograms.
@@ -31,7 +31,7 @@ constexpr double kFreeSlope = 0.5;
 /// Expected change of the first level's albedos from vertex to vertex: half of what they are on average, so that both dark and bright
 /// neighbours are likely.
 constexpr double kOutlineChange = 0.5 * 0.25;
-/// Of an image in the coarse levels, per second of the whole: of the rabbit 1024 histograms with 512 each (optim/README.md, Histograms).
+/// Of an image in the coarse levels, per second of the whole: of the rabbit 1197 histograms with 438 each (optim/README.md, Histograms).
 constexpr double kCoarseSamplesPerSecond = 1024 * 512 / 300.0;
 constexpr int kLeastCoarseHistograms = 256;
 
