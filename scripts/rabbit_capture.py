@@ -19,6 +19,7 @@ from reproduction.measure import ROOT, program
 SCENE = ROOT / "scenes/rabbit"
 GRID = "size: [64, 64]"  # in scene.yaml
 CONFOCAL = "laser: confocal"
+FUR = "{type: diffuse, albedo: 0.75}"
 
 EXPERIMENT = """\
 name: rabbit
@@ -35,7 +36,7 @@ samples: {{primal: {samples}, interior: 1, visibility: 0, path_length: 0}}
 def scene(options):
     """The scene's text, for other points of the wall and another laser."""
     text = (SCENE / "scene.yaml").read_text(encoding="ascii").replace("file: rabbit.obj", f"file: {SCENE / 'rabbit.obj'}")
-    text = text.replace(GRID, f"size: [{options.points}, {options.points}]")
+    text = text.replace(GRID, f"size: [{options.points}, {options.points}]").replace(FUR, options.material)
     if options.spot:
         text = text.replace(CONFOCAL, f"laser: {{points: {[[x, y, 0.0] for x, y in options.spot]}}}")
     return text
@@ -68,6 +69,7 @@ def parser():
     parser.add_argument("--spot", type=float, nargs=2, action="append", metavar=("X", "Y"),
                         help="a spot of the laser, in metres from the wall's middle; may be repeated; without: confocal")
     parser.add_argument("--bounces", type=int, default=1, help="on the rabbit (default 1)")
+    parser.add_argument("--material", default=FUR, help=f"of the rabbit, as a scene has it (default {FUR})")
     parser.add_argument("--samples", type=int, default=32768, help="per point, of the expected counts (default 32768)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
     parser.add_argument("--no-noise", action="store_true", help="expected counts in place of Poisson numbers")

@@ -32,7 +32,7 @@ from isochron.back_projection import METRES
 from isochron.captures import read_capture
 from isochron.mesh_files import read_mesh
 from reproduction.measure import ROOT, Failure, program, summary
-from reproduction.tables import write_rows
+from reproduction.tables import markdown, read_rows, write_rows
 
 RESPONSE = rabbit_errors.SCENE / "response.csv"
 REACH = 0.7  # metres: beyond the rabbit as seen from the wall's corners
@@ -110,6 +110,26 @@ def sweep(options, name):
             write_rows(options.output / f"rabbit_{name}.csv", COLUMNS, rows)
 
 
+def spread(rows, key, factor=1.0):
+    """Of the draws that found something: the number, or the least and the most."""
+    texts = [f"{factor * value:.3g}" for value in sorted(float(row[key]) for row in rows if row[key])]
+    return " to ".join(dict.fromkeys((texts[0], texts[-1]))) if texts else ""
+
+
+def table_of(rows, name):
+    """For experiments/README.md: a line for each value of a sweep; the light-cone transform is in the figure alone."""
+    column = {"seconds": "limit"}.get(name, name)
+    fits, others = ([row for row in rows if row["method"] == method] for method in METHODS[:2])
+    table = []
+    for value in dict.fromkeys(row[column] for row in fits):
+        own, same = ([row for row in of if row[column] in (value, "")] for of in (fits, others))
+        explained = sum(row["verdict"] == "explained" for row in own)
+        table.append([value, f"{explained} of {len(own)}", *(spread(own, key) for key in ("median_mm", "within_80_mm", "silhouette")),
+                      f"{spread(own, 'covered', 100)} %", *(spread(same, key) for key in ("median_mm", "within_80_mm", "silhouette"))])
+    return markdown([{"seconds": "`--seconds`"}.get(name, name), "explained", "median, mm", "80 %, mm", "silhouette", "within 3 errors",
+                     "back-projection: median, mm", "80 %, mm", "silhouette"], table)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--photons", type=float, nargs="+", help="sweep: 20 63 200 630 2000 6300 20000, for example")
@@ -118,7 +138,11 @@ def main():
     parser.add_argument("--seeds", type=int, default=1, help="captures of each kind (default 1)")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="default: all")
     parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
+    parser.add_argument("--table", choices=USUAL, help="print the table of a sweep that was measured before, as a page has it")
     options = parser.parse_args()
+    if options.table:
+        print(table_of(read_rows(options.output / f"rabbit_{options.table}.csv"), options.table))
+        return 0
     names = [name for name in USUAL if getattr(options, name)]
     if not names:
         parser.error(f"no sweep: give one of {', '.join(f'--{name}' for name in USUAL)}")

@@ -19,6 +19,8 @@ import rabbit_errors
 import rabbit_study
 import shape_bound
 import shape_study
+import smoothing_study
+import wrong_models
 import yaml
 from isochron.captures import Capture
 from isochron.mesh_files import read_mesh
@@ -151,6 +153,58 @@ class StudyTest(unittest.TestCase):
             self.assertGreater(np.ptp(matplotlib.image.imread(folder / "a.png")[..., :3]), 0.9)
             fits = [row for row in plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv") if row["method"] == "fit"]
             self.assertEqual(plot_rabbit_study.medians(fits, "seconds", "within_80_mm"), [[62, 121], [5, 4]])
+            table = rabbit_study.table_of(plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv"), "seconds").splitlines()
+            self.assertEqual(table[2], "| 30 | 0 of 1 |  |  |  |  % | 2 | 7 | 0.7 |")
+            self.assertEqual(table[3], "| 60 | 2 of 3 | 1 | 4 to 6 | 0.9 |  % | 2 | 7 | 0.7 |")
+
+
+class SmoothingTest(unittest.TestCase):
+    def test_other_weights_begin_at_the_last_level(self):
+        """With a stand-in for the program. The table compares the chosen weight with the best."""
+        errors = {0.1: 3.0, 1: 2.4, 10: 2.0}
+
+        def program(*words):
+            self.assertEqual(words[:2], ("run", folder / "rabbit-20/levels/10/experiment.yaml"))
+            weights.append(float(words[words.index("--set") + 1].removeprefix("parameters.shape.smoothing.bending=")))
+
+        with tempfile.TemporaryDirectory() as name:
+            folder, weights = pathlib.Path(name), []
+            for level in ("9", "10"):
+                (folder / "rabbit-20/levels" / level).mkdir(parents=True)
+            (folder / "rabbit-20/geometry").mkdir()
+            (folder / "rabbit-20/geometry/final_surface.ply").touch()
+            (folder / "rabbit-20/levels/10/experiment.yaml").write_text("parameters: [{name: shape, smoothing: {bending: 0.5}}]\n", encoding="utf-8")
+            with unittest.mock.patch.multiple(smoothing_study, program=program, FACTORS=tuple(errors), summary=lambda _: {"loss_final": 0.5},
+                                              errors=lambda *_: (errors[weights[-1] / 0.5], 9.0, 0.9)):
+                rows = list(smoothing_study.grid("rabbit", 20, folder))
+        self.assertEqual(weights, [0.05, 0.5, 5])
+        table = smoothing_study.table_of(dict(zip(smoothing_study.COLUMNS, map(str, row))) for row in rows)
+        self.assertIn("| rabbit | 20 | 0.5 | 2.4 | 1.20 (10) | 9 | 1.00 (0.1) |", table)
+
+    def test_the_truth_has_no_errors(self):
+        with tempfile.TemporaryDirectory() as name:
+            path = pathlib.Path(name) / "plates.obj"
+            vertices, triangles = shape_study.together(shape_study.shapes()["plates"].parts)
+            shape_study.mesh.write_obj(path, (vertices, triangles), "Part")
+            self.assertEqual(np.round(smoothing_study.errors("plates", path), 6).tolist(), [0, 0, 1])
+        self.assertEqual(smoothing_study.errors("rabbit", rabbit_errors.SCENE / "rabbit.obj"), (0, 0, 1))
+
+
+class WrongModelsTest(unittest.TestCase):
+    def test_responses_are_stretched_about_their_peak(self):
+        offsets, values = np.loadtxt(wrong_models.RESPONSE, delimiter=",", skiprows=1).T
+        peak = offsets[values.argmax()]
+        with tempfile.TemporaryDirectory() as name:
+            path = pathlib.Path(name) / "response.csv"
+            wrong_models.response(1.2, -16, path)
+            self.assertEqual(path.read_text().splitlines()[0], "offset,value")
+            moved, same = np.loadtxt(path, delimiter=",", skiprows=1).T
+        np.testing.assert_array_equal(same, values)
+        np.testing.assert_allclose(moved + 16 - peak, 1.2 * (offsets - peak), atol=1e-6)
+
+    def test_the_table_has_signs(self):
+        row = dict(zip(wrong_models.COLUMNS, ("late", "3.1", "5.5", "2.9", "0.9", "1.01", "unexplained", "0.5")))
+        self.assertIn("| late | 3.1 / 5.5 / +2.9 | 0.9 | unexplained | 50 % |", wrong_models.table_of([row]))
 
 
 class ShapesTest(unittest.TestCase):
