@@ -7,7 +7,7 @@ wall of 2 m with bins of 32 ps. Writes experiments/measured/shapes.csv after eve
     method                        fit or back_projection
     median_mm, within_80_mm       of the differences in depth, where back-projection and truth see something
     silhouette                    intersection over union of what is seen
-    seconds                       wall, of the whole method
+    seconds                       wall, of the whole method, of the reconstruction with its pictures and report
     verdict, deviance_over_floor  of the fit
     covered                       share of the true depths within three standard errors of the fit's
 """
@@ -143,7 +143,7 @@ def rows(name, shape, options, folder):
     shown = seen(projected, shape)
     start = time.monotonic()
     program("reconstruct", path, "-o", folder / name, "--response", rabbit_errors.SCENE / "response.csv", "--seconds", options.seconds,
-            "--seed", options.seed, "--force")
+            "--seed", options.seed, "--force", pictures=True)
     seconds = time.monotonic() - start
     surface, fit = folder / name / "geometry/final_surface.ply", summary(folder / name)["fit"]
     found, covered = seen(read_mesh(surface), shape), rabbit_errors.covered(surface, true, lines(shape))

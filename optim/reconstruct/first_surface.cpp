@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "core/base/disjoint_sets.h"
 #include "optim/reconstruct/sheet_maxima.h"
 
 namespace isochron {
@@ -142,34 +143,19 @@ class SheetMesher {
   std::map<std::pair<Node, std::pair<int, int>>, int> border_;  ///< by vertex inside and line outside
 };
 
-/// For each vertex a vertex of its part, the same for all of the part.
-std::vector<int> parts(std::size_t vertices, const std::vector<std::array<int, 3>>& faces) {
-  std::vector<int> parent(vertices);
-  std::iota(parent.begin(), parent.end(), 0);
-  const auto root = [&](int v) {
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (const auto& face : faces) {
-    parent[root(face[1])] = root(face[0]);
-    parent[root(face[2])] = root(face[0]);
-  }
-  std::vector<int> result(vertices);
-  for (std::size_t v = 0; v < vertices; ++v) result[v] = root(static_cast<int>(v));
-  return result;
-}
-
 /// Faces of parts that seen from the wall have at least that area.
 std::vector<std::array<int, 3>> large_parts(const SheetMesher& sheets, double least) {
-  const std::vector<int> part = parts(sheets.places.size(), sheets.faces);
+  DisjointSets parts(sheets.places.size());
+  for (const auto& face : sheets.faces)
+    for (const int k : {1, 2}) parts.join(face[k], face[0]);
   std::vector<double> area(sheets.places.size());
   for (const auto& face : sheets.faces) {
     const Vec3 &a = sheets.places[face[0]], &b = sheets.places[face[1]], &c = sheets.places[face[2]];
-    area[part[face[0]]] += 0.5 * std::abs(cross(b - a, c - a).z);
+    area[parts.root(face[0])] += 0.5 * std::abs(cross(b - a, c - a).z);
   }
   std::vector<std::array<int, 3>> faces;
   for (const auto& face : sheets.faces) {
-    if (area[part[face[0]]] >= least) faces.push_back(face);
+    if (area[parts.root(face[0])] >= least) faces.push_back(face);
   }
   return faces;
 }

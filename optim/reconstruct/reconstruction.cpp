@@ -7,6 +7,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/base/description.h"
 #include "core/base/error.h"
 #include "core/base/file.h"
 #include "core/base/progress.h"
@@ -22,10 +23,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string quoted_path(const std::string& file) {
-  std::string text = "\"";
-  for (const char c : fs::weakly_canonical(fs::absolute(file)).string())
-    text += c == '"' || c == '\\' ? fmt::format("\\{}", c) : std::string(1, c);
-  return text + "\"";
+  return yaml_text(fs::weakly_canonical(fs::absolute(file)).string());
 }
 
 /// Without a response gates would jump at the ends of bins, and a term of derivatives be needed for that, which is far more work. A

@@ -122,14 +122,6 @@ def join(*meshes):
     return np.array(kept), renumbered[triangles]
 
 
-def normals(mesh):
-    """Unit normals of the triangles."""
-    vertices, triangles = mesh
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    n = np.cross(b - a, c - a)
-    return n / np.linalg.norm(n, axis=1, keepdims=True)
-
-
 def write_obj(path, mesh, comment):
     vertices, triangles = mesh
     lines = [f"# {comment}"]
