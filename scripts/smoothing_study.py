@@ -30,7 +30,7 @@ from reproduction.tables import markdown, read_rows, write_rows
 COLUMNS = "shape", "photons", "factor", "bending", "median_mm", "within_80_mm", "silhouette", "loss"
 SHAPES, PHOTONS = ("rabbit", "blob", "bust"), (20, 200, 2000)
 FACTORS = tuple(10 ** (half / 2) for half in range(-5, 6))  # the chosen weight among them
-ITERATIONS = 6
+ITERATIONS = 4
 STUDY = SimpleNamespace(background=0.5, samples=2**28, seed=1)
 
 
