@@ -1,5 +1,7 @@
 #include <spdlog/spdlog.h>
 
+#include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "app/commands.h"
@@ -47,9 +49,11 @@ void add_reconstruct(CLI::App& app, Action& action) {
       ->type_name("IRF.csv");
   sub->add_option("--seconds", command->spec.seconds,
                   "work of the fit, as much as two cores do in that time; more gives less noise (default 300)")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(CLI::Range(kLeastSeconds, kMostSeconds))
       ->type_name("N");
-  sub->add_option("--seed", command->spec.seed, "seed of the random numbers")->type_name("N");
+  sub->add_option("--seed", command->spec.seed, "seed of the random numbers")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
   add_force_option(*sub, command->common);
   add_session_options(*sub, command->common);
   sub->footer(

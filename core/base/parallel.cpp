@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
 #include <mutex>
@@ -57,6 +58,12 @@ void parallel(int count, const std::function<void(int)>& f) {
     f(i);
     count_part();
   });
+}
+
+void parallel_ranges(std::size_t count, const std::function<void(std::size_t, std::size_t)>& f) {
+  constexpr std::size_t kRange = std::size_t{1} << 15;  // long beside what it takes to share one out; not tuned
+  run(static_cast<int>((count + kRange - 1) / kRange),
+      [&](int range) { f(range * kRange, std::min((range + 1) * kRange, count)); });
 }
 
 }  // namespace isochron

@@ -1,5 +1,6 @@
 // Work shared out to threads. Results must not depend on who does what: see partition_sum.h.
 #pragma once
+#include <cstddef>
 #include <functional>
 
 namespace isochron {
@@ -11,5 +12,9 @@ void set_thread_count(int threads);
 /// f(0) ... f(count - 1), in any order, on as many threads as set. Counts as progress (progress.h). Throws Interrupted once
 /// a stop is requested, and what f throws, after all threads have left f.
 void parallel(int count, const std::function<void(int)>& f);
+
+/// f(begin, end) of ranges that together are [0, count): loops over large arrays, of which each number is for itself. Is no progress and
+/// not stopped, so that no array is left half done.
+void parallel_ranges(std::size_t count, const std::function<void(std::size_t, std::size_t)>& f);
 
 }  // namespace isochron

@@ -132,4 +132,15 @@ NumberArray read_npy(const std::string& file) {
   return array;
 }
 
+std::string npy_of_pixels(int columns, int rows, const std::vector<std::uint8_t>& values) {
+  std::string header = fmt::format("{{'descr': '|u1', 'fortran_order': True, 'shape': ({}, {}), }}", columns, rows);
+  constexpr std::size_t kBefore = 10, kAligned = 64;  // bytes before the header; elements begin at a multiple of
+  header.resize((kBefore + header.size()) / kAligned * kAligned + kAligned - kBefore, ' ');
+  header.back() = '\n';
+  std::string contents = "\x93NUMPY\x01";
+  contents += '\0';
+  for (const std::size_t byte : {header.size() % 256, header.size() / 256}) contents += static_cast<char>(byte);
+  return contents + header + std::string(values.begin(), values.end());
+}
+
 }  // namespace isochron

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/base/parallel.h"
 
@@ -24,15 +25,17 @@ GatePick::GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, b
   std::vector<std::vector<double>> of_chunk((pixels + kChunk - 1) / kChunk, std::vector<double>(count + 1, 0.0));
   parallel(static_cast<int>(of_chunk.size()), [&](int chunk) {
     std::vector<double> alone;
+    double* const of_all = of_chunk[chunk].data() + 1;
     for (int pixel = chunk * kChunk; pixel < std::min((chunk + 1) * kChunk, pixels); ++pixel) {
       if (!lengths) alone.assign(count + 1, 0.0);
       double* p = lengths ? &below_[row(pixel)] : alone.data();
-      for (int g = 0; g < count; ++g) {
-        for (const GatedImage& adjoint : adjoints)
-          for (int c = 0; c < adjoint.channels; ++c) p[g + 1] += std::abs(adjoint.at(pixel, g, c));
-        of_chunk[chunk][g + 1] += p[g + 1];
+      for (const GatedImage& adjoint : adjoints) {
+        const double* values = &adjoint.data[adjoint.index(pixel, 0)];
+        for (int c = 0; c < adjoint.channels; ++c)
+          for (int g = 0; g < count; ++g) p[g + 1] += std::abs(values[g * adjoint.channels + c]);
       }
-      rate_[pixel] = accumulate(p);
+      for (int g = 0; g < count; ++g) of_all[g] += p[g + 1];
+      rate_[pixel] = lengths ? accumulate(p) : std::accumulate(p, p + count + 1, 0.0);
     }
   });
   std::vector<double> of_image(count + 1, 0.0);

@@ -24,7 +24,7 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
     for (const std::vector<double>& sample : samples) trace += penalty.curved(block, sample, scale) / kTraceSamples;
     // What the samples' noise may hide counts as determined, so that the weight stays finite.
     const double determined = std::max(rank - trace, std::sqrt(2 * rank / kTraceSamples));
-    // A penalty below that of a single unknown's scatter, half of a logarithm's unit, is not distinguishable from none.
+    // One free unknown has an expected penalty of half a nat. Less is taken for that, so that the weight stays finite.
     factors[i] = determined * scale.priors / std::max(2 * value, scale.priors);
   }
   return factors;

@@ -21,7 +21,9 @@ void add_half(const Problem& problem, const std::vector<double>& theta, const Ta
   const SampleSpec& samples = problem.experiment().samples;
   const auto add = [&](int column, const GatedImage& image) {
     double* entry = jacobian.half[half].data() + jacobian.residuals * static_cast<std::size_t>(column);
-    for (double value : image.data) *entry++ += value;
+    parallel_ranges(image.data.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) entry[i] += image.data[i];
+    });
   };
   const int columns = static_cast<int>(jacobian.unknowns);
   if (problem.experiment().gradient.method == GradientMethod::finite_difference) {

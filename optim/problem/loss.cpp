@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/base/parallel.h"
+
 namespace isochron {
 namespace {
 
@@ -88,10 +90,12 @@ double ReadingLoss::third(double image, double target) const {
 
 SplitImage join_halves(GatedImage first, int first_samples, GatedImage second, int second_samples) {
   const double part = static_cast<double>(first_samples) / (first_samples + second_samples);
-  for (std::size_t i = 0; i < first.data.size(); ++i) {
-    first.data[i] -= second.data[i];
-    second.data[i] += part * first.data[i];
-  }
+  parallel_ranges(first.data.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      first.data[i] -= second.data[i];
+      second.data[i] += part * first.data[i];
+    }
+  });
   return {std::move(second), std::move(first), part};
 }
 

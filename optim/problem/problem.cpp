@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/base/error.h"
+#include "core/base/parallel.h"
 #include "core/paths/differentiable.h"
 #include "core/scene/behind_wall.h"
 #include "core/scene/scene_loader.h"
@@ -86,7 +87,9 @@ SplitImage render_halves(const Renderer& renderer, const Stream& stream, SampleR
 
 void ImageMean::add(const GatedImage& image, int samples) {
   if (samples_ == 0) sum_ = GatedImage(image.width, image.height, image.gates, image.channels);
-  for (std::size_t i = 0; i < image.data.size(); ++i) sum_.data[i] += samples * image.data[i];
+  parallel_ranges(image.data.size(), [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) sum_.data[i] += samples * image.data[i];
+  });
   samples_ += samples;
 }
 

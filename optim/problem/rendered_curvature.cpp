@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/base/parallel.h"
 #include "optim/problem/conjugate_gradients.h"
 #include "optim/problem/jacobian.h"
 #include "optim/problem/metric.h"
@@ -42,7 +43,8 @@ RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& t
       priors_{0, problem.penalty_scale(target).priors},
       scene_(problem.parameters().apply(theta)),
       basis_(problem.parameters().tangent(theta)) {
-  const Evaluation at = problem.evaluate(theta, target, kMatrixIteration, poll);
+  Evaluation at = problem.evaluate(theta, target, kMatrixIteration, poll);
+  first_gradient_ = std::move(at.gradient);
   weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
 }
 
@@ -50,8 +52,9 @@ std::vector<std::vector<double>> RenderedCurvature::gradients() const {
   const Parameters& parameters = problem_.parameters();
   std::vector<std::vector<double>> gradients;
   for (int k = 0; k < kGradients; ++k)
-    gradients.push_back(within_bounds(problem_.evaluate(theta_, target_, kMatrixIteration + k, poll_).gradient, theta_,
-                                      parameters.lower(), parameters.upper()));
+    gradients.push_back(within_bounds(
+        k == 0 ? first_gradient_ : problem_.evaluate(theta_, target_, kMatrixIteration + k, poll_).gradient, theta_,
+        parameters.lower(), parameters.upper()));
   return gradients;
 }
 
@@ -143,7 +146,9 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
     for (const int half : {0, 1}) {  // what one half of the samples sees, by the other's transpose
       for (std::size_t k = 0; k < images.size(); ++k) {
         const double* column = forward.half[1 - half].data() + (done + k) * forward.residuals;
-        for (std::size_t i = 0; i < weights_.size(); ++i) images[k].data[i] = weights_[i] * column[i] / 2;
+        parallel_ranges(weights_.size(), [&](std::size_t begin, std::size_t end) {
+          for (std::size_t i = begin; i < end; ++i) images[k].data[i] = weights_[i] * column[i] / 2;
+        });
       }
       for (const Term term : kTerms) {
         if (samples.term(term) == 0) continue;

@@ -23,8 +23,8 @@ class RenderedCurvature : public CurvatureProducts {
   /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient and
   /// another for every kImagesTogether vectors. Not for finite differences.
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
-  /// Some of the loss, penalty included, each from random numbers of its own; 0 for unknowns that a bound keeps from following
-  /// it.
+  /// Some of the loss, penalty included, each from random numbers of its own (the first from those of the weights); 0 for unknowns that a
+  /// bound keeps from following it.
   std::vector<std::vector<double>> gradients() const;
   /// How the unknowns scatter about the optimum, `count` times: by the noise of the readings, and by what the prior leaves
   /// open. Their covariance is (H + P)^-1, which is that of the unknowns but for variance_scale(). The Jacobian's
@@ -47,7 +47,7 @@ class RenderedCurvature : public CurvatureProducts {
   PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
   Scene scene_;
   TangentBasis basis_;
-  std::vector<double> weights_;
+  std::vector<double> weights_, first_gradient_;  ///< at theta
   mutable std::vector<double> diagonal_;  ///< empty until it is asked for
 };
 

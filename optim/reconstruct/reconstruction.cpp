@@ -3,15 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <functional>
 
 #include "core/base/description.h"
 #include "core/base/error.h"
 #include "core/base/file.h"
 #include "core/base/progress.h"
 #include "core/gates/gate_description.h"
+#include "core/image/npy.h"
 #include "core/scene/mesh_writer.h"
 #include "optim/reconstruct/fit_settings.h"
 #include "optim/reconstruct/start_surface.h"
@@ -26,6 +29,15 @@ std::string quoted_path(const std::string& file) {
   return yaml_text(fs::weakly_canonical(fs::absolute(file)).string());
 }
 
+/// Names of experiments are made of letters, digits, _ and -, which those of files need not be.
+std::string name_of(const std::string& file) {
+  std::string name = fs::path(file).stem().string();
+  const auto usable = [](unsigned char c) { return c < 0x80 && (std::isalnum(c) || c == '_' || c == '-'); };
+  std::replace_if(name.begin(), name.end(), std::not_fn(usable), '_');
+  if (name.starts_with('-')) name[0] = '_';
+  return name;
+}
+
 /// Without a response gates would jump at the ends of bins, and a term of derivatives be needed for that, which is far more work. A
 /// triangle of half a bin adds an eighth to the variance that bins have themselves.
 std::string response_text(const ReconstructionSpec& spec, double bin) {
@@ -35,7 +47,7 @@ std::string response_text(const ReconstructionSpec& spec, double bin) {
   return fmt::format(", response: {{offsets: [{:.6g}, 0, {:.6g}], values: [0, 1, 0]}}", -quarter, quarter);
 }
 
-std::string experiment_text(const ReconstructionSpec& spec, const FitSettings& set) {
+std::string experiment_text(const ReconstructionSpec& spec, const FitSettings& set, bool masked) {
   return fmt::format(
       R"(# The surface that a capture's light came from; written by isochron reconstruct.
 name: {name}
@@ -63,13 +75,13 @@ parameters:
   - {{name: background, type: background{per}, scale: 0.01}}
 target:
   capture: {capture}
-  window: [{first:.6g}, {last:.6g}]   # light of the surface and some time before and after
+  window: [{first:.6g}, {last:.6g}]   # light of the surface and some time before and after{mask}
 samples: {{primal: {primal}, interior: {interior}, visibility: 0, path_length: 0}}
 loss: {{kind: poisson}}
 optimizer: {{method: quasi_newton, iterations: 2, inner_iterations: 10}}   # of each level
 output: {{histogram_samples: {primal}}}
 )",
-      fmt::arg("name", fs::path(spec.capture).stem().string()), fmt::arg("seed", spec.seed),
+      fmt::arg("name", name_of(spec.capture)), fmt::arg("seed", spec.seed),
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),
       fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("more", set.more_levels),
       fmt::arg("coarse", set.coarse_levels), fmt::arg("fine", set.fine_from),
@@ -79,8 +91,8 @@ output: {{histogram_samples: {primal}}}
       fmt::arg("gain", set.gain), fmt::arg("low", 0.999 * set.gain), fmt::arg("high", 1.001 * set.gain),
       fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
       fmt::arg("capture", quoted_path(spec.capture)), fmt::arg("first", set.window.first),
-      fmt::arg("last", set.window.last), fmt::arg("primal", set.samples),
-      fmt::arg("interior", std::max(2, set.samples / 2)));
+      fmt::arg("last", set.window.last), fmt::arg("mask", masked ? "\n  mask: mask.npy" : ""),
+      fmt::arg("primal", set.samples), fmt::arg("interior", std::max(2, set.samples / 2)));
 }
 
 std::string scene_text(const std::string& capture) {
@@ -108,10 +120,28 @@ DetectorResponse response_of(GateSpec gates, const CaptureFile& capture) {
   return response.upper() > response.lower() ? DetectorResponse(response) : std::nullopt;
 }
 
-BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response, const std::string& file) {
+/// One number per sensor point, zero where values under any spot are no counts: not finite, or below zero, as dead points have; empty: all
+/// are counts. Where most points have values below zero, dark counts were taken off, and these say nothing about points.
+std::vector<std::uint8_t> usable_points(const CaptureFile& capture) {
+  const std::size_t points = capture.geometry.sensor.size();
+  std::vector<std::uint8_t> finite(points, 1), positive(points, 1);
+  for (int pixel = 0; pixel < capture.counts.pixels(); ++pixel)
+    for (int g = 0; g < capture.counts.gates; ++g) {
+      const double value = capture.counts.at(pixel, g);
+      if (!std::isfinite(value)) finite[pixel % points] = positive[pixel % points] = 0;
+      if (value < 0) positive[pixel % points] = 0;
+    }
+  const auto left = [](const std::vector<std::uint8_t>& used) { return std::ranges::count(used, 1); };
+  std::vector<std::uint8_t>& used = 2 * left(positive) < left(finite) ? finite : positive;
+  if (left(used) == std::ssize(used)) used.clear();
+  return std::move(used);
+}
+
+BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response,
+                              const std::vector<std::uint8_t>& used, const std::string& file) {
   const ProgressStage stage("back-projection", 1);
   try {
-    return back_project(capture, response);
+    return back_project(capture, response, used);
   } catch (const InputError& error) {
     throw InputError(fmt::format("{}: {}", file, error.what()));
   }
@@ -146,19 +176,30 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   if (!spec.response.empty() && !file_exists(spec.response))
     throw InputError(spec.response + ": does not exist (a table of the detector's response: offsets in ps, values)");
   const std::string experiment = place + "/experiment.yaml";
+  if (!(spec.seconds >= kLeastSeconds && spec.seconds <= kMostSeconds))
+    throw InputError(fmt::format("seconds: {} (allowed: {} to {})", spec.seconds, kLeastSeconds, kMostSeconds));
   Reconstruction result;
   FitSettings settings;
+  std::vector<std::uint8_t> used;
   const auto write_experiment = [&] {
-    result.experiment = experiment_text(spec, settings);
+    result.experiment = experiment_text(spec, settings, !used.empty());
     write_file_atomically(experiment, result.experiment);
   };
   write_file_atomically(place + "/scene.yaml", scene_text(quoted_path(spec.capture)));
   write_experiment();
   const CaptureFile capture = read_capture(spec.capture);
   const DetectorResponse response = response_of(load_experiment(experiment).gates, capture);
-  const BackProjection volume = back_projected(capture, response, spec.capture);
+  used = usable_points(capture);
+  if (!used.empty()) {
+    const int columns = capture.geometry.columns, rows = static_cast<int>(used.size()) / columns;
+    write_file_atomically(place + "/mask.npy", npy_of_pixels(columns, rows, used));
+    if (warning)
+      warning(fmt::format("{}: {} of {} points are left out, whose values are no counts", spec.capture,
+                          std::ranges::count(used, 0), used.size()));
+  }
+  const BackProjection volume = back_projected(capture, response, used, spec.capture);
   const FirstSurface first = first_surface(volume);
-  const LikelyAlbedos likely = likely_albedos(volume, histograms(capture, volume.frame), response);
+  const LikelyAlbedos likely = likely_albedos(volume, histograms(capture, volume.frame, used), response);
   const Mesh start = start_surface(likely);
 
   result.photons_needed = photons_needed(capture, volume);
@@ -171,7 +212,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
     result.files["start.ply"] = ply(start);
     // Beside the run's copy of the capture.
     result.files["scene.yaml"] =
-        scene_text("\"inputs/scene/elsewhere/" + fs::path(spec.capture).filename().string() + "\"");
+        scene_text(yaml_text("inputs/scene/elsewhere/" + fs::path(spec.capture).filename().string()));
     write_file_atomically(place + "/start.ply", result.files["start.ply"]);
     write_experiment();
     measure(experiment, start, settings, warning);

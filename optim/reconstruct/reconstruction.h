@@ -18,6 +18,9 @@
 
 namespace isochron {
 
+/// Of ReconstructionSpec::seconds.
+inline constexpr double kLeastSeconds = 0.1, kMostSeconds = 1e6;
+
 struct ReconstructionSpec {
   std::string capture;   ///< HDF5 file
   std::string response;  ///< table of how much later than it arrives light is counted, ps; empty: as it arrives
@@ -35,8 +38,8 @@ struct Reconstruction {
   std::string experiment;  ///< contents of experiment.yaml, which reads the first two
 };
 
-/// Reads the capture and makes a start. `place` is a folder for what it writes on the way: scene.yaml, start.ply, experiment.yaml.
-/// Throws InputError.
+/// Reads the capture and makes a start. `place` is a folder for what it writes on the way: scene.yaml, start.ply, experiment.yaml, and
+/// mask.npy where some points have no counts. Throws InputError.
 Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::string& place,
                                     const std::function<void(const std::string&)>& warning);
 

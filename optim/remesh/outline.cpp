@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -195,7 +196,8 @@ Remeshed without_small_holes(const Mesh& mesh, double least_area) {
   for (const std::vector<int>& loop : borders(edges)) {
     double length_of_loop = length(p[loop.front()] - p[loop.back()]);
     for (std::size_t i = 1; i < loop.size(); ++i) length_of_loop += length(p[loop[i]] - p[loop[i - 1]]);
-    if (!(length_of_loop < border) || areas[loop.front()] < least_area) continue;
+    // No flat part has a shorter outer border for its area than a disc.
+    if (!(length_of_loop < border) || areas[loop.front()] < border * border / (4 * std::numbers::pi)) continue;
     const auto faces = fan(loop, edges);
     result.mesh.faces.insert(result.mesh.faces.end(), faces.begin(), faces.end());
   }
@@ -204,8 +206,10 @@ Remeshed without_small_holes(const Mesh& mesh, double least_area) {
 
 Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area) {
   const std::vector<double> area = areas_of(mesh), typical = typical_albedos(mesh, albedo);
+  // A part that is dark all over goes if another is not.
+  const double none = std::ranges::any_of(typical, [](double value) { return value > 0; }) ? -1 : 0;
   std::vector<double> above(albedo.size());
-  for (std::size_t v = 0; v < above.size(); ++v) above[v] = albedo[v] - share * typical[v];
+  for (std::size_t v = 0; v < above.size(); ++v) above[v] = typical[v] > 0 ? albedo[v] - share * typical[v] : none;
   drop_small(mesh, area, least_area, false, above);
   drop_small(mesh, area, least_area, true, above);
   return Cut(mesh, above).left();

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iterator>
 
+#include "core/base/description.h"
 #include "core/base/error.h"
 #include "core/base/file.h"
 #include "core/base/yaml_reader.h"
@@ -17,15 +18,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kFolder = "inputs";
 constexpr const char* kList = "inputs.yaml";
-
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') result += '\\';
-    result += c;
-  }
-  return result + "\"";
-}
 
 const FileCopy* find(const std::vector<FileCopy>& inputs, const std::string& original) {
   const auto found =
@@ -65,7 +57,7 @@ void write_inputs(const std::string& folder, const std::vector<FileCopy>& inputs
   for (const FileCopy& copy : inputs)
     fmt::format_to(std::back_inserter(list),
                    "  - copy: {}\n    checksum: \"{}\"\n    original: {}\n    original_checksum: \"{}\"\n",
-                   quoted(copy.name), checksum(copy.contents), quoted(copy.original), copy.checksum);
+                   yaml_text(copy.name), checksum(copy.contents), yaml_text(copy.original), copy.checksum);
   // The list comes first, as it marks the folder as a run's; experiment.yaml, without which there is no run, comes last.
   fs::create_directories(place);
   write_file_atomically((place / kList).string(), list);

@@ -8,7 +8,7 @@
 namespace isochron {
 
 void add_level_scatter(const EarlierSurfaces& earlier, const Scene& scene, std::vector<double>& errors) {
-  if (errors.empty() || earlier.meshes.empty()) return;
+  if (errors.empty()) return;
   const Shape& shape = scene.shapes[scene.find_shape(earlier.shape)];
   const std::vector<Vec3> normals = vertex_normals(scene);
   std::vector<double> farthest(shape.vertex_count, 0.0);  // squared

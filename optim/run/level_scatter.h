@@ -2,7 +2,7 @@
 //
 // Errors from the curvature of the loss are those of one minimum. Levels end in others: each begins on the surface of the one before, with
 // other random numbers and triangles. Where outlines are undecided the surface moves most, and there the curvature's errors are too small by
-// up to 3 (optim/README.md, Standard errors). So an error is no less than the way that the surface has come there.
+// up to 3 (optim/README.md, Standard errors). So an error is at least the vertex's distance from the farthest of the earlier levels' surfaces.
 #pragma once
 #include <string>
 #include <vector>

@@ -58,12 +58,12 @@ void write_surface(const std::string& file, const Mesh& mesh) {
   write_file_atomically(file, to_ply(scene, scene.shapes[0]));
 }
 
-/// Of a part or a hole that the outline makes, in squares of the edges: three vertices have more, one or two mean nothing.
+/// Least area of a part or a hole that an outline may cut, in squared edge lengths: smaller ones hold one or two vertices, which is noise.
 constexpr double kLeastPart = 2;
 
-/// Area of a regular triangle, in squares of its edges. Parts that a fit has shrunk below it are left out, and such holes closed: they would
+/// The area of a regular triangle, in squared edge lengths. Parts that a fit has shrunk below it are left out, and such holes closed: they would
 /// shrink with every level, and penalties relative to the distance of their vertices would grow without bound.
-constexpr double kTriangle = 0.43;
+constexpr double kLeastFeature = 0.43;
 
 /// Factor of the albedos that the levels by adam begin with. Borders are drawn back more easily than they are extended, and light that is missing
 /// extends them. By trials with the rabbit (optim/README.md, Dim albedos).
@@ -156,7 +156,7 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      if (!first) surface = without_small_features(*surface, kTriangle * edge_length * edge_length);
+      if (!first) surface = without_small_features(*surface, kLeastFeature * edge_length * edge_length);
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,
                                  kLeastPart * edge_length * edge_length);
@@ -165,7 +165,7 @@ class Levels {
       const bool follows = level > remeshed_.remesh.coarse_levels;
       set_weights(level, follows, next.parameters);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
-      if (follows) follow_evidence(former, theta, before, !remeshed_.remesh.spares_histograms(level), next.parameters);
+      if (follows) follow_evidence(former, theta, before, next.parameters);
       if (remeshed_.remesh.steps_by_adam(level) && level == remeshed_.remesh.first_by_adam()) dim(next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
@@ -202,17 +202,15 @@ class Levels {
   }
 
   void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
-                       bool more_histograms, std::vector<ParameterSpec>& next) const {
+                       std::vector<ParameterSpec>& next) const {
     if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
     const ProgressStage stage("weighing the smoothing", 1);
-    // Weights of slopes are for a mean over readings.
-    const double readings = more_histograms ? former.share_of_histograms() : 1;
     const std::vector<double> factors = evidence_factors(former, former.read_target(folder + "/target.exr"), theta);
     for (std::size_t i = 0; i < next.size(); ++i)
       if (next[i].bending > 0)
         next[i].bending *= factors[i];
       else
-        next[i].slopes *= factors[i] * readings;
+        next[i].slopes *= factors[i];
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {

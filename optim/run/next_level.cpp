@@ -72,17 +72,21 @@ Mesh mesh_of(const Scene& scene, const std::string& name) {
   return mesh;
 }
 
+std::vector<double> offsets_alone(const Problem& problem, std::vector<double> theta, const std::string& shape) {
+  const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const Parameters::Block& block = problem.parameters().blocks()[i];
+    const bool of_vertices = specs[i].type == ParameterType::vertices && specs[i].shape == shape;
+    if (moves(specs[i]) && !of_vertices) std::fill_n(theta.begin() + block.begin, block.count, 0.0);
+  }
+  return theta;
+}
+
 LevelSurface found_surface(const Problem& problem, const std::vector<double>& theta, const ParameterSpec& remeshed) {
   const Parameters& parameters = problem.parameters();
   const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
   LevelSurface surface;
-  std::vector<double> offsets_alone = theta;
-  for (std::size_t i = 0; i < specs.size(); ++i) {
-    const Parameters::Block& block = parameters.blocks()[i];
-    if (moves(specs[i]) && specs[i].name != remeshed.name)
-      std::fill_n(offsets_alone.begin() + block.begin, block.count, 0.0);
-  }
-  surface.mesh = mesh_of(parameters.apply(offsets_alone), remeshed.shape);
+  surface.mesh = mesh_of(parameters.apply(offsets_alone(problem, theta, remeshed.shape)), remeshed.shape);
   const int vertices = static_cast<int>(surface.mesh.positions.size());
   for (std::size_t i = 0; i < specs.size(); ++i) {
     const Parameters::Block& block = parameters.blocks()[i];

@@ -31,6 +31,10 @@ struct LevelSurface {
   std::vector<Field> fields;
 };
 
+/// The same but for 0 where something is moved otherwise than by the offsets of the shape's vertices: levels keep such motions apart from
+/// their meshes.
+std::vector<double> offsets_alone(const Problem& problem, std::vector<double> theta, const std::string& shape);
+
 /// The surface of `remeshed` at theta, and all that the next level takes from its vertices.
 LevelSurface found_surface(const Problem& problem, const std::vector<double>& theta, const ParameterSpec& remeshed);
 

@@ -35,6 +35,7 @@
 #include "optim/run/inputs.h"
 #include "optim/run/levels.h"
 #include "optim/run/log.h"
+#include "optim/run/next_level.h"
 #include "optim/run/report.h"
 #include "optim/run/run_folder.h"
 #include "optim/run/summary.h"
@@ -200,7 +201,9 @@ class Run {
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
     std::vector<double> of_surfaces;
     if (options_.errors && !options_.loss) of_surfaces = find_errors(*optimizer, final);
-    add_level_scatter(options_.earlier, parameters_.apply(state_.theta), of_surfaces);
+    if (!options_.earlier.meshes.empty())
+      add_level_scatter(options_.earlier,
+                        parameters_.apply(offsets_alone(problem_, state_.theta, options_.earlier.shape)), of_surfaces);
     geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");
     write_exr(path("final.exr"), final.image, notes_);

@@ -20,12 +20,17 @@ namespace {
 /// Folders within that of a run.
 constexpr const char* kParts[] = {"inputs", "geometry", "frames", "report", "levels"};
 
-/// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run.
+/// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run. Of a reconstruction's files those stay that its
+/// experiment reads, scene.yaml and start.ply: another run may be of these.
 void clear_run(const std::string& folder) {
-  for (const char* file : {"experiment.yaml", "checkpoint.yaml", "checkpoint.previous.yaml", "log.csv", "summary.yaml",
-                           "own_loss.yaml", "target.exr", "initial.exr", "final.exr", "final.h5", "target.png",
-                           "initial.png", "final.png", "residual.png", "rmse.png", "capture.png", "report.html"})
-    std::filesystem::remove(std::filesystem::path(folder) / file);
+  constexpr const char* kFiles[] = {"experiment.yaml", "checkpoint.yaml",    "checkpoint.previous.yaml",
+                                    "log.csv",         "summary.yaml",       "own_loss.yaml",
+                                    "target.exr",      "initial.exr",        "final.exr",
+                                    "final.h5",        "target.png",         "initial.png",
+                                    "final.png",       "residual.png",       "rmse.png",
+                                    "capture.png",     "report.html",        "start.yaml",
+                                    "surface.png",     "back_projection.ply"};
+  for (const char* file : kFiles) std::filesystem::remove(std::filesystem::path(folder) / file);
   for (const char* part : kParts) std::filesystem::remove_all(std::filesystem::path(folder) / part);
 }
 

@@ -19,8 +19,14 @@ TEST_F(Program, RunMovesTowardsTheTargetAndNeverOverwrites) {
   EXPECT_NE(again.errors.find("a.1"), std::string::npos) << again.errors;
   EXPECT_EQ(log("a.1"), first);
   EXPECT_NE(log("a"), first);
+  // What a reconstruction has left there is not this run's; what its experiment reads may be anybody's.
+  for (const char* name : {"start.yaml", "surface.png", "back_projection.ply", "scene.yaml"})
+    folder_.write(std::string("a/") + name, "start: {}\n");
   EXPECT_EQ(run(run_command("a", {"--force"})).status, 0);
   EXPECT_EQ(log("a"), first);
+  for (const char* name : {"start.yaml", "surface.png", "back_projection.ply"})
+    EXPECT_FALSE(folder_.has(std::string("a/") + name)) << name;
+  EXPECT_TRUE(folder_.has("a/scene.yaml"));
   EXPECT_FALSE(folder_.has("a.2"));
 }
 

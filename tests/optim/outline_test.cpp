@@ -70,6 +70,15 @@ TEST(Outline, PartsHaveTypicalAlbedosOfTheirOwn) {
   EXPECT_NEAR(area_left(left), 2, 1e-9);
 }
 
+TEST(Outline, DarkPartsGoUnlessAllAre) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 8);
+  add_square(mesh, {3, 0, 0}, 8);
+  EXPECT_NEAR(area_left(within_outline(mesh, painted(mesh, [](const Vec3& p) { return p.x < 2 ? 0.9 : 0; }), 0.5, 0)),
+              1, 1e-9);
+  EXPECT_NEAR(area_left(within_outline(mesh, painted(mesh, [](const Vec3&) { return 0; }), 0.5, 0)), 2, 1e-9);
+}
+
 /// A dark web, three vertices wide, tears halfway to the bright ones beside it. A dark spot and a bright one beyond, each as
 /// large as a cell, stay and go.
 TEST(Outline, WebsTearButSpecksDoNot) {
@@ -127,7 +136,7 @@ TEST(Outline, SmallHolesAreClosed) {
 TEST(Outline, SmallPartsAreNotClosed) {
   Mesh mesh;
   add_square(mesh, {0, 0, 0}, 1);
-  EXPECT_EQ(without_small_holes(mesh, 2).mesh.faces.size(), 2u);
+  for (const double least : {0.7, 0.9, 2.0}) EXPECT_EQ(without_small_holes(mesh, least).mesh.faces.size(), 2u) << least;
 }
 
 /// A fit that pulls a hole together to a point leaves edges of no length, which remeshing takes away once it is closed.

@@ -44,6 +44,15 @@ TEST(Npy, BothOrdersAndAllTypes) {
   EXPECT_EQ(values(npy("<f8", false, "0, 3", "")), std::vector<double>());
 }
 
+TEST(Npy, PixelsAreWrittenByColumnAndRow) {
+  const TemporaryFolder folder;
+  const std::string contents = npy_of_pixels(3, 2, {1, 2, 3, 4, 5, 6});
+  EXPECT_EQ((contents.size() - 6) % 64, 0u) << "elements are aligned";
+  const NumberArray array = read_npy(folder.write("a.npy", contents));
+  EXPECT_EQ(array.shape, (std::vector<std::size_t>{3, 2}));
+  EXPECT_EQ(array.values, (std::vector<double>{1, 4, 2, 5, 3, 6}));
+}
+
 TEST(Npy, SaysWhatIsAmiss) {
   const TemporaryFolder folder;
   const auto said = [&](const std::string& contents) {

@@ -7,6 +7,8 @@
 
 #include <cmath>
 
+#include "core/base/error.h"
+#include "core/image/npy.h"
 #include "core/scene/mesh.h"
 #include "optim/remesh/remesh.h"
 #include "tests/optim/temporary_folder.h"
@@ -19,12 +21,13 @@ namespace {
 constexpr double kBinOfPlate = 32 * 0.299792458e-3;
 
 /// What a reconstruction of a capture begins with, whose files are in `folder`.
-Reconstruction begun(const CaptureFile& capture, const TemporaryFolder& folder) {
+Reconstruction begun(const CaptureFile& capture, const TemporaryFolder& folder, const std::string& name = "capture.h5",
+                     const std::function<void(const std::string&)>& warning = {}) {
   ReconstructionSpec spec;
-  spec.capture = folder.file("capture.h5");
+  spec.capture = folder.file(name);
   spec.seconds = 0.5;
   write_capture(spec.capture, capture);
-  const Reconstruction result = begin_reconstruction(spec, folder.path(), {});
+  const Reconstruction result = begin_reconstruction(spec, folder.path(), warning);
   EXPECT_TRUE(result.has_signal);
   return result;
 }
@@ -73,6 +76,69 @@ TEST(Reconstruction, AlbedosHaveRoomForASurfaceThatShrinks) {
     if (parameter.name == "albedo") {
       EXPECT_LT(parameter.initial.at(0) * area / (side * side), 0.5);
     }
+}
+
+/// Counts of a plate before 12 x 12 points.
+CaptureFile plate_counts() {
+  CaptureFile capture =
+      expected_counts(square_wall(12, 0.5), plate({0.02, -0.01, 0.4}, 0.16, 0.16, 0.004), 256, kBinOfPlate, 2000);
+  for (double& value : capture.counts.data) value += 0.5;
+  return capture;
+}
+
+TEST(Reconstruction, LeavesOutDeadPoints) {
+  const TemporaryFolder folder;
+  CaptureFile capture = plate_counts();
+  capture.counts.at(17, 3) = std::nan("");
+  capture.counts.at(40, 250) = -1;
+  std::vector<std::string> warnings;
+  const auto note = [&](const std::string& text) { warnings.push_back(text); };
+  const std::string text = begun(capture, folder, "capture.h5", note).experiment;
+  EXPECT_NE(text.find("\n  mask: mask.npy\n"), std::string::npos) << text;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_NE(warnings[0].find("capture.h5: 2 of 144 points are left out"), std::string::npos) << warnings[0];
+  const NumberArray mask = read_npy(folder.file("mask.npy"));
+  EXPECT_EQ(mask.shape, (std::vector<std::size_t>{12, 12}));
+  for (int p = 0; p < 144; ++p) EXPECT_EQ(mask.values[p % 12 * 12 + p / 12], p != 17 && p != 40) << p;
+  const TemporaryFolder whole;
+  EXPECT_EQ(begun(plate_counts(), whole).experiment.find("mask"), std::string::npos);
+}
+
+/// Where dark counts were taken off, all points have values below zero; whoever leaves them out has nothing left.
+TEST(Reconstruction, RefusesWhatIsNoCount) {
+  const TemporaryFolder folder;
+  CaptureFile capture = plate_counts();
+  for (double& value : capture.counts.data) value -= 0.6;
+  try {
+    begun(capture, folder);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("capture.h5: -0.1"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("is no count"), std::string::npos) << error.what();
+  }
+}
+
+/// Names of experiments have no blanks, dots or letters beyond ASCII.
+TEST(Reconstruction, TakesFilesOfAnyName) {
+  for (const char* name : {"scan 3.2 # a: \"b\".h5",
+                           "gr\xc3\xb6\xc3\x9f"
+                           "e.h5",
+                           "-x.h5"}) {
+    const TemporaryFolder folder;
+    begun(plate_counts(), folder, name);
+    EXPECT_EQ(load_experiment(folder.file("experiment.yaml")).target.capture, folder.file(name)) << name;
+  }
+}
+
+TEST(Reconstruction, NeedsSecondsThatAreANumber) {
+  const TemporaryFolder folder;
+  ReconstructionSpec spec;
+  spec.capture = folder.file("capture.h5");
+  write_capture(spec.capture, plate_counts());
+  for (const double seconds : {std::nan(""), 0.0, -1.0, 1e7}) {
+    spec.seconds = seconds;
+    EXPECT_THROW(begin_reconstruction(spec, folder.path(), {}), InputError) << seconds;
+  }
 }
 
 }  // namespace
