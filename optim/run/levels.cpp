@@ -230,6 +230,7 @@ class Levels {
     RunOptions options = options_;
     options.folder = folder(level);
     options.errors = level >= remeshed_.remesh.levels;
+    options.followed_unless_explained = level < remeshed_.remesh.most_levels();
     options.earlier = {remeshed_.shape, options.errors ? earlier_surfaces(level) : std::vector<std::string>{}};
     options.report = [this](const std::string& text) { report_ = text; };
     // Losses of a level by adam scatter by design. The levels that follow show what came of it.

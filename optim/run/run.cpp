@@ -199,15 +199,20 @@ class Run {
       stage.advance();
     };
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
+    write_exr(path("final.exr"), final.image, notes_);
+    std::optional<RenderedCurvature> curvature;
+    std::vector<std::vector<double>> samples;
+    const Poll never = [] {};  // as it ends, a run is not interrupted
+    if (options_.errors && !options_.loss && has_errors()) {
+      curvature.emplace(problem_, target_, state_.theta, never);
+      samples = posterior_samples(*curvature);
+    }
+    judge_expected_counts();
     std::vector<double> of_surfaces;
-    if (options_.errors && !options_.loss) of_surfaces = find_errors(*optimizer, final);
-    if (!options_.earlier.meshes.empty())
-      add_level_scatter(options_.earlier,
-                        parameters_.apply(offsets_alone(problem_, state_.theta, options_.earlier.shape)), of_surfaces);
+    if (curvature && !(options_.followed_unless_explained && fit_ && fit_->verdict() == FitVerdict::unexplained))
+      of_surfaces = find_errors(*curvature, samples, {variance_scale(problem_, final), optimizer->scatters()});
     geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");
-    write_exr(path("final.exr"), final.image, notes_);
-    judge_expected_counts();
     // Of levels that others follow a noisier iteration at the end says little.
     if (fit_ && (options_.errors ? left_its_data(*fit_, state_, last_) : fit_->lost()))
       result.status = RunStatus::diverged;
@@ -215,28 +220,40 @@ class Run {
     return result;
   }
 
-  /// Of all unknowns together where their matrix is not too large; those of surfaces are returned, where there are any. As it
-  /// ends, a run is not interrupted.
-  std::vector<double> find_errors(const Optimizer& optimizer, const Evaluation& final) {
-    const std::vector<double>& theta = state_.theta;
+  /// Whether errors are of all unknowns together, as their matrix is not too large.
+  bool together() const {
     const double unknowns = parameters_.size();
-    const bool together =
-        unknowns <= kMostTogether && linearisation_bytes(problem_, unknowns) <= kMostLinearisationBytes;
-    const bool differences = problem_.experiment().gradient.method == GradientMethod::finite_difference;
-    if (!problem_.can_render(theta) || (differences && !together)) return {};
-    const NoiseLevel noise{variance_scale(problem_, final), optimizer.scatters()};
+    return unknowns <= kMostTogether && linearisation_bytes(problem_, unknowns) <= kMostLinearisationBytes;
+  }
+
+  bool by_differences() const { return problem_.experiment().gradient.method == GradientMethod::finite_difference; }
+
+  bool has_errors() const { return problem_.can_render(state_.theta) && (together() || !by_differences()); }
+
+  /// Of the final parameters, where anything is made of them.
+  std::vector<std::vector<double>> posterior_samples(const RenderedCurvature& curvature) {
+    const bool surfaces = has_surface_errors(problem_);
+    if (by_differences() || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty()))) return {};
+    std::vector<std::vector<double>> samples = curvature.samples(surfaces ? kErrorSamples : kTraceSamples);
+    determined_ = determined_unknowns(problem_, target_, free_unknowns(problem_, state_.theta), samples);
+    return samples;
+  }
+
+  /// Returns those of surfaces, where there are any.
+  std::vector<double> find_errors(const RenderedCurvature& curvature, const std::vector<std::vector<double>>& samples,
+                                  const NoiseLevel& noise) {
+    const std::vector<double>& theta = state_.theta;
     const std::vector<Parameters::Block>& blocks = parameters_.blocks();
     const std::vector<std::string>& names = parameters_.component_names();
-    const Poll poll = [] {};
-    const RenderedCurvature curvature(problem_, target_, theta, poll);
-    errors_ = together ? joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta)
-                       : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
-                                           curvature.gradients(), noise, blocks, names, theta);
-    const bool surfaces = has_surface_errors(problem_);
-    if (differences || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty()))) return {};
-    const std::vector<std::vector<double>> samples = curvature.samples(surfaces ? kErrorSamples : kTraceSamples);
-    determined_ = determined_unknowns(problem_, target_, free_unknowns(problem_, theta), samples);
-    return surfaces ? surface_errors(problem_, samples, theta, noise.scale) : std::vector<double>{};
+    errors_ = together() ? joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta)
+                         : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
+                                             curvature.gradients(), noise, blocks, names, theta);
+    if (samples.empty() || !has_surface_errors(problem_)) return {};
+    std::vector<double> errors = surface_errors(problem_, samples, theta, noise.scale);
+    if (!options_.earlier.meshes.empty())
+      add_level_scatter(options_.earlier, parameters_.apply(offsets_alone(problem_, theta, options_.earlier.shape)),
+                        errors);
+    return errors;
   }
 
   /// What the final parameters make of the counts, with far less noise than an iteration's image.

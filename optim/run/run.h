@@ -46,6 +46,8 @@ struct RunOptions {
   /// Whether standard errors of what was found are stated, and expected counts rendered until their noise does not decide the verdict; of
   /// a level that others follow they are not.
   bool errors = true;
+  bool followed_unless_explained =
+      false;  ///< another level follows, which states the errors, where the counts are not explained
   /// Their distances from what is found add to the errors of its vertices.
   EarlierSurfaces earlier;
   std::function<void(const std::string&)> warning;  ///< one line

@@ -134,6 +134,8 @@ TEST_F(Reconstruct, AnotherLevelFollowsWhereCountsAreNotExplained) {
   EXPECT_NE(folder_.read("whole/levels/10/summary.yaml").find("verdict: unexplained"), std::string::npos);
   EXPECT_TRUE(folder_.has("whole/levels/11/summary.yaml"));
   EXPECT_FALSE(folder_.has("whole/levels/12"));
+  EXPECT_EQ(folder_.read("whole/levels/10/summary.yaml").find("standard_errors:"), std::string::npos) << "for nobody";
+  EXPECT_NE(folder_.read("whole/levels/11/summary.yaml").find("standard_errors:"), std::string::npos);
   EXPECT_EQ(folder_.read("whole/geometry/final_surface.ply"),
             folder_.read("whole/levels/11/geometry/final_surface.ply"));
   EXPECT_EQ(run(command("killed", late), SIGKILL, [&] { return folder_.has("killed/levels/10/summary.yaml"); }).status,
