@@ -34,6 +34,9 @@ constexpr double kOutlineChange = 0.5 * 0.25;
 /// Of an image in the coarse levels, per second of the whole: of the rabbit 1197 histograms with 438 each (optim/README.md, Histograms).
 constexpr double kCoarseSamplesPerSecond = 1024 * 512 / 300.0;
 constexpr int kLeastCoarseHistograms = 256;
+/// Beyond so many photons of a histogram for each sample the noise of the images is far above theirs, and counts say no more: priors weigh as
+/// if there were no more (optim/README.md, Bright captures).
+constexpr double kPhotonsPerSample = 5;
 
 struct Range {
   double least = std::numeric_limits<double>::infinity(), most = 0;
@@ -159,11 +162,15 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
     if (block.name == "background") std::fill_n(theta.begin() + block.begin, block.count, 0.0);
   const GatedImage light =
       problem.render(theta, problem.stream(Pass::render), {0, std::max(kLeastSamples, settings.samples / 4)});
-  const double gain = multiple_of(by_gate(light, readings), by_gate(counts, readings));
+  const std::vector<double> lights = by_gate(light, readings);
+  const double gain = multiple_of(lights, by_gate(counts, readings));
   if (gain > 0 && std::isfinite(gain)) settings.gain = gain;
+  const double photons = settings.gain * std::accumulate(lights.begin(), lights.end(), 0.0) / readings.pixels(counts);
   // Weights of slopes that are normal with such a standard deviation (optim/README.md).
   const double area = surface_area(start), edges = 3 * vertices_of(area, settings.edge_length);
-  const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings));
+  const double believed = std::min(1.0, kPhotonsPerSample * settings.samples / photons);
+  const double unit = edges / (2 * readings.count(counts) * mean_square(counts, readings)) / believed;
+  settings.bending /= believed;
   settings.motion = unit / (kMotionSlope * kMotionSlope);
   settings.adam_motion = unit / (kFreeSlope * kFreeSlope);
   const double slope = kAlbedoChange / std::sqrt(area);

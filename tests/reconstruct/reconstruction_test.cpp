@@ -118,6 +118,23 @@ TEST(Reconstruction, RefusesWhatIsNoCount) {
   }
 }
 
+/// Images of 16 samples: their noise is above that of 80 photons. Priors of ten times as many weigh ten times as much.
+TEST(Reconstruction, PhotonsBeyondWhatSamplesTellDoNotWeighMore) {
+  const auto bending_of = [](double factor) {
+    const TemporaryFolder folder;
+    CaptureFile capture = plate_counts();
+    for (double& value : capture.counts.data) value *= factor;
+    begun(capture, folder);
+    const Experiment experiment = load_experiment(folder.file("experiment.yaml"));
+    EXPECT_EQ(experiment.samples.primal, 16);
+    return experiment.parameters[0].bending;
+  };
+  const double many = bending_of(1);
+  EXPECT_EQ(bending_of(0.02), 1);
+  EXPECT_NEAR(many, 2000 / 80.0, 10);
+  EXPECT_NEAR(bending_of(10) / many, 10, 0.1);
+}
+
 /// Names of experiments have no blanks, dots or letters beyond ASCII.
 TEST(Reconstruction, TakesFilesOfAnyName) {
   for (const char* name : {"scan 3.2 # a: \"b\".h5",
