@@ -120,21 +120,34 @@ DetectorResponse response_of(GateSpec gates, const CaptureFile& capture) {
   return response.upper() > response.lower() ? DetectorResponse(response) : std::nullopt;
 }
 
-/// One number per sensor point, zero where values under any spot are no counts: not finite, or below zero, as dead points have; empty: all
-/// are counts. Where most points have values below zero, dark counts were taken off, and these say nothing about points.
+/// From so many counts of the median point on one that counts nothing is dead: with a tenth of its light it would be so once in 22000.
+constexpr double kNeverSilent = 100;
+
+/// One number per sensor point, zero for dead ones; empty: none is. Values of these are no counts under some spot, not finite or below zero, or
+/// they count nothing where others do. Where most points have values below zero, dark counts were taken off, and these say nothing.
 std::vector<std::uint8_t> usable_points(const CaptureFile& capture) {
   const std::size_t points = capture.geometry.sensor.size();
-  std::vector<std::uint8_t> finite(points, 1), positive(points, 1);
+  std::vector<std::uint8_t> finite(points, 1), used(points, 1);
+  std::vector<double> counted(points, 0.0);
   for (int pixel = 0; pixel < capture.counts.pixels(); ++pixel)
     for (int g = 0; g < capture.counts.gates; ++g) {
       const double value = capture.counts.at(pixel, g);
-      if (!std::isfinite(value)) finite[pixel % points] = positive[pixel % points] = 0;
-      if (value < 0) positive[pixel % points] = 0;
+      const std::size_t point = pixel % points;
+      if (!std::isfinite(value)) finite[point] = used[point] = 0;
+      if (value < 0) used[point] = 0;
+      counted[point] += value;
     }
-  const auto left = [](const std::vector<std::uint8_t>& used) { return std::ranges::count(used, 1); };
-  std::vector<std::uint8_t>& used = 2 * left(positive) < left(finite) ? finite : positive;
+  const auto left = [](const std::vector<std::uint8_t>& of) { return std::ranges::count(of, 1); };
+  if (2 * left(used) < left(finite)) used = finite;
+  std::vector<double> sums;
+  for (std::size_t p = 0; p < points; ++p)
+    if (used[p]) sums.push_back(counted[p]);
+  const auto middle = sums.begin() + std::ssize(sums) / 2;
+  if (!sums.empty()) std::nth_element(sums.begin(), middle, sums.end());
+  for (std::size_t p = 0; p < points && !sums.empty() && *middle >= kNeverSilent; ++p)
+    if (counted[p] == 0) used[p] = 0;
   if (left(used) == std::ssize(used)) used.clear();
-  return std::move(used);
+  return used;
 }
 
 BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response,
@@ -194,7 +207,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
     const int columns = capture.geometry.columns, rows = static_cast<int>(used.size()) / columns;
     write_file_atomically(place + "/mask.npy", npy_of_pixels(columns, rows, used));
     if (warning)
-      warning(fmt::format("{}: {} of {} points are left out, whose values are no counts", spec.capture,
+      warning(fmt::format("{}: {} of {} points are left out: they count nothing, or what is no count", spec.capture,
                           std::ranges::count(used, 0), used.size()));
   }
   const BackProjection volume = back_projected(capture, response, used, spec.capture);
