@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <limits>
 #include <thread>
 
 #include "core/base/error.h"
@@ -34,9 +33,7 @@ void add_experiment_options(CLI::App& command, CommonOptions& options) {
   command.add_option("--samples", options.samples, "samples per pixel, for every term that is not left out")
       ->check(CLI::Range(1, 1 << 30))
       ->type_name("N");
-  command.add_option("--seed", options.seed, "seed of the random numbers")
-      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
-      ->type_name("N");
+  add_seed_option(command, options.seed);
   command
       .add_option("--set", options.set,
                   "replace a value of the experiment file, such as optimizer.iterations=10 or "

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,13 @@ void warn(const std::string& text);
 void add_parameter_option(CLI::App& command, CommonOptions& options);
 /// --force, of those that may replace a run.
 void add_force_option(CLI::App& command, CommonOptions& options);
+/// --seed: a number that experiments may have.
+template <class Seed>
+void add_seed_option(CLI::App& command, Seed& seed) {
+  command.add_option("--seed", seed, "seed of the random numbers")
+      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->type_name("N");
+}
 /// Unknowns [begin, begin + count) that --parameter names; all for an empty name. Throws InputError.
 Parameters::Block chosen_parameter(const Parameters& parameters, const std::string& name);
 

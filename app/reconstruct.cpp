@@ -1,7 +1,5 @@
 #include <spdlog/spdlog.h>
 
-#include <cstdint>
-#include <limits>
 #include <optional>
 
 #include "app/commands.h"
@@ -51,9 +49,7 @@ void add_reconstruct(CLI::App& app, Action& action) {
                   "work of the fit, as much as two cores do in that time; more gives less noise (default 300)")
       ->check(CLI::Range(kLeastSeconds, kMostSeconds))
       ->type_name("N");
-  sub->add_option("--seed", command->spec.seed, "seed of the random numbers")
-      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
-      ->type_name("N");
+  add_seed_option(*sub, command->spec.seed);
   add_force_option(*sub, command->common);
   add_session_options(*sub, command->common);
   sub->footer(

@@ -76,8 +76,9 @@ def parser():
     return parser
 
 
-def main():
-    options = parser().parse_args()
+def main(arguments=None):
+    """Of the command line where there are no arguments."""
+    options = parser().parse_args(None if arguments is None else list(map(str, arguments)))
     with tempfile.TemporaryDirectory() as temporary:
         settings = EXPERIMENT.format(samples=options.samples, bounces=options.bounces)
         light = expected(pathlib.Path(temporary), scene(options), settings, options.seed)

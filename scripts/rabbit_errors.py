@@ -50,14 +50,18 @@ def covered(path, true, along):
     return (errors[np.isfinite(errors)] <= 3).mean()
 
 
-def errors(vertices, triangles):
-    found, true = depths(vertices, triangles), depths(*read_mesh(SCENE / "rabbit.obj"))
+def compared(found, true):
+    """What main prints, of depths on the same lines."""
     in_found, in_true = np.isfinite(found), np.isfinite(true)
     both = in_found & in_true
     off = 1000 * (found - true)[both]
     return {**errors_of_depths(off), "bias_mm": np.median(off) if off.size else np.nan,
             "silhouette": both.sum() / (in_found | in_true).sum(), "extra": (in_found & ~in_true).sum() / in_true.sum(),
             "missed": (in_true & ~in_found).sum() / in_true.sum()}
+
+
+def errors(vertices, triangles):
+    return compared(depths(vertices, triangles), depths(*read_mesh(SCENE / "rabbit.obj")))
 
 
 def surface(path):

@@ -19,7 +19,6 @@ import argparse
 import itertools
 import pathlib
 import shutil
-import subprocess
 import sys
 import tempfile
 import time
@@ -27,6 +26,7 @@ import time
 import numpy as np
 
 import light_cone
+import rabbit_capture
 import rabbit_errors
 from isochron.back_projection import METRES
 from isochron.captures import read_capture
@@ -73,8 +73,8 @@ def row_of(found, seen, seconds, verdict="", covered=""):
     """The last columns; `seen`: depths of back-projection."""
     if found is None or not len(found[1]):
         return ("",) * 5 + (f"{seconds:.3g}", verdict, covered)
-    errors, true = rabbit_errors.errors(*found), rabbit_errors.depths(*read_mesh(rabbit_errors.SCENE / "rabbit.obj"))
-    off = 1000 * (rabbit_errors.depths(*found) - true)
+    depths, true = rabbit_errors.depths(*found), rabbit_errors.depths(*read_mesh(rabbit_errors.SCENE / "rabbit.obj"))
+    errors, off = rabbit_errors.compared(depths, true), 1000 * (depths - true)
     shared = rabbit_errors.errors_of_depths(off[np.isfinite(off) & np.isfinite(seen)])
     numbers = (errors["median_mm"], errors["within_80_mm"], shared["median_mm"], shared["within_80_mm"], errors["silhouette"], seconds)
     return (*(f"{value:.3g}" for value in numbers), verdict, covered)
@@ -83,8 +83,7 @@ def row_of(found, seen, seconds, verdict="", covered=""):
 def measure(options, photons, points, limits, seed, folder):
     """Rows of one capture."""
     path = folder / "capture.h5"
-    subprocess.run([sys.executable, ROOT / "scripts/rabbit_capture.py", path, "--points", str(points), "--counts", str(photons), "--seed",
-                    str(seed)], check=True)
+    rabbit_capture.main([path, "--points", points, "--counts", photons, "--seed", seed])
     *projected, spent = rabbit_errors.surface(path)
     seen = rabbit_errors.depths(*projected)
     start = f"{photons:g}", points, "", seed
@@ -110,10 +109,10 @@ def sweep(options, name):
             write_rows(options.output / f"rabbit_{name}.csv", COLUMNS, rows)
 
 
-def spread(rows, key, factor=1.0):
+def spread(rows, key, factor=1.0, unit=""):
     """Of the draws that found something: the number, or the least and the most."""
     texts = [f"{factor * value:.3g}" for value in sorted(float(row[key]) for row in rows if row[key])]
-    return " to ".join(dict.fromkeys((texts[0], texts[-1]))) if texts else ""
+    return " to ".join(dict.fromkeys((texts[0], texts[-1]))) + unit if texts else ""
 
 
 def table_of(rows, name):
@@ -125,7 +124,7 @@ def table_of(rows, name):
         own, same = ([row for row in of if row[column] in (value, "")] for of in (fits, others))
         explained = sum(row["verdict"] == "explained" for row in own)
         table.append([value, f"{explained} of {len(own)}", *(spread(own, key) for key in ("median_mm", "within_80_mm", "silhouette")),
-                      f"{spread(own, 'covered', 100)} %", *(spread(same, key) for key in ("median_mm", "within_80_mm", "silhouette"))])
+                      spread(own, "covered", 100, " %"), *(spread(same, key) for key in ("median_mm", "within_80_mm", "silhouette"))])
     return markdown([{"seconds": "`--seconds`"}.get(name, name), "explained", "median, mm", "80 %, mm", "silhouette", "within 3 errors",
                      "back-projection: median, mm", "80 %, mm", "silhouette"], table)
 

@@ -15,7 +15,6 @@ wall of 2 m with bins of 32 ps. Writes experiments/measured/shapes.csv after eve
 import argparse
 import dataclasses
 import pathlib
-import subprocess
 import sys
 import tempfile
 import time
@@ -26,8 +25,9 @@ import rabbit_capture
 import rabbit_errors
 from isochron.mesh_files import read_mesh
 from isochron.pictures.raster import Seen
-from reproduction.measure import ROOT, program, summary
-from reproduction.tables import markdown, read_rows, write_rows
+from reproduction.measure import program, summary
+from reproduction.study import study
+from reproduction.tables import markdown
 from scenes import mesh
 from scenes.implicit import Blobs, polygonise
 
@@ -152,8 +152,7 @@ def rows(name, shape, options, folder):
                                            ("fit", found, seconds, *verdict_of_fit)):
         off = 1000 * (depths - true)
         errors = rabbit_errors.errors_of_depths(off[np.isfinite(off) & np.isfinite(shown)])
-        both, either = np.isfinite(depths) & np.isfinite(true), np.isfinite(depths) | np.isfinite(true)
-        numbers = (*errors.values(), both.sum() / either.sum(), took)
+        numbers = (*errors.values(), rabbit_errors.compared(depths, true)["silhouette"], took)
         yield name, method, *(f"{value:.3g}" for value in numbers), *verdict
 
 
@@ -179,22 +178,8 @@ def main():
     parser.add_argument("--seconds", type=float, default=300, help="of each reconstruction (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for captures and runs; default: a temporary one")
-    parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
-    parser.add_argument("--table", action="store_true", help="print the table of what was measured before, as a page has it")
-    options = parser.parse_args()
-    if options.table:
-        print(table_of(read_rows(options.output / "shapes.csv")))
-        return 0
-    table = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = options.keep or pathlib.Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        for name in options.shapes:
-            for row in rows(name, known[name], options, folder):
-                table.append(row)
-                print(*row, flush=True)
-            write_rows(options.output / "shapes.csv", COLUMNS, table)
-    return 0
+    return study(parser, "shapes.csv", COLUMNS,
+                 lambda options, folder: (rows(name, known[name], options, folder) for name in options.shapes), table_of)
 
 
 if __name__ == "__main__":

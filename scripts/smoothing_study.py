@@ -13,19 +13,18 @@ with every weight, from the same start. Writes smoothing.csv after every reconst
 import argparse
 import itertools
 import pathlib
-import subprocess
 import sys
-import tempfile
 from types import SimpleNamespace
 
-import numpy as np
 import yaml
 
+import rabbit_capture
 import rabbit_errors
 import shape_study
 from isochron.mesh_files import read_mesh
-from reproduction.measure import ROOT, program, summary
-from reproduction.tables import markdown, read_rows, write_rows
+from reproduction.measure import program, summary
+from reproduction.study import study
+from reproduction.tables import markdown
 
 COLUMNS = "shape", "photons", "factor", "bending", "median_mm", "within_80_mm", "silhouette", "loss"
 SHAPES, PHOTONS = ("rabbit", "blob", "bust"), (20, 200, 2000)
@@ -38,7 +37,7 @@ def capture(shape, photons, path):
     if shape != "rabbit":
         shape_study.capture(shape_study.shapes()[shape], SimpleNamespace(photons=photons, **vars(STUDY)), path)
         return
-    subprocess.run([sys.executable, ROOT / "scripts/rabbit_capture.py", path, "--counts", str(photons), "--seed", str(STUDY.seed)], check=True)
+    rabbit_capture.main([path, "--counts", photons, "--seed", STUDY.seed])
 
 
 def depths(shape, mesh):
@@ -51,9 +50,8 @@ def depths(shape, mesh):
 
 def errors(shape, path):
     """The columns behind the weight, but the loss."""
-    found, true = depths(shape, read_mesh(path)), depths(shape, None)
-    off, either = 1000 * (found - true), np.isfinite(found) | np.isfinite(true)
-    return *rabbit_errors.errors_of_depths(off[np.isfinite(off)]).values(), np.isfinite(off).sum() / either.sum()
+    found = rabbit_errors.compared(depths(shape, read_mesh(path)), depths(shape, None))
+    return tuple(found[column] for column in COLUMNS[4:7])
 
 
 def reconstruction(shape, photons, folder):
@@ -97,22 +95,8 @@ def main():
     parser.add_argument("--shapes", nargs="+", choices=SHAPES, default=SHAPES, help="default: all")
     parser.add_argument("--photons", type=int, nargs="+", default=PHOTONS, help="per point (default 20 200 2000)")
     parser.add_argument("--keep", type=pathlib.Path, help="folder for captures and runs, which are taken if they are there")
-    parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
-    parser.add_argument("--table", action="store_true", help="print the table of what was measured before, as a page has it")
-    options = parser.parse_args()
-    if options.table:
-        print(table_of(read_rows(options.output / "smoothing.csv")))
-        return 0
-    table = []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = options.keep or pathlib.Path(temporary)
-        folder.mkdir(parents=True, exist_ok=True)
-        for shape, photons in itertools.product(options.shapes, options.photons):
-            for row in grid(shape, photons, folder):
-                table.append(row)
-                print(*row, flush=True)
-            write_rows(options.output / "smoothing.csv", COLUMNS, table)
-    return 0
+    return study(parser, "smoothing.csv", COLUMNS,
+                 lambda options, folder: (grid(*case, folder) for case in itertools.product(options.shapes, options.photons)), table_of)
 
 
 if __name__ == "__main__":

@@ -12,17 +12,16 @@ wrong_models.csv after every reconstruction:
 """
 
 import argparse
-import pathlib
-import subprocess
 import sys
-import tempfile
 
 import numpy as np
 
+import rabbit_capture
 import rabbit_errors
 from isochron.mesh_files import read_mesh
-from reproduction.measure import ROOT, program, summary
-from reproduction.tables import markdown, read_rows, write_rows
+from reproduction.measure import program, summary
+from reproduction.study import study
+from reproduction.tables import markdown
 
 COLUMNS = "model", "median_mm", "within_80_mm", "bias_mm", "silhouette", "deviance_over_floor", "verdict", "covered"
 RESPONSE = rabbit_errors.SCENE / "response.csv"
@@ -49,12 +48,12 @@ def response(stretch, shift, path):
 def row(model, seconds, folder):
     how, stretch, shift = MODELS[model]
     path, told, run = folder / "capture.h5", folder / "response.csv", folder / "run"
-    subprocess.run([sys.executable, ROOT / "scripts/rabbit_capture.py", path, "--points", str(POINTS), "--seed", str(SEED), *how], check=True)
+    rabbit_capture.main([path, "--points", POINTS, "--seed", SEED, *how])
     response(stretch, shift, told)
     program("reconstruct", path, "-o", run, "--response", told, "--seconds", seconds, "--seed", SEED, "--force")
     surface, fit = run / "geometry/final_surface.ply", summary(run)["fit"]
-    found = rabbit_errors.errors(*read_mesh(surface))
     true = rabbit_errors.depths(*read_mesh(rabbit_errors.SCENE / "rabbit.obj"))
+    found = rabbit_errors.compared(rabbit_errors.depths(*read_mesh(surface)), true)
     covered = rabbit_errors.covered(surface, true, rabbit_errors.LINES)
     return (model, *(f"{found[key]:.3g}" for key in COLUMNS[1:5]), f"{fit['deviance'] / fit['floor']:.4f}", fit["verdict"], f"{covered:.3f}")
 
@@ -69,19 +68,7 @@ def table_of(rows):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seconds", type=float, default=100, help="of each reconstruction (default 100)")
-    parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
-    parser.add_argument("--table", action="store_true", help="print the table of what was measured before, as a page has it")
-    options = parser.parse_args()
-    if options.table:
-        print(table_of(read_rows(options.output / "wrong_models.csv")))
-        return 0
-    rows = []
-    for model in MODELS:
-        with tempfile.TemporaryDirectory() as folder:
-            rows.append(row(model, options.seconds, pathlib.Path(folder)))
-        print(*rows[-1], flush=True)
-        write_rows(options.output / "wrong_models.csv", COLUMNS, rows)
-    return 0
+    return study(parser, "wrong_models.csv", COLUMNS, lambda options, folder: ([row(model, options.seconds, folder)] for model in MODELS), table_of)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@
 namespace isochron {
 namespace {
 
-/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 438 for 300 s. It takes some 130 s.
+/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 438 for 300 s. It takes some 160 s.
 constexpr double kLevelSamplesPerSecond = 60000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// The first finds the outline and the second the albedo; six of adam move borders, the last of these with half the edges, as a rim that

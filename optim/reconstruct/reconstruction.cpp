@@ -16,6 +16,7 @@
 #include "core/gates/gate_description.h"
 #include "core/image/npy.h"
 #include "core/scene/mesh_writer.h"
+#include "optim/problem/vector_math.h"
 #include "optim/reconstruct/fit_settings.h"
 #include "optim/reconstruct/start_surface.h"
 #include "optim/remesh/surface.h"
@@ -142,10 +143,9 @@ std::vector<std::uint8_t> usable_points(const CaptureFile& capture) {
   std::vector<double> sums;
   for (std::size_t p = 0; p < points; ++p)
     if (used[p]) sums.push_back(counted[p]);
-  const auto middle = sums.begin() + std::ssize(sums) / 2;
-  if (!sums.empty()) std::nth_element(sums.begin(), middle, sums.end());
-  for (std::size_t p = 0; p < points && !sums.empty() && *middle >= kNeverSilent; ++p)
-    if (counted[p] == 0) used[p] = 0;
+  if (!sums.empty() && median(sums) >= kNeverSilent)
+    for (std::size_t p = 0; p < points; ++p)
+      if (counted[p] == 0) used[p] = 0;
   if (left(used) == std::ssize(used)) used.clear();
   return used;
 }

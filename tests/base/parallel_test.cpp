@@ -3,8 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <thread>
+#include <vector>
 
 namespace isochron {
 namespace {
@@ -32,6 +34,16 @@ TEST(Parallel, ThreadCountChangesUnderALoop) {
     EXPECT_EQ(inner, 50);
   }
   set_thread_count(0);
+}
+
+TEST(Parallel, RangesTogetherAreAll) {
+  for (const std::size_t count : {std::size_t{0}, std::size_t{1}, std::size_t{1} << 15, (std::size_t{1} << 17) + 3}) {
+    std::vector<int> visits(count, 0);
+    parallel_ranges(count, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) ++visits[i];
+    });
+    EXPECT_EQ(std::ranges::count(visits, 1), std::ssize(visits)) << count;
+  }
 }
 
 }  // namespace

@@ -146,16 +146,16 @@ class StudyTest(unittest.TestCase):
             self.assertEqual(plot_rabbit_study.main([str(folder)]), 2)
             rows = [("back_projection", 2000, 64, "", 1, 2, 7, 2, 7, 0.7, 10, "", ""), ("light_cone", 2000, 64, "", 1, 2, 6, 2, 5, 0.7, 5, "", ""),
                     ("fit", 2000, 64, 30, 1, "", "", "", "", "", 5, "no_signal", ""),
-                    *(("fit", 2000, 64, limit, seed, 1, 3 + seed, 1, 3, 0.9, limit + seed, verdict, "") for limit, seed, verdict in
-                      ((60, 1, "explained"), (60, 2, "explained"), (60, 3, "unexplained"), (120, 1, "explained")))]
+                    *(("fit", 2000, 64, limit, seed, 1, 3 + seed, 1, 3, 0.9, limit + seed, verdict, covered) for limit, seed, verdict, covered in
+                      ((60, 1, "explained", 0.95), (60, 2, "explained", 0.975), (60, 3, "unexplained", 0.96), (120, 1, "explained", 1)))]
             write_rows(folder / "rabbit_seconds.csv", rabbit_study.COLUMNS, rows)
             self.assertEqual(plot_rabbit_study.main([str(folder), str(folder / "a.png")]), 0)
             self.assertGreater(np.ptp(matplotlib.image.imread(folder / "a.png")[..., :3]), 0.9)
             fits = [row for row in plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv") if row["method"] == "fit"]
             self.assertEqual(plot_rabbit_study.medians(fits, "seconds", "within_80_mm"), [[62, 121], [5, 4]])
             table = rabbit_study.table_of(plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv"), "seconds").splitlines()
-            self.assertEqual(table[2], "| 30 | 0 of 1 |  |  |  |  % | 2 | 7 | 0.7 |")
-            self.assertEqual(table[3], "| 60 | 2 of 3 | 1 | 4 to 6 | 0.9 |  % | 2 | 7 | 0.7 |")
+            self.assertEqual(table[2], "| 30 | 0 of 1 |  |  |  |  | 2 | 7 | 0.7 |")
+            self.assertEqual(table[3], "| 60 | 2 of 3 | 1 | 4 to 6 | 0.9 | 95 to 97.5 % | 2 | 7 | 0.7 |")
 
 
 class SmoothingTest(unittest.TestCase):
