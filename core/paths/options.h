@@ -91,14 +91,26 @@ struct SampleRange {
   int count() const { return end - begin; }
 };
 
-/// How many times as long as a ray a triangle takes that is tested for an arc, measured on the cube and the box.
-inline constexpr double kRaysPerArc = 1.3;
+/// How many times as long as a ray it takes to test a triangle for an arc, and to differentiate a segment of a path (isochron_work).
+inline constexpr double kRaysPerArc = 0.5, kRaysPerSegment = 0.4;
 
-/// So many rays, and triangles tested for arcs.
-struct RayCounts {
-  long long rays = 0, arcs = 0;
+/// What work is counted by, the same on every machine: rays, triangles tested for arcs, and segments of paths that were differentiated.
+struct WorkCounts {
+  long long rays = 0, arcs = 0, segments = 0;
 
-  double in_rays() const { return static_cast<double>(rays) + kRaysPerArc * static_cast<double>(arcs); }
+  double in_rays() const {
+    return static_cast<double>(rays) + kRaysPerArc * static_cast<double>(arcs) +
+           kRaysPerSegment * static_cast<double>(segments);
+  }
+  WorkCounts& operator+=(const WorkCounts& other) {
+    rays += other.rays;
+    arcs += other.arcs;
+    segments += other.segments;
+    return *this;
+  }
+  WorkCounts operator-(const WorkCounts& other) const {
+    return {rays - other.rays, arcs - other.arcs, segments - other.segments};
+  }
 };
 
 }  // namespace isochron

@@ -1,12 +1,11 @@
 #include "core/render/measure_mix.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
-#include "core/render/light_trial.h"
 #include "core/render/technique_trial.h"
 
 namespace isochron {
@@ -20,6 +19,8 @@ struct TrialWidths {
 };
 constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
+constexpr double kNone = std::numeric_limits<double>::infinity();
+
 constexpr int kTrialSamples = 2;  ///< per pixel, batch and technique
 /// Before images are larger. Sums over blocks vary together, so that only batches say more about them.
 constexpr int kMostBatches = 32, kFewestBatches = 4, kFewestBatchesOfSums = 16;
@@ -32,15 +33,15 @@ constexpr int kBlocks = 4;        ///< across the image
 /// By what low-discrepancy numbers lower the variance of pixels under standard sampling, where trials do without: about 2 on the
 /// cube, 0.8 in the Cornell box (isochron_technique_trial: costs of trials against those of 64 samples).
 constexpr double kGainOfStandard = 1.3;
-/// The work of all trials is this part of that of the job at most; that of light subpaths takes its part of it.
-constexpr double kTrialPart = 0.1, kLightTrialPart = 0.04;
+/// The part of the samples with light subpaths, where standard sampling uses them: of shares from 0.2 to 0.8 the best costs a fifth
+/// less at most (isochron_light_share).
+constexpr double kLightShare = 0.5;
+/// The work of a trial is this part of that of the job at most.
+constexpr double kTrialPart = 0.1;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
 /// Samples of standard sampling whose work a first batch may take: where one by connections takes 25 times as much.
 constexpr double kFewestBudget = 8000;
-/// Paths of the trial of light subpaths at most and, where the job is small, at least, what each takes in paths by standard
-/// sampling (one without and one with light subpaths and all their joints).
-constexpr double kLightPaths = 16384, kFewestLightPaths = 400, kLightWork = 6;
 
 double pixels_of(const Scene& scene) {
   return double{1} * scene.camera.width * scene.camera.height;
@@ -68,59 +69,97 @@ TangentBasis combined(const TangentBasis& basis, const Stream& stream) {
   return basis.combined(sign);
 }
 
-/// Decides between standard sampling and connections.
-struct TechniqueChoice {
+/// Decides what images or derivatives are found by.
+struct MixChoice {
   const Scene& scene;
   const GateSet& gates;
-  EstimatorOptions options;
-  const TangentBasis* column;  ///< of the interior term; null: of images
+  const EstimatorOptions& options;
+  const TangentBasis* column;  ///< of the derivative; null: of images
   bool sums;                   ///< over blocks of pixels count, not pixels
-  double job;                  ///< samples per pixel that it decides about
-  double part;                 ///< of the job's work, at most
+  double samples;              ///< per pixel that it decides about
+  const Job& job;
+
+  /// What one sample of each term took, by each mix: of images, `paths` alone.
+  struct Found {
+    TrialBatches paths, jumps, boundaries;
+  };
 
   int block_of(const Scene& small) const { return sums ? std::max(1, small.camera.width / kBlocks) : 1; }
 
-  /// Batches of standard sampling and of connections, each within a work of its own. `work` grows by what they took.
-  std::array<TrialBatches, 2> run(const Scene& small, int batches, const std::array<double, 2>& most,
-                                  const Stream& stream, double& work) const {
+  /// So many batches by each. `work` grows by what they took.
+  std::vector<Found> run(const Scene& small, std::span<const PathMix> mixes, int batches, const Stream& stream,
+                         double& work) const {
     const TechniqueTrial trial{small, gates, options, column, block_of(small), kTrialSamples};
     SceneCache cache(small, CasterUpdate::rebuild);
-    std::array<TrialBatches, 2> found;
-    for (const int t : {0, 1}) {
-      found[t] = run_trial(trial, t == 1, batches, most[t], stream, cache);
-      work += found[t].work * found[t].count;
+    std::vector<Found> found(mixes.size());
+    for (std::size_t i = 0; i < mixes.size(); ++i) {
+      const auto batches_of = [&](Term term) {
+        const TrialBatches result = run_trial(trial, mixes[i], term, batches, stream, cache);
+        work += batches * result.work;
+        return result;
+      };
+      found[i].paths = batches_of(Term::interior);
+      if (column && job.path_length > 0) found[i].jumps = batches_of(Term::path_length);
+      if (!column || !(job.visibility > 0)) continue;
+      // Searches for boundaries have no light subpaths.
+      const bool known = i > 0 && mixes[i].connections == mixes[i - 1].connections;
+      found[i].boundaries = known ? found[i - 1].boundaries : batches_of(Term::visibility);
     }
     return found;
   }
 
-  /// Whether connections cost less, or `by_width` where trials cannot tell.
-  bool connections(bool by_width, const Stream& stream, double& work) const {
-    const double samples =
-        part * pixels_of(scene) * job - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
-    if (!(samples >= kFewestBudget)) return by_width;
-    // What connections take differs between scenes: a tiny image tells.
+  /// What a sample of the job takes, and its variance.
+  double work_of(const Found& found) const {
+    return found.paths.work + job.path_length * found.jumps.work + job.visibility * found.boundaries.work;
+  }
+  double variance_of(const Found& found, double of_paths) const {
+    const auto part = [](const TrialBatches& of, double rate) { return rate > 0 ? of.variance / rate : 0; };
+    return of_paths + part(found.jumps, job.path_length) + part(found.boundaries, job.visibility);
+  }
+
+  /// The mix that costs least; `by_width` where trials cannot tell.
+  PathMix best(std::span<const PathMix> mixes, const PathMix& by_width, const Stream& stream, double& work) const {
+    if (mixes.size() == 1) return mixes[0];
+    const double affordable_samples =
+        kTrialPart * pixels_of(scene) * samples - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
+    if (!(affordable_samples >= kFewestBudget)) return by_width;
+    // What each takes differs between scenes: a tiny image tells.
     const Scene tiny = reduced(scene, kTinyPixels);
-    const auto first = run(tiny, 1, {0, 0}, stream, work);
-    const double both = first[0].work + first[1].work, least = std::min(first[0].work, first[1].work);
-    const double budget = samples * least / (kTrialSamples * pixels_of(tiny)) - both;
-    const double affordable = budget / both * pixels_of(tiny);  // pixels times batches
+    double tiny_work = 0, least = kNone;
+    for (const Found& found : run(tiny, mixes, 1, stream, tiny_work)) least = std::min(least, work_of(found));
+    work += tiny_work;
+    const double budget = affordable_samples * least / (kTrialSamples * pixels_of(tiny)) - tiny_work;
+    const double affordable = budget / tiny_work * pixels_of(tiny);  // pixels times batches
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
     if (!(affordable >= 2 * fewest)) return by_width;
     const double most = std::min<double>(kPixels, kMostValues / (gates.size() * (scene.grey ? 1.0 : 3.0)));
     const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
     const auto batches = static_cast<int>(std::min<double>(kMostBatches, affordable / pixels_of(small)));
-    const auto [standard, by_connections] =
-        run(small, batches, {budget * first[0].work / both, budget * first[1].work / both}, stream, work);
-    if (standard.count < 2 || by_connections.count < 2) return by_width;
-    if (standard.has_others) return false;
-    // Nothing seen says nothing: a technique that never hit the gates is no good one.
-    constexpr double kNone = std::numeric_limits<double>::infinity();
-    const auto cost = [](const TrialBatches& of) { return of.variance > 0 ? of.variance * of.work : kNone; };
+    if (batches < 2) return by_width;
+    const std::vector<Found> found = run(small, mixes, batches, stream, work);
+    const bool others = std::ranges::any_of(found, [](const Found& f) { return f.paths.has_others; });
     const bool loses_evenness = block_of(small) == 1 && options.numbers == Numbers::low_discrepancy;
-    const double of_standard = cost(standard) / (loses_evenness ? kGainOfStandard : 1),
-                 of_connections = cost(by_connections);
-    return std::min(of_standard, of_connections) == kNone ? by_width : of_connections < of_standard;
+    double least_cost = kNone;
+    PathMix best = by_width;
+    for (std::size_t i = 0; i < mixes.size(); ++i) {
+      if (others && mixes[i].connections) continue;
+      double variance = found[i].paths.variance;
+      // Standard sampling would count what light subpaths find, too, although few samples may not have found it.
+      if (!mixes[i].connections && mixes[i].light == 0)
+        for (const Found& other : found)
+          if (other.paths.moment > 0)
+            variance = std::max(variance, other.paths.variance * other.paths.moment_without_light / other.paths.moment);
+      // Nothing seen says nothing: a technique that never hit the gates is no good one.
+      if (!(variance > 0)) continue;
+      if (!mixes[i].connections && loses_evenness) variance /= kGainOfStandard;
+      const double cost = variance_of(found[i], variance) * work_of(found[i]);
+      if (cost < least_cost) {
+        least_cost = cost;
+        best = mixes[i];
+      }
+    }
+    return best;
   }
 };
 
@@ -139,32 +178,33 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   EstimatorOptions plain = options;
   plain.mix.reset();
   const SamplingMix by_width = sampling_mix(plain, gates, scene);
-  SamplingMix best;
   // Next-event estimation finds light of one bounce.
   const bool light_is_open = !options.light && options.max_bounces > 1;
-  const double part = kTrialPart - (light_is_open ? kLightTrialPart : 0);
-  const auto choose_light = [&](const TrialWidths& widths, double samples, const TangentBasis* column) {
-    const double budget = kLightTrialPart * pixels_of(scene) * samples -
-                          kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
-    const double paths = std::min(kLightPaths, budget / kLightWork);
-    if (!light_is_open || coverage < widths.below_is_ellipsoidal || !(paths >= kFewestLightPaths)) return 0.0;
-    const Scene small = reduced(scene, std::min<double>(paths, kPixels));
-    return light_subpaths_pay(small, gates, options, column, stream, paths, work) ? kLightShare : 0.0;
-  };
-  const auto choose = [&](const TrialWidths& widths, bool otherwise, double samples, const TangentBasis* column) {
-    if (coverage < widths.below_is_ellipsoidal) return true;
-    if (width > widths.above_is_standard) return false;
-    EstimatorOptions trial = options;
-    if (!trial.light) trial.light = column ? best.interior_light : best.image_light;
+  const auto choose = [&](const TrialWidths& widths, PathMix otherwise, double samples, const TangentBasis* column) {
+    const bool keeps_length = column && options.keep_length == true;  // standard sampling cannot
+    std::vector<PathMix> mixes;
+    for (const bool connections : {false, true}) {
+      const bool open = connections ? keeps_length || width <= widths.above_is_standard
+                                    : !keeps_length && coverage >= widths.below_is_ellipsoidal;
+      if (!open) continue;
+      mixes.push_back({connections, otherwise.light});
+      if (light_is_open) mixes.push_back({connections, kLightShare});
+    }
+    // Where one of the two is left.
+    if (mixes.front().connections == mixes.back().connections) otherwise.connections = mixes.front().connections;
     const bool sums = column && purpose == Purpose::gradients;
-    return TechniqueChoice{scene, gates, trial, column, sums, samples, part}.connections(otherwise, stream, work);
+    return MixChoice{scene, gates, options, column, sums, samples, job}.best(mixes, otherwise, stream, work);
   };
-  best.image_light = choose_light(kImage, job.image, nullptr);
-  best.image_connections = choose(kImage, by_width.image_connections, job.image, nullptr);
+  SamplingMix best;
+  const PathMix image = choose(kImage, {by_width.image_connections, by_width.image_light}, job.image, nullptr);
+  best.image_connections = image.connections;
+  best.image_light = image.light;
   if (!basis || basis->columns == 0) return best;
   const TangentBasis one = combined(*basis, stream);
-  best.interior_light = choose_light(kInterior, job.interior, &one);
-  best.interior_connections = choose(kInterior, by_width.interior_connections, job.interior, &one);
+  const PathMix interior =
+      choose(kInterior, {by_width.interior_connections, by_width.interior_light}, job.interior, &one);
+  best.interior_connections = interior.connections;
+  best.interior_light = interior.light;
   return best;
 }
 

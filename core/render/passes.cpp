@@ -29,18 +29,15 @@ constexpr long long kFewestLearningRounds = 64;
 class CountedWork {
  public:
   CountedWork(Worker& worker, Technique technique)
-      : worker_(worker), own_(worker.work_of[static_cast<std::size_t>(technique)]), before_{worker.rays, worker.arcs} {}
+      : worker_(worker), own_(worker.work_of[static_cast<std::size_t>(technique)]), before_(worker.counts) {}
   CountedWork(const CountedWork&) = delete;
   CountedWork& operator=(const CountedWork&) = delete;
-  ~CountedWork() {
-    own_.rays += worker_.rays - before_.rays;
-    own_.arcs += worker_.arcs - before_.arcs;
-  }
+  ~CountedWork() { own_ += worker_.counts - before_; }
 
  private:
   const Worker& worker_;
-  RayCounts& own_;
-  const RayCounts before_;
+  WorkCounts& own_;
+  const WorkCounts before_;
 };
 
 /// Of p from the points of a triangle, the least and the largest.
@@ -319,13 +316,12 @@ void Passes::learn() const {
 }
 
 void Passes::count(const Worker& worker) const {
-  rays_ += worker.rays;
-  arcs_ += worker.arcs;
-  for (int t = 0; t < kTechniques; ++t) {
-    counts_of_[t].rays += worker.work_of[t].rays;
-    counts_of_[t].arcs += worker.work_of[t].arcs;
+  {
+    const std::scoped_lock lock(counts_mutex_);
+    counts_ += worker.counts;
+    for (int t = 0; t < kTechniques; ++t) counts_of_[t] += worker.work_of[t];
   }
-  if (cache_) cache_->count_rays(worker.rays);
+  if (cache_) cache_->count_rays(worker.counts.rays);
 }
 
 }  // namespace isochron

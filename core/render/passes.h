@@ -3,7 +3,6 @@
 #pragma once
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <bit>
 #include <functional>
 #include <mutex>
@@ -101,13 +100,12 @@ class Passes {
   const GatePick every_gate;  ///< all gates and pixels alike
 
   /// Rays traced so far by all ranks. Collective: every rank has to call it.
-  long long rays() const { return sum_over_ranks(rays_.load()); }
+  long long rays() const { return sum_over_ranks(counts_.rays); }
   /// Work done so far by all ranks, in rays. Collective.
-  double work() const { return RayCounts{rays(), sum_over_ranks(arcs_.load())}.in_rays(); }
+  double work() const { return in_rays_over_ranks(counts_); }
   /// Of the samples of one technique so far. Collective.
   double work_of(Technique technique) const {
-    const Counts& of = counts_of_[static_cast<std::size_t>(technique)];
-    return RayCounts{sum_over_ranks(of.rays.load()), sum_over_ranks(of.arcs.load())}.in_rays();
+    return in_rays_over_ranks(counts_of_[static_cast<std::size_t>(technique)]);
   }
 
   /// Where the time of a pass counts; null: nowhere.
@@ -153,17 +151,19 @@ class Passes {
 
   void learn() const;
 
+  static double in_rays_over_ranks(const WorkCounts& of) {
+    return WorkCounts{sum_over_ranks(of.rays), sum_over_ranks(of.arcs), sum_over_ranks(of.segments)}.in_rays();
+  }
+
   /// Adds the work of a worker that has done its work.
   void count(const Worker& worker) const;
 
   const BoundaryEdges& edges() const { return *ready->edges; }
 
   SceneCache* const cache_;
-  mutable std::atomic<long long> rays_{0}, arcs_{0};
-  struct Counts {
-    std::atomic<long long> rays{0}, arcs{0};
-  };
-  mutable std::array<Counts, kTechniques> counts_of_;
+  mutable std::mutex counts_mutex_;
+  mutable WorkCounts counts_;
+  mutable std::array<WorkCounts, kTechniques> counts_of_;
   mutable std::once_flag learned_;
   mutable std::optional<BoundaryGuide> guide_;  ///< only of the visibility term
 };

@@ -1,6 +1,8 @@
 #include "core/render/technique_trial.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/base/listed_sum.h"
 
@@ -26,11 +28,22 @@ struct Layout {
   }
 };
 
-/// Sums over blocks, and behind them the magnitudes of what connections do not find.
+/// Sums over blocks, and behind them the magnitudes of what connections do not find and second moments of contributions, with
+/// light subpaths and without.
 class BlockSink final : public Sink {
  public:
-  BlockSink(const Passes& passes, const TangentBasis* column, const Layout& layout, ListedSum& sums)
-      : gates_(passes.gates), scene_(passes.scene), layout_(layout), sums_(sums) {
+  static constexpr int kOthers = 0, kMoment = 1, kMomentWithout = 2, kExtra = 3;
+
+  /// `moments`: whether all is found by standard sampling, the part `light` of it with light subpaths.
+  BlockSink(const Passes& passes, const TangentBasis* column, const Layout& layout, bool moments, double light,
+            ListedSum& sums)
+      : gates_(passes.gates),
+        scene_(passes.scene),
+        layout_(layout),
+        sums_(sums),
+        balance_(passes.scene, passes.every_gate),
+        moments_(moments),
+        light_(light) {
     if (column) rates_.emplace(passes.scene.layout, *column);
   }
 
@@ -39,6 +52,8 @@ class BlockSink final : public Sink {
     const int last = path.size() - 1;
     const auto outside = [&](int k) { return scene_.outside(path.vertex[k], path.vertex[k + 1]); };
     by_others_ = last > 1 && (!outside(last - 1) || (is_light(path.back().triangle) && !outside(last - 2)));
+    if (moments_ && light_ > 0)
+      without_light_ = (1 - light_) * (1 + light_rate(light_) * balance_.light_ratio(path, 0).all);
   }
   void bind(const LocalDifferential& differential) override { rates_->bind(differential); }
 
@@ -61,7 +76,12 @@ class BlockSink final : public Sink {
   void splat(int pixel, int gate, const Rgb& value) {
     double* out = sums_.at(layout_.at(pixel, gate), layout_.channels);
     for (int c = 0; c < layout_.channels; ++c) out[c] += value[c];
-    if (by_others_) *sums_.at(layout_.size, 1) += std::abs(value.r) + std::abs(value.g) + std::abs(value.b);
+    const double magnitude = std::max({std::abs(value.r), std::abs(value.g), std::abs(value.b)});
+    if (by_others_) *sums_.at(layout_.size + kOthers, 1) += magnitude;
+    if (!moments_) return;
+    double* moments = sums_.at(layout_.size + kMoment, 2);
+    moments[0] += magnitude * magnitude;
+    moments[1] += magnitude * magnitude * without_light_;
   }
 
   const GateSet& gates_;
@@ -70,33 +90,41 @@ class BlockSink final : public Sink {
   ListedSum& sums_;
   std::optional<ColumnRates> rates_;
   bool by_others_ = false;
+  Balance balance_;
+  const bool moments_;
+  const double light_;
+  double without_light_ = 1;
 };
 
 }  // namespace
 
-TrialBatches run_trial(const TechniqueTrial& trial, bool connections, int batches, double work, const Stream& stream,
+TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int batches, const Stream& stream,
                        SceneCache& cache) {
   EstimatorOptions options = trial.options;
-  options.mix = SamplingMix{.image_connections = connections, .interior_connections = connections};
-  // Where paths keep their lengths, a part of the variance is another term's.
-  options.keep_length = false;
+  options.mix = mix.sampling_mix();
+  options.light.reset();
   // What low-discrepancy numbers gain in a pixel grows with its samples, of which trials have few. In sums, techniques whose
   // points cover the whole image gain as much in a trial (isochron_technique_trial: cube, 5 %, sums).
   if (trial.block == 1) options.numbers = Numbers::independent;
   const Passes passes(trial.scene, trial.gates, options, trial.column, &cache);
   TrialBatches result;
-  if (passes.scene.emitters.empty() || (trial.column && !passes.has(Term::interior))) return result;
+  if (passes.scene.emitters.empty() || (trial.column && !passes.has(term))) return result;
+  if (trial.column) passes.prepare(term);
+  const PassKind kind = trial.column ? pass_kind(term) : PassKind::primal;
+  const bool moments = !mix.connections && (!trial.column || term == Term::interior);
   const Layout layout(passes, trial.block);
   ListedSum sums(layout.size), squares(layout.size);
-  const PassKind kind = trial.column ? PassKind::interior : PassKind::primal;
-  double done = 0;
-  do {
+  for (; result.count < batches; ++result.count) {
     const SampleRange range{result.count * trial.samples, (result.count + 1) * trial.samples};
     const int partitions = passes.partitions_for(range, layout.size);
     const auto found = passes.sum_of<ListedSum>(kind, partitions, [&](int partition) {
-      ListedSum own(layout.size + 1);
-      BlockSink sink(passes, trial.column, layout, own);
-      passes.run_images_or_interior({stream, range}, {partition, partitions}, sink);
+      ListedSum own(layout.size + BlockSink::kExtra);
+      BlockSink sink(passes, trial.column, layout, moments, mix.light, own);
+      const Pass pass{stream, range};
+      if (trial.column)
+        passes.run_term(term, pass, {partition, partitions}, passes.every_gate, sink);
+      else
+        passes.run_images(pass, {partition, partitions}, sink);
       own.finish();
       return own;
     });
@@ -104,11 +132,14 @@ TrialBatches run_trial(const TechniqueTrial& trial, bool connections, int batche
       *sums.at(i, 1) += value;
       *squares.at(i, 1) += value * value;
     });
-    found.for_each(layout.size, layout.size + 1, [&](std::size_t, double value) { result.has_others |= value > 0; });
-    ++result.count;
-    done = passes.work();
-  } while (result.count < batches && done * (result.count + 1) <= work * result.count);
-  result.work = done / result.count;
+    found.for_each(layout.size, found.size(), [&](std::size_t i, double value) {
+      if (i == layout.size + BlockSink::kOthers)
+        result.has_others |= value > 0;
+      else
+        (i == layout.size + BlockSink::kMoment ? result.moment : result.moment_without_light) += value;
+    });
+  }
+  result.work = passes.work() / result.count;
   sums.finish();
   squares.finish();
   if (result.count < 2) return result;

@@ -1,4 +1,4 @@
-// What standard sampling and ellipsoidal connections cost, by a small rendering of each.
+// What techniques cost, by small renderings.
 #pragma once
 #include "core/render/passes.h"
 
@@ -7,10 +7,18 @@ namespace isochron {
 struct TechniqueTrial {
   const Scene& scene;
   const GateSet& gates;
-  EstimatorOptions options;    ///< those of the estimates that are decided about; light subpaths are given
-  const TangentBasis* column;  ///< the interior term of the derivative along it; null: images
+  EstimatorOptions options;    ///< those of the estimates that are decided about
+  const TangentBasis* column;  ///< the derivative along it; null: images
   int block;                   ///< variances are those of sums over so many pixels by as many
   int samples;                 ///< per pixel and batch
+};
+
+/// What images and the interior and path-length terms are found by.
+struct PathMix {
+  bool connections = false;
+  double light = 0;  ///< see SamplingMix
+
+  SamplingMix sampling_mix() const { return {connections, connections, light, light}; }
 };
 
 struct TrialBatches {
@@ -18,10 +26,14 @@ struct TrialBatches {
   double work = 0;          ///< of one, see Renderer::work
   double variance = 0;      ///< of one, summed over blocks and gates; 0: nothing was seen, or there is one batch
   bool has_others = false;  ///< paths that connections do not find
+  /// Sums of squares of single contributions: of standard sampling, with light subpaths if these are used, and as it is expected of as
+  /// many samples without them. A contribution v = f / (n_s p_s + n_l p_l) is the same whichever technique found it, so that the sum
+  /// of v g over all that is found is the integral of f g; with g = f / p_s the second moment of standard sampling alone.
+  double moment = 0, moment_without_light = 0;
 };
 
-/// Batches of one technique: at most so many, and, beyond the first, as long as they take no more than this work.
-TrialBatches run_trial(const TechniqueTrial& trial, bool connections, int batches, double work, const Stream& stream,
+/// So many batches by one mix of techniques, of images or of a term of the derivative; none where the term is zero.
+TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int batches, const Stream& stream,
                        SceneCache& cache);
 
 }  // namespace isochron

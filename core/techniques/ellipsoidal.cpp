@@ -158,7 +158,7 @@ void EllipsoidalConnections::find_candidates(const EllipsoidBvh& bvh, const Elli
   for (const int t : worker_.candidates) scene_.prefetch(t);
   const Path& path = worker_.path;
   if (path.size() > 1) back_ = normalize(path.vertex[path.size() - 2].p - path.back().p);
-  worker_.arcs += 1 + worker_.candidates.size();
+  worker_.counts.arcs += 1 + worker_.candidates.size();
 }
 
 Directions EllipsoidalConnections::scattering_to(const Vec3& w) const {

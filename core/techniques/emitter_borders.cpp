@@ -26,7 +26,7 @@ void EmitterBorders::sample(double tau, int pixel, const Rgb& throughput, Rng& r
   const EllipsoidBvh::Focus anywhere{q.p, {0, 0, 0}, 0, 1, false};
   scene_.hierarchy(PreparedScene::Part::emitting)
       .sample_surfaces(anywhere, anywhere, 2 * radius, 2 * radius, thinning, candidates, inverse_probability);
-  worker_.arcs += 1 + candidates.size();
+  worker_.counts.arcs += 1 + candidates.size();
   crossings_.clear();
   for (std::size_t i = 0; i < candidates.size(); ++i) cross(candidates[i], radius, inverse_probability[i], throughput);
   const int count = static_cast<int>(crossings_.size());

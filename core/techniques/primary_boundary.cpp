@@ -32,7 +32,7 @@ std::optional<SurfacePoint> seen_beside(Worker& worker, const BoundaryEdge& edge
     if (scene.stacked.may_cover(front, scene.normal(front), d)) front = scene.top_face(front, p, d);
     return SurfacePoint{p, scene.normal(front), front};
   }
-  ++worker.rays;
+  ++worker.counts.rays;
   const Vec3 beside = normalize(y + side * offset - scene.camera.position);
   const int t = scene.first_hit(scene.camera.position, beside);
   if (t < 0 || dot(scene.normal(t), beside) == 0) return std::nullopt;
@@ -78,7 +78,7 @@ void PrimaryBoundary::sample(double scale, Rng& rng) {
   Vec3 off = -d;
   for (int i = 0; i < edge->faces(); ++i)
     off += scene_.normal(edge->face[i]) * std::copysign(1.0, -dot(scene_.normal(edge->face[i]), d));
-  ++worker_.rays;
+  ++worker_.counts.rays;
   if (scene_.caster.occluded(scene_.camera.position, y + off * scene_.caster.offset())) return;
 
   worker_.sink.bind(differential);

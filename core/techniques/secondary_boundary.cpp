@@ -84,7 +84,7 @@ void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
   const Rgb intensity = scene_.emitted(g.light, -g.w);
   if (intensity.is_black() || !g.orient()) return;
   if (!(g.y.edge->moves || may_flow(g.light) || may_meet_flowing(g, -g.w)) || !find_camera_end(g)) return;
-  ++worker_.rays;
+  ++worker_.counts.rays;
   if (scene_.caster.occluded(scene_.offset_ray_origin(g.light, -g.w), g.offset_ray_origin(scene_.caster.offset())))
     return;
 
@@ -149,7 +149,7 @@ Vec3 SecondaryBoundary::direction_in_wedge(const BoundaryEdges::Sample& y, doubl
 }
 
 bool SecondaryBoundary::find_light_end(Segment& g) {
-  ++worker_.rays;
+  ++worker_.counts.rays;
   const Vec3 start = g.offset_ray_origin(scene_.caster.offset());
   const int t = scene_.first_hit(start, g.w);
   if (t < 0 || !faces(t, -g.w)) return false;
@@ -159,7 +159,7 @@ bool SecondaryBoundary::find_light_end(Segment& g) {
 }
 
 bool SecondaryBoundary::find_camera_end(Segment& g) {
-  ++worker_.rays;
+  ++worker_.counts.rays;
   const int t = scene_.first_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
   if (t < 0 || !faces(t, g.w)) return false;
   g.camera_end = scene_.point_on_triangle(t, g.y.y, -g.w);
@@ -286,7 +286,7 @@ bool SecondaryBoundary::join_camera_path(Segment& g, int pixel, const Rgb& throu
   if (!(any_may_move_ || g.y.edge->moves || may_flow(g.camera_end) || may_meet_flowing(g, g.w))) return false;
   if (!find_light_end(g)) return false;
   if (!differentiate(g) && !any_may_move_ && !may_flow(g.camera_end) && !may_flow(g.light)) return false;
-  ++worker_.rays;
+  ++worker_.counts.rays;
   if (scene_.caster.occluded(scene_.offset_ray_origin(g.camera_end, g.w), g.offset_ray_origin(scene_.caster.offset())))
     return false;
   WalkDensities densities = camera_densities_;

@@ -57,7 +57,7 @@ double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
 void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, GateUse use) {
   sink.note_path(p);
   if (differential_sink) {
-    differentiate_path(scene, pixel, p.vertex.data(), p.size(), false, differential);
+    differentiate(p, pixel, false, differential);
     if (differential.empty()) return;
     sink.bind(differential);
     if (keeps_length(p)) use = GateUse::value_only;
@@ -65,9 +65,14 @@ void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, Gat
   sink.add(pixel, value, length, use);
 }
 
+void Worker::differentiate(const Path& p, int pixel, bool length_only, LocalDifferential& out) {
+  differentiate_path(scene, pixel, p.vertex.data(), p.size(), length_only, out);
+  counts.segments += p.size() - 1;
+}
+
 void Worker::emit_length_rate(const Path& p, int pixel, int gate, const Rgb& value) {
   sink.note_path(p);
-  differentiate_path(scene, pixel, p.vertex.data(), p.size(), true, differential);
+  differentiate(p, pixel, true, differential);
   if (differential.empty()) return;
   sink.bind(differential);
   sink.add_length_rate(pixel, gate, value);
@@ -75,7 +80,7 @@ void Worker::emit_length_rate(const Path& p, int pixel, int gate, const Rgb& val
 
 void Worker::emit_length_flux(const Path& p, int pixel, const Rgb& value, double length) {
   sink.note_path(p);
-  differentiate_path(scene, pixel, p.vertex.data(), p.size(), true, of_length);
+  differentiate(p, pixel, true, of_length);
   differential.clear();
   differential.add_length(of_length, 1);
   if (differential.empty()) return;

@@ -27,32 +27,31 @@ struct Worker {
   LocalDifferential differential, of_length;
   std::vector<int> candidates;              ///< triangles that may hold an arc
   std::vector<double> inverse_probability;  ///< of each candidate: 1 / probability that it is listed
-  long long rays = 0;
-  long long arcs = 0;  ///< triangles tested for arcs, and the queries that found them
+  WorkCounts counts;                        ///< arcs: with the queries that found their triangles
 
   Worker(const PreparedScene& prepared, const GateSet& gate_set, const EstimatorOptions& estimator,
          const GatePick& gate_pick, Sink& target);
 
-  std::array<RayCounts, kTechniques> work_of{};  ///< that of the samples of Passes::visit
+  std::array<WorkCounts, kTechniques> work_of{};  ///< that of the samples of Passes::visit
 
-  /// Of the rays and arcs so far, in rays.
-  double work() const { return RayCounts{rays, arcs}.in_rays(); }
+  /// So far, in rays.
+  double work() const { return counts.in_rays(); }
 
   // Queries of the scene, whose rays are counted.
   bool visible(const SurfacePoint& x, const SurfacePoint& y) {
-    ++rays;
+    ++counts.rays;
     return scene.visible(x, y);
   }
   int closest_hit(const SurfacePoint& x, const Vec3& w) {
-    ++rays;
+    ++counts.rays;
     return scene.closest_hit(x, w);
   }
   int closest_hit_within(const SurfacePoint& x, const Vec3& w, double distance) {
-    ++rays;
+    ++counts.rays;
     return scene.closest_hit_within(x, w, distance);
   }
   int closest_camera_hit(const Vec3& direction) {
-    ++rays;
+    ++counts.rays;
     return scene.closest_camera_hit(direction);
   }
   std::optional<SurfacePoint> trace(const SurfacePoint& x, const Vec3& w) {
@@ -95,6 +94,8 @@ struct Worker {
   void emit_length_flux(const Path& p, int pixel, const Rgb& value, double length);
 
  private:
+  /// Of the path p, or of its length alone.
+  void differentiate(const Path& p, int pixel, bool length_only, LocalDifferential& out);
   double start_at_wall(int pixel, Rng& rng, double hidden);
 };
 

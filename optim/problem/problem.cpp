@@ -215,11 +215,13 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
     const Scene scene = parameters_->apply(theta);
     const TangentBasis basis = parameters_->tangent(theta);
     const SampleSpec& samples = experiment_.samples;
-    Job job{0, double{1} * samples.interior};
+    const double one = std::max(1, samples.interior);
+    Job job{0, double{1} * samples.interior, samples.visibility / one, samples.path_length / one};
     if (purpose == Purpose::gradients) {
       const double images =
           experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;
-      job = {evaluations_ * images * samples.primal, evaluations_ * job.interior};
+      job.image = evaluations_ * images * samples.primal;
+      job.interior *= evaluations_;
       if (!experiment_.target.measured()) job.image += experiment_.target.samples;
     }
     options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose, job);

@@ -91,12 +91,12 @@ inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const Ga
     walk.begin(rng);
     for (bool goes_on = max_bounces > 0; goes_on;) {
       const std::size_t recorded = recorder.rays.size();
-      const long long traced = worker.rays;
+      const long long traced = worker.counts.rays;
       next_event = true;
       goes_on = walk.next_event_and_sample(rng);
       next_event = false;
       const auto occlusions = static_cast<long long>(recorder.rays.size() - recorded);
-      if (worker.rays - traced > occlusions) recorder.closest_hit(walk.direction());
+      if (worker.counts.rays - traced > occlusions) recorder.closest_hit(walk.direction());
       goes_on = goes_on && walk.intersect(rng);
     }
   }

@@ -173,7 +173,7 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
       else
         boundary.sample_from_edge(0, 1, rng);
     }
-    return static_cast<double>(worker.rays) / kSearches - from_camera;  // but for the camera's own
+    return static_cast<double>(worker.counts.rays) / kSearches - from_camera;  // but for the camera's own
   };
   EXPECT_LT(rays(false), 1.4);
   EXPECT_LT(rays(true), 0.35);

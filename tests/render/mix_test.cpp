@@ -193,7 +193,8 @@ TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {
   const auto mix = [&](double width, Sampling sampling = Sampling::automatic, Purpose purpose = Purpose::images,
                        unsigned seed = 1) {
     const GateSet gates(GateShape::gaussian(width * 5.4), {5.4});
-    return measure_mix(scene, gates, {.max_bounces = 4, .sampling = sampling}, &basis, {seed, 0, 0}, purpose);
+    return measure_mix(scene, gates, {.max_bounces = 4, .sampling = sampling}, &basis, {seed, 0, 0}, purpose,
+                       {.image = 256, .interior = 256});
   };
   for (const double width : {1e-4, 0.005}) {
     EXPECT_TRUE(mix(width).image_connections) << width;
@@ -233,7 +234,9 @@ TEST(MeasureMix, LooksAtWhatAllGatesCover) {
   const EstimatorOptions options{.max_bounces = 2};
   for (const unsigned seed : {1, 2, 3}) {
     const auto by_connections = [&](const GateSet& gates) {
-      return measure_mix(scene, gates, options, &basis, {seed, 0, 0}, Purpose::gradients).interior_connections;
+      const Job job{
+          .image = 0, .interior = 1600, .visibility = 0, .path_length = 1 / 48.0};  // as in experiments/tree.yaml
+      return measure_mix(scene, gates, options, &basis, {seed, 0, 0}, Purpose::gradients, job).interior_connections;
     };
     EXPECT_FALSE(by_connections(all)) << seed;
     EXPECT_TRUE(by_connections(one)) << seed;
@@ -262,18 +265,27 @@ TEST(MeasureMix, TrialsTakeATenthOfTheWorkAtMost) {
     const GateSet gates(GateShape::boxcar(width), {5.5});
     EstimatorOptions options{.max_bounces = 4};
     for (const int samples : {4, 64}) {
+      const double count = samples;
       double work = 0;
       options.mix = measure_mix(scene, gates, options, nullptr, {1, 0, 0}, Purpose::images,
-                                {static_cast<double>(samples), 0}, &work);
+                                {.image = count, .interior = 0}, &work);
       const Renderer image(scene, gates, options);
       image.render({2, 0, 0}, {0, samples});
       EXPECT_LT(work, 0.11 * image.work()) << "image, width " << width << ", samples " << samples;
       EXPECT_EQ(work > 0, samples > 4);
-      options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 0}, Purpose::images,
-                                {0, static_cast<double>(samples)}, &work);
-      const Renderer derivative(scene, gates, options, &basis);
-      derivative.derive(Term::interior, {2, 0, 0}, {0, samples});
-      EXPECT_LT(work, 0.11 * derivative.work()) << "interior, width " << width << ", samples " << samples;
+      for (const bool all_terms : {false, true}) {
+        const Job job{0, count, all_terms ? 0.5 : 0.0, all_terms ? 0.25 : 0.0};
+        options.mix = measure_mix(scene, gates, options, &basis, {1, 0, 0}, Purpose::images, job, &work);
+        const Renderer derivative(scene, gates, options, &basis);
+        derivative.derive(Term::interior, {2, 0, 0}, {0, samples});
+        if (all_terms) {
+          derivative.derive(Term::visibility, {2, 0, 0}, {0, samples / 2});
+          derivative.derive(Term::path_length, {2, 0, 0}, {0, samples / 4});
+        }
+        EXPECT_LT(work, 0.11 * derivative.work())
+            << "all " << all_terms << ", width " << width << ", samples " << samples;
+        options.mix.reset();
+      }
       options.mix.reset();
     }
   }

@@ -1,5 +1,5 @@
 // What light subpaths bring: isochron_light_share CSV [SEEDS]. Variance x CPU seconds over the mean square, summed over pixels and
-// gates, of images and of the interior term of a derivative, by shares of samples with light subpaths, and by the
+// gates, of images and of a derivative, by shares of samples with light subpaths, and by the
 // share that is measured by default (its trial not counted). Lower is better.
 #include <fmt/format.h>
 
@@ -40,7 +40,14 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
   const SampleRange range{0, c.samples};
   const std::vector<double> costs =
       relative_costs(c.scene, c.gates, options, basis, seeds, [&](const Renderer& renderer, const Stream& stream) {
-        return derivative ? renderer.derive(Term::interior, stream, range)[0] : renderer.render(stream, range);
+        if (!derivative) return renderer.render(stream, range);
+        GatedImage sum = renderer.derive(Term::interior, stream, range)[0];
+        for (const Term term : {Term::visibility, Term::path_length}) {
+          if (!renderer.has(term)) continue;
+          const GatedImage part = renderer.derive(term, stream, range)[0];
+          for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += part.data[i];
+        }
+        return sum;
       });
   for (std::FILE* out : {csv, stdout}) {
     std::fprintf(out, "%s,%s,%d,%g", c.name.c_str(), derivative ? "derivative" : "image",
