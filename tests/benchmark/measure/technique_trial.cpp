@@ -40,7 +40,7 @@ void measure(const Case& c, Of of, int seeds, std::FILE* csv) {
   const auto trial = [&](std::uint64_t seed) {
     constexpr double kJob = 16 * kSamples;
     return measure_mix(c.scene, c.gates, plain, image ? nullptr : &basis, {seed, 7, 0}, purpose,
-                       image ? Job{kJob, 0} : Job{0, kJob});
+                       image ? Job{kJob, 0} : Job{0, kJob, 0, 0});
   };
   const SamplingMix first = trial(0);
   plain.light = image ? first.image_light : first.interior_light;
