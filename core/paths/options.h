@@ -91,8 +91,8 @@ struct SampleRange {
   int count() const { return end - begin; }
 };
 
-/// How many times as long as a ray it takes to test a triangle for an arc, and to differentiate a segment of a path (isochron_work: by these,
-/// what a unit of work takes lies within 0.77 and 1.43 of the median over five scenes and all techniques).
+/// How many times as long as a ray it takes to test a triangle for an arc, and to differentiate a segment of a path. By these a unit of work
+/// takes 0.77 to 1.43 times the median, over five scenes, images, interior and visibility terms, and all mixes (isochron_work).
 inline constexpr double kRaysPerArc = 0.5, kRaysPerSegment = 0.4;
 
 /// What work is counted by, the same on every machine: rays, triangles tested for arcs, and segments of paths that were differentiated.

@@ -11,8 +11,8 @@
 namespace isochron {
 namespace {
 
-/// Widths of gates, relative to the path length, between which a trial decides. Outside one technique is far better in every
-/// scene measured. Gates that together cover less than the lower one are hit by standard sampling so rarely that it looks too
+/// Widths of gates, relative to the path length, between which standard sampling and connections are both tried. Outside one of
+/// them is far better in every scene measured. Gates that together cover less than the lower one are hit by standard sampling so rarely that it looks too
 /// quiet in a trial.
 struct TrialWidths {
   double below_is_ellipsoidal, above_is_standard;
@@ -21,14 +21,14 @@ constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-constexpr int kTrialSamples = 2;  ///< per pixel, batch and technique
+constexpr int kTrialSamples = 2;  ///< per pixel, batch and mix
 /// Before images are larger. Sums over blocks vary together, so that only batches say more about them.
 constexpr int kMostBatches = 32, kFewestBatches = 4, kFewestBatchesOfSums = 16;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
 constexpr int kPixels = 4096, kFewestPixels = 576;
 /// Of the sums that a trial keeps.
 constexpr double kMostValues = 1 << 23;
-constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what connections take
+constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what each mix takes
 constexpr int kBlocks = 4;        ///< across the image
 /// By what low-discrepancy numbers lower the variance of pixels under standard sampling, where trials do without: about 2 on the
 /// cube, 0.8 in the Cornell box (isochron_technique_trial: costs of trials against those of 64 samples).
@@ -40,7 +40,8 @@ constexpr double kLightShare = 0.5;
 constexpr double kTrialPart = 0.1;
 /// To prepare a scene takes about as long as so many samples per triangle (70 000 triangles: 90 ms).
 constexpr double kSamplesPerTriangle = 0.3;
-/// Samples of standard sampling whose work a first batch may take: where one by connections takes 25 times as much.
+/// Samples of standard sampling whose work a first batch may take, for each pair of mixes and each term: where one by connections
+/// takes 25 times as much.
 constexpr double kFewestBudget = 8000;
 
 double pixels_of(const Scene& scene) {
@@ -119,10 +120,11 @@ struct MixChoice {
 
   /// The mix that costs least; `by_width` where trials cannot tell.
   PathMix best(std::span<const PathMix> mixes, const PathMix& by_width, const Stream& stream, double& work) const {
-    if (mixes.size() == 1) return mixes[0];
+    if (mixes.size() < 2) return mixes.empty() ? by_width : mixes[0];
     const double affordable_samples =
         kTrialPart * pixels_of(scene) * samples - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
-    if (!(affordable_samples >= kFewestBudget)) return by_width;
+    const int terms = 1 + (column && job.path_length > 0) + (column && job.visibility > 0);
+    if (!(affordable_samples >= kFewestBudget * terms * (static_cast<double>(mixes.size()) / 2))) return by_width;
     // What each takes differs between scenes: a tiny image tells.
     const Scene tiny = reduced(scene, kTinyPixels);
     double tiny_work = 0, least = kNone;
@@ -135,7 +137,9 @@ struct MixChoice {
     const double most = std::min<double>(kPixels, kMostValues / (gates.size() * (scene.grey ? 1.0 : 3.0)));
     const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
-    const auto batches = static_cast<int>(std::min<double>(kMostBatches, affordable / pixels_of(small)));
+    // As many samples as of images of the fewest pixels, where there are not as many pixels.
+    const double most_batches = std::max<double>(kMostBatches, wanted * kFewestPixels / pixels_of(small));
+    const auto batches = static_cast<int>(std::min(most_batches, affordable / pixels_of(small)));
     if (batches < 2) return by_width;
     const std::vector<Found> found = run(small, mixes, batches, stream, work);
     const bool others = std::ranges::any_of(found, [](const Found& f) { return f.paths.has_others; });
@@ -145,7 +149,7 @@ struct MixChoice {
     for (std::size_t i = 0; i < mixes.size(); ++i) {
       if (others && mixes[i].connections) continue;
       double variance = found[i].paths.variance;
-      // Standard sampling would count what light subpaths find, too, although few samples may not have found it.
+      // What light subpaths find is part of the variance of standard sampling, too, even if its few samples missed it.
       if (!mixes[i].connections && mixes[i].light == 0)
         for (const Found& other : found)
           if (other.paths.moment > 0)
@@ -191,7 +195,8 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
       if (light_is_open) mixes.push_back({connections, kLightShare});
     }
     // Where one of the two is left.
-    if (mixes.front().connections == mixes.back().connections) otherwise.connections = mixes.front().connections;
+    if (!mixes.empty() && mixes.front().connections == mixes.back().connections)
+      otherwise.connections = mixes.front().connections;
     const bool sums = column && purpose == Purpose::gradients;
     return MixChoice{scene, gates, options, column, sums, samples, job}.best(mixes, otherwise, stream, work);
   };

@@ -21,8 +21,8 @@ struct Job {
 
 /// The mix of techniques with the least variance x work, found by trials on small images (at most 4096 pixels), and, where `basis` has
 /// columns, on the derivative along a random combination of them, all of its terms together. Depends only on the arguments. For
-/// gradients, variance is that of sums over blocks of a quarter of the image's width. Gates much wider or narrower than where
-/// standard sampling and connections cross leave one of these; each is tried without and with light subpaths. Other sampling than
+/// gradients, variance is that of sums over blocks of a quarter of the image's width. Under gates much wider or narrower than where
+/// standard sampling and connections cost the same, only one of them is tried; each without and with light subpaths. Other sampling than
 /// automatic needs no trial. Together trials take about a tenth of the work of what they decide about at most; where that is too little
 /// to tell techniques apart there is none, and the width of the gates decides. `trial_work`, where given, gets the work of all trials
 /// (see Renderer::work).

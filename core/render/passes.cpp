@@ -316,12 +316,10 @@ void Passes::learn() const {
 }
 
 void Passes::count(const Worker& worker) const {
-  {
-    const std::scoped_lock lock(counts_mutex_);
-    counts_ += worker.counts;
-    for (int t = 0; t < kTechniques; ++t) counts_of_[t] += worker.work_of[t];
-  }
   if (cache_) cache_->count_rays(worker.counts.rays);
+  const std::scoped_lock lock(counts_mutex_);
+  counts_ += worker.counts;
+  for (int t = 0; t < kTechniques; ++t) counts_of_[t] += worker.work_of[t];
 }
 
 }  // namespace isochron

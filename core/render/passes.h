@@ -83,14 +83,6 @@ class Passes {
   /// One partition of a term of the derivative, which was prepared; gates and pixels by `pick`. `sink` is differential.
   void run_term(Term term, const Pass& pass, Partition partition, const GatePick& pick, Sink& sink) const;
 
-  /// One partition of the interior term for a differential sink, of the images for any other; all gates and pixels alike.
-  void run_images_or_interior(const Pass& pass, Partition partition, Sink& sink) const {
-    if (sink.differential())
-      run_term(Term::interior, pass, partition, every_gate, sink);
-    else
-      run_images(pass, partition, sink);
-  }
-
   const GateSet gates;  ///< as the detector's time offset shifts them
   const EstimatorOptions options;
   const TangentBasis* const basis;
@@ -100,12 +92,12 @@ class Passes {
   const GatePick every_gate;  ///< all gates and pixels alike
 
   /// Rays traced so far by all ranks. Collective: every rank has to call it.
-  long long rays() const { return sum_over_ranks(counts_.rays); }
+  long long rays() const { return sum_over_ranks(counted(counts_).rays); }
   /// Work done so far by all ranks, in rays. Collective.
-  double work() const { return in_rays_over_ranks(counts_); }
+  double work() const { return in_rays_over_ranks(counted(counts_)); }
   /// Of the samples of one technique so far. Collective.
   double work_of(Technique technique) const {
-    return in_rays_over_ranks(counts_of_[static_cast<std::size_t>(technique)]);
+    return in_rays_over_ranks(counted(counts_of_[static_cast<std::size_t>(technique)]));
   }
 
   /// Where the time of a pass counts; null: nowhere.
@@ -151,6 +143,10 @@ class Passes {
 
   void learn() const;
 
+  WorkCounts counted(const WorkCounts& of) const {
+    const std::scoped_lock lock(counts_mutex_);
+    return of;
+  }
   static double in_rays_over_ranks(const WorkCounts& of) {
     return WorkCounts{sum_over_ranks(of.rays), sum_over_ranks(of.arcs), sum_over_ranks(of.segments)}.in_rays();
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include "core/base/listed_sum.h"
@@ -103,6 +104,7 @@ TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int 
   EstimatorOptions options = trial.options;
   options.mix = mix.sampling_mix();
   options.light.reset();
+  options.guiding_samples = 0;  // learning takes longer than a trial; the visibility term looks noisier than it will be
   // What low-discrepancy numbers gain in a pixel grows with its samples, of which trials have few. In sums, techniques whose
   // points cover the whole image gain as much in a trial (isochron_technique_trial: cube, 5 %, sums).
   if (trial.block == 1) options.numbers = Numbers::independent;

@@ -26,9 +26,9 @@ struct TrialBatches {
   double work = 0;          ///< of one, see Renderer::work
   double variance = 0;      ///< of one, summed over blocks and gates; 0: nothing was seen, or there is one batch
   bool has_others = false;  ///< paths that connections do not find
-  /// Sums of squares of single contributions: of standard sampling, with light subpaths if these are used, and as it is expected of as
-  /// many samples without them. A contribution v = f / (n_s p_s + n_l p_l) is the same whichever technique found it, so that the sum
-  /// of v g over all that is found is the integral of f g; with g = f / p_s the second moment of standard sampling alone.
+  /// Sums of squares of single contributions: of standard sampling, with light subpaths if these are used, and what as many samples
+  /// without them would have. A contribution v = f / (n_s p_s + n_l p_l) is the same whichever technique found it, so that the sum of
+  /// v g over all that is found is the integral of f g; with g = f / p_s the second moment of standard sampling alone.
   double moment = 0, moment_without_light = 0;
 };
 

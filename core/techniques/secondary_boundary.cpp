@@ -210,6 +210,7 @@ const LocalDifferential& SecondaryBoundary::with_kept_length(const Segment& g, c
     whole_.push_back(found == Found::from_camera ? worker_.path.vertex[k] : walk_[c.bounces - k]);
   whole_.push_back(g.light);
   differentiate_path(scene_, c.pixel, whole_.data(), static_cast<int>(whole_.size()), true, of_length_);
+  worker_.counts.segments += static_cast<long long>(whole_.size()) - 1;
   const double across = g.side * dot(g.n_b, LengthFlow(g.camera_end, g.light).x);
   if (std::isfinite(across)) following_.add_length(of_length_, across * g.r_d / (g.r_s + g.r_d));
   return following_;

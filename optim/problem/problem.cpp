@@ -215,8 +215,8 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
     const Scene scene = parameters_->apply(theta);
     const TangentBasis basis = parameters_->tangent(theta);
     const SampleSpec& samples = experiment_.samples;
-    const double one = std::max(1, samples.interior);
-    Job job{0, double{1} * samples.interior, samples.visibility / one, samples.path_length / one};
+    const double interior = samples.interior, one = std::max(1.0, interior);
+    Job job{0, interior, samples.visibility / one, samples.path_length / one};
     if (purpose == Purpose::gradients) {
       const double images =
           experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;

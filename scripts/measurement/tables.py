@@ -238,13 +238,13 @@ def light_share(folder):
 
 
 def technique_trial(folder):
+    mixes = [f"{technique}{light}" for technique in ("standard", "connections") for light in ("", " with light")]
     lines = []
     for r in read_rows(folder / "technique_trial.csv"):
-        costs = [float(r[technique]) for technique in ("standard", "connections")]
-        noise = min(costs) <= 0
-        lines.append([f"{r['scene']}, {r['of']}", r["trials for connections"], "noise" if noise else number(r["cost of trials"]),
-                      *("noise" if c <= 0 else number(c) for c in costs)])
-    return markdown(["", "trials for connections, of 8", "times the better", "standard", "connections"], lines)
+        costs = [float(r[mix]) for mix in mixes]
+        lines.append([f"{r['scene']}, {r['of']}", r["trials for connections"], r["trials for light"],
+                      "noise" if min(costs) <= 0 else number(r["cost of trials"]), *("noise" if c <= 0 else number(c) for c in costs)])
+    return markdown(["", "trials for connections", "for light subpaths", "times the best", *mixes], lines)
 
 
 def checks(folder):

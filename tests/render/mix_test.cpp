@@ -286,7 +286,6 @@ TEST(MeasureMix, TrialsTakeATenthOfTheWorkAtMost) {
             << "all " << all_terms << ", width " << width << ", samples " << samples;
         options.mix.reset();
       }
-      options.mix.reset();
     }
   }
 }

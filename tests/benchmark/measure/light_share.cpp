@@ -44,7 +44,8 @@ void measure(const Case& c, bool derivative, int seeds, std::FILE* csv) {
         GatedImage sum = renderer.derive(Term::interior, stream, range)[0];
         for (const Term term : {Term::visibility, Term::path_length}) {
           if (!renderer.has(term)) continue;
-          const GatedImage part = renderer.derive(term, stream, range)[0];
+          const Stream own{stream.seed, stream.iteration, stream.pass + static_cast<std::uint32_t>(term)};
+          const GatedImage part = renderer.derive(term, own, range)[0];
           for (std::size_t i = 0; i < sum.data.size(); ++i) sum.data[i] += part.data[i];
         }
         return sum;

@@ -1,7 +1,7 @@
 // What the trial of automatic sampling chooses, and what that costs: isochron_technique_trial CSV [SEEDS]. Variance x CPU seconds over
-// the mean square of standard sampling and of ellipsoidal connections, and how often of so many trials connections were chosen, with
-// the trials' mean cost over that of the better technique. Images, and the interior term of a derivative in pixels and in sums over
-// blocks of pixels.
+// the mean square of standard sampling and of ellipsoidal connections, without light subpaths and with them; how often of so many
+// trials connections and light subpaths were chosen, and the trials' mean cost over that of the best. Images, and the interior term of a
+// derivative in pixels and in sums over blocks of pixels.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -36,19 +36,13 @@ void measure(const Case& c, Of of, int seeds, std::FILE* csv) {
   const TangentBasis basis = make_basis(c.scene, {translate(c.scene, c.moving, {0, 1, 0})});
   const Purpose purpose = of == Of::sums ? Purpose::gradients : Purpose::images;
   const bool image = of == Of::image;
-  EstimatorOptions plain{.max_bounces = c.max_bounces, .keep_length = false};
-  const auto trial = [&](std::uint64_t seed) {
-    constexpr double kJob = 16 * kSamples;
-    return measure_mix(c.scene, c.gates, plain, image ? nullptr : &basis, {seed, 7, 0}, purpose,
-                       image ? Job{kJob, 0} : Job{0, kJob, 0, 0});
-  };
-  const SamplingMix first = trial(0);
-  plain.light = image ? first.image_light : first.interior_light;
+  const EstimatorOptions plain{.max_bounces = c.max_bounces, .keep_length = false};
   std::vector<EstimatorOptions> options;
-  for (const bool connections : {false, true}) {
-    options.push_back(plain);
-    options.back().mix = SamplingMix{connections, connections};
-  }
+  for (const bool connections : {false, true})
+    for (const double light : {0.0, 0.5}) {
+      options.push_back(plain);
+      options.back().mix = SamplingMix{connections, connections, light, light};
+    }
   const SampleRange range{0, kSamples};
   const std::vector<double> costs =
       relative_costs(c.scene, c.gates, options, basis, seeds, [&](const Renderer& renderer, const Stream& stream) {
@@ -56,21 +50,21 @@ void measure(const Case& c, Of of, int seeds, std::FILE* csv) {
         GatedImage derivative = renderer.derive(Term::interior, stream, range)[0];
         return of == Of::pixels ? derivative : blocks(derivative, derivative.width / 4);
       });
-  int chosen = 0;
+  int by_connections = 0, with_light = 0;
   double mean = 0;
   for (int seed = 0; seed < kTrials; ++seed) {
-    const SamplingMix mix = trial(seed);
+    constexpr double kJob = 16 * kSamples;
+    const SamplingMix mix = measure_mix(c.scene, c.gates, plain, image ? nullptr : &basis, {1u * seed, 7, 0}, purpose,
+                                        image ? Job{kJob, 0} : Job{0, kJob, 0, 0});
     const bool connections = image ? mix.image_connections : mix.interior_connections;
-    chosen += connections;
-    mean += costs[connections] / kTrials;
+    const bool light = (image ? mix.image_light : mix.interior_light) > 0;
+    by_connections += connections;
+    with_light += light;
+    mean += costs[2 * connections + light] / kTrials;
   }
   for (std::FILE* out : {csv, stdout}) {
-    std::fprintf(out, "%s,%s,%g", c.name.c_str(),
-                 image              ? "image"
-                 : of == Of::pixels ? "derivative"
-                                    : "sums",
-                 *plain.light);
-    std::fprintf(out, ",%d,%.3g", chosen, mean / *std::ranges::min_element(costs));
+    std::fprintf(out, "%s,%s", c.name.c_str(), image ? "image" : of == Of::pixels ? "derivative" : "sums");
+    std::fprintf(out, ",%d,%d,%.3g", by_connections, with_light, mean / *std::ranges::min_element(costs));
     write_costs(costs, out);
   }
 }
@@ -103,7 +97,10 @@ int main(int argc, char** argv) {
   const Arguments arguments = read_arguments(argc, argv, 1, "isochron_technique_trial CSV [SEEDS]", 16, 2);
   isochron::set_thread_count(1);
   for (std::FILE* out : {arguments.csv.get(), stdout})
-    std::fprintf(out, "scene,of,light,trials for connections,cost of trials,standard,connections\n");
+    std::fprintf(
+        out,
+        "scene,of,trials for connections,trials for light,cost of trials,standard,standard with light,connections,"
+        "connections with light\n");
   for (const Case& c : cases())
     for (const Of of : {Of::image, Of::pixels, Of::sums}) measure(c, of, arguments.number, arguments.csv.get());
 }
