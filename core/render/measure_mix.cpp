@@ -21,7 +21,10 @@ constexpr TrialWidths kImage{0.002, 0.1}, kInterior{0.008, 0.2};
 
 constexpr double kNone = std::numeric_limits<double>::infinity();
 
-constexpr int kTrialSamples = 2;  ///< per pixel, batch and mix
+/// Per pixel and batch. What low-discrepancy numbers gain in a pixel grows with the samples, in standard sampling above all, which takes
+/// least: on the cube under gates of 10 % sixteen vary five to seven times less than as many independent ones. In sums techniques
+/// whose points cover the whole image gain as much with few.
+constexpr int kSamples = 2, kSamplesOfStandard = 16;
 /// Before images are larger. Sums over blocks vary together, so that only batches say more about them.
 constexpr int kMostBatches = 32, kFewestBatches = 4, kFewestBatchesOfSums = 16;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
@@ -30,9 +33,6 @@ constexpr int kPixels = 4096, kFewestPixels = 576;
 constexpr double kMostValues = 1 << 23;
 constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what each mix takes
 constexpr int kBlocks = 4;        ///< across the image
-/// By what low-discrepancy numbers lower the variance of pixels under standard sampling, where trials do without: about 2 on the
-/// cube, 0.8 in the Cornell box (isochron_technique_trial: costs of trials against those of 64 samples).
-constexpr double kGainOfStandard = 1.3;
 /// The part of the samples with light subpaths, where standard sampling uses them: of shares from 0.2 to 0.8 the best costs a fifth
 /// less at most (isochron_light_share).
 constexpr double kLightShare = 0.5;
@@ -90,13 +90,15 @@ struct MixChoice {
   /// So many batches by each. `work` grows by what they took.
   std::vector<Found> run(const Scene& small, std::span<const PathMix> mixes, int batches, const Stream& stream,
                          double& work) const {
-    const TechniqueTrial trial{small, gates, options, column, block_of(small), kTrialSamples};
+    const int block = block_of(small);
     SceneCache cache(small, CasterUpdate::rebuild);
     std::vector<Found> found(mixes.size());
     for (std::size_t i = 0; i < mixes.size(); ++i) {
+      const TechniqueTrial trial{small,  gates, options,
+                                 column, block, mixes[i].connections || block > 1 ? kSamples : kSamplesOfStandard};
       const auto batches_of = [&](Term term) {
         const TrialBatches result = run_trial(trial, mixes[i], term, batches, stream, cache);
-        work += batches * result.work;
+        work += batches * trial.samples * result.work;
         return result;
       };
       found[i].paths = batches_of(Term::interior);
@@ -130,7 +132,7 @@ struct MixChoice {
     double tiny_work = 0, least = kNone;
     for (const Found& found : run(tiny, mixes, 1, stream, tiny_work)) least = std::min(least, work_of(found));
     work += tiny_work;
-    const double budget = affordable_samples * least / (kTrialSamples * pixels_of(tiny)) - tiny_work;
+    const double budget = affordable_samples * least / pixels_of(tiny) - tiny_work;
     const double affordable = budget / tiny_work * pixels_of(tiny);  // pixels times batches
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
     if (!(affordable >= 2 * fewest)) return by_width;
@@ -143,20 +145,17 @@ struct MixChoice {
     if (batches < 2) return by_width;
     const std::vector<Found> found = run(small, mixes, batches, stream, work);
     const bool others = std::ranges::any_of(found, [](const Found& f) { return f.paths.has_others; });
-    const bool loses_evenness = block_of(small) == 1 && options.numbers == Numbers::low_discrepancy;
     double least_cost = kNone;
     PathMix best = by_width;
     for (std::size_t i = 0; i < mixes.size(); ++i) {
       if (others && mixes[i].connections) continue;
       double variance = found[i].paths.variance;
-      // What light subpaths find is part of the variance of standard sampling, too, even if its few samples missed it.
+      // What light subpaths find is part of the second moment of standard sampling, too, even if its few samples missed it.
       if (!mixes[i].connections && mixes[i].light == 0)
         for (const Found& other : found)
-          if (other.paths.moment > 0)
-            variance = std::max(variance, other.paths.variance * other.paths.moment_without_light / other.paths.moment);
+          variance += std::max(0.0, other.paths.moment_without_light - found[i].paths.moment);
       // Nothing seen says nothing: a technique that never hit the gates is no good one.
       if (!(variance > 0)) continue;
-      if (!mixes[i].connections && loses_evenness) variance /= kGainOfStandard;
       const double cost = variance_of(found[i], variance) * work_of(found[i]);
       if (cost < least_cost) {
         least_cost = cost;

@@ -105,9 +105,6 @@ TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int 
   options.mix = mix.sampling_mix();
   options.light.reset();
   options.guiding_samples = 0;  // learning takes longer than a trial; the visibility term looks noisier than it will be
-  // What low-discrepancy numbers gain in a pixel grows with its samples, of which trials have few. In sums, techniques whose
-  // points cover the whole image gain as much in a trial (isochron_technique_trial: cube, 5 %, sums).
-  if (trial.block == 1) options.numbers = Numbers::independent;
   const Passes passes(trial.scene, trial.gates, options, trial.column, &cache);
   TrialBatches result;
   if (passes.scene.emitters.empty() || (trial.column && !passes.has(term))) return result;
@@ -141,14 +138,16 @@ TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int 
         (i == layout.size + BlockSink::kMoment ? result.moment : result.moment_without_light) += value;
     });
   }
-  result.work = passes.work() / result.count;
+  result.work = passes.work() / (result.count * trial.samples);
+  for (double* moment : {&result.moment, &result.moment_without_light})
+    *moment *= trial.samples / static_cast<double>(result.count);
   sums.finish();
   squares.finish();
   if (result.count < 2) return result;
   double variance = 0;
   squares.for_each(0, layout.size, [&](std::size_t, double value) { variance += value; });
   sums.for_each(0, layout.size, [&](std::size_t, double value) { variance -= value * value / result.count; });
-  result.variance = variance / (result.count - 1);
+  result.variance = variance / (result.count - 1) * trial.samples;
   return result;
 }
 

@@ -23,8 +23,9 @@ struct PathMix {
 
 struct TrialBatches {
   int count = 0;
-  double work = 0;          ///< of one, see Renderer::work
-  double variance = 0;      ///< of one, summed over blocks and gates; 0: nothing was seen, or there is one batch
+  double work = 0;  ///< of one sample per pixel, see Renderer::work
+  double variance =
+      0;  ///< times samples per pixel, summed over blocks and gates; 0: nothing was seen, or there is one batch
   bool has_others = false;  ///< paths that connections do not find
   /// Sums of squares of single contributions: of standard sampling, with light subpaths if these are used, and what as many samples
   /// without them would have. A contribution v = f / (n_s p_s + n_l p_l) is the same whichever technique found it, so that the sum of

@@ -51,8 +51,8 @@ TEST_P(TechniqueTrials, TellWhatEachCosts) {
     double variance = 0;
     for (std::size_t i = 0; i < images.mean().data.size(); ++i) variance += images.variance(i) * kBatches;
     const double sums = double{1} * block * block * block * block;  // blocks() averages
-    EXPECT_NEAR(found.variance / (variance * sums), 1, 1e-9) << connections;
-    EXPECT_NEAR(found.work / (renderer.work() / kBatches), 1, 1e-9) << connections;
+    EXPECT_NEAR(found.variance / (variance * sums * kSamples), 1, 1e-9) << connections;
+    EXPECT_NEAR(found.work / (renderer.work() / (kBatches * kSamples)), 1, 1e-9) << connections;
   }
 }
 
