@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -86,6 +87,9 @@ struct MixChoice {
   };
 
   int block_of(const Scene& small) const { return sums ? std::max(1, small.camera.width / kBlocks) : 1; }
+  int samples_of(const PathMix& mix, const Scene& small) const {
+    return mix.connections || block_of(small) > 1 ? kSamples : kSamplesOfStandard;
+  }
 
   /// So many batches by each. `work` grows by what they took.
   std::vector<Found> run(const Scene& small, std::span<const PathMix> mixes, int batches, const Stream& stream,
@@ -94,8 +98,8 @@ struct MixChoice {
     SceneCache cache(small, CasterUpdate::rebuild);
     std::vector<Found> found(mixes.size());
     for (std::size_t i = 0; i < mixes.size(); ++i) {
-      const TechniqueTrial trial{small,  gates, options,
-                                 column, block, mixes[i].connections || block > 1 ? kSamples : kSamplesOfStandard};
+      const int per_batch = batches > 1 ? samples_of(mixes[i], small) : kSamples;
+      const TechniqueTrial trial{small, gates, options, column, block, per_batch};
       const auto batches_of = [&](Term term) {
         const TrialBatches result = run_trial(trial, mixes[i], term, batches, stream, cache);
         work += batches * trial.samples * result.work;
@@ -120,33 +124,36 @@ struct MixChoice {
     return of_paths + part(found.jumps, job.path_length) + part(found.boundaries, job.visibility);
   }
 
-  /// The mix that costs least; `by_width` where trials cannot tell.
-  PathMix best(std::span<const PathMix> mixes, const PathMix& by_width, const Stream& stream, double& work) const {
-    if (mixes.size() < 2) return mixes.empty() ? by_width : mixes[0];
+  /// The mix that costs least; none where trials cannot tell. `work` is what trials of the same choice took before.
+  std::optional<PathMix> best(std::span<const PathMix> mixes, const Stream& stream, double& work) const {
     const double affordable_samples =
         kTrialPart * pixels_of(scene) * samples - 2 * kSamplesPerTriangle * static_cast<double>(scene.triangles.size());
     const int terms = 1 + (column && job.path_length > 0) + (column && job.visibility > 0);
-    if (!(affordable_samples >= kFewestBudget * terms * (static_cast<double>(mixes.size()) / 2))) return by_width;
+    if (!(affordable_samples >= kFewestBudget * terms * (static_cast<double>(mixes.size()) / 2))) return std::nullopt;
     // What each takes differs between scenes: a tiny image tells.
     const Scene tiny = reduced(scene, kTinyPixels);
-    double tiny_work = 0, least = kNone;
-    for (const Found& found : run(tiny, mixes, 1, stream, tiny_work)) least = std::min(least, work_of(found));
-    work += tiny_work;
-    const double budget = affordable_samples * least / pixels_of(tiny) - tiny_work;
-    const double affordable = budget / tiny_work * pixels_of(tiny);  // pixels times batches
+    double least = kNone, work_of_batch = 0;
+    const std::vector<Found> first = run(tiny, mixes, 1, stream, work);
+    for (std::size_t i = 0; i < mixes.size(); ++i) {
+      const auto& [paths, jumps, boundaries] = first[i];
+      least = std::min(least, work_of(first[i]));
+      work_of_batch += samples_of(mixes[i], tiny) * (paths.work + jumps.work + boundaries.work);
+    }
+    const double budget = affordable_samples * least / pixels_of(tiny) - work;
+    const double affordable = budget / work_of_batch * pixels_of(tiny);  // pixels times batches
     const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
-    if (!(affordable >= 2 * fewest)) return by_width;
+    if (!(affordable >= 2 * fewest)) return std::nullopt;
     const double most = std::min<double>(kPixels, kMostValues / (gates.size() * (scene.grey ? 1.0 : 3.0)));
     const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
     // As many samples as of images of the fewest pixels, where there are not as many pixels.
     const double most_batches = std::max<double>(kMostBatches, wanted * kFewestPixels / pixels_of(small));
     const auto batches = static_cast<int>(std::min(most_batches, affordable / pixels_of(small)));
-    if (batches < 2) return by_width;
+    if (batches < 2) return std::nullopt;
     const std::vector<Found> found = run(small, mixes, batches, stream, work);
     const bool others = std::ranges::any_of(found, [](const Found& f) { return f.paths.has_others; });
     double least_cost = kNone;
-    PathMix best = by_width;
+    std::optional<PathMix> best;
     for (std::size_t i = 0; i < mixes.size(); ++i) {
       if (others && mixes[i].connections) continue;
       double variance = found[i].paths.variance;
@@ -197,7 +204,17 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
     if (!mixes.empty() && mixes.front().connections == mixes.back().connections)
       otherwise.connections = mixes.front().connections;
     const bool sums = column && purpose == Purpose::gradients;
-    return MixChoice{scene, gates, options, column, sums, samples, job}.best(mixes, otherwise, stream, work);
+    const MixChoice choice{scene, gates, options, column, sums, samples, job};
+    double own_trials = 0;
+    std::optional<PathMix> best = mixes.size() > 1 ? choice.best(mixes, stream, own_trials) : std::nullopt;
+    if (!best) {
+      // All mixes may take too much where those that the width of the gates leaves do not.
+      const std::size_t before = mixes.size();
+      std::erase_if(mixes, [&](const PathMix& mix) { return mix.connections != otherwise.connections; });
+      if (mixes.size() > 1 && mixes.size() < before) best = choice.best(mixes, stream, own_trials);
+    }
+    work += own_trials;
+    return best.value_or(otherwise);
   };
   SamplingMix best;
   const PathMix image = choose(kImage, {by_width.image_connections, by_width.image_light}, job.image, nullptr);
