@@ -30,10 +30,11 @@ constexpr int kSamples = 2, kSamplesOfStandard = 16;
 constexpr int kMostBatches = 32, kFewestBatches = 4, kFewestBatchesOfSums = 16;
 /// At most, and, where the job is small, at least: where pixels are larger, connections from the camera look better.
 constexpr int kPixels = 4096, kFewestPixels = 576;
+/// Of a first batch, which tells what each mix takes, and at least where there are no connections.
+constexpr int kTinyPixels = 144;
 /// Of the sums that a trial keeps.
 constexpr double kMostValues = 1 << 23;
-constexpr int kTinyPixels = 144;  ///< of a first batch, which tells what each mix takes
-constexpr int kBlocks = 4;        ///< across the image
+constexpr int kBlocks = 4;  ///< across the image
 /// The part of the samples with light subpaths, where standard sampling uses them: of shares from 0.2 to 0.8 the best costs a fifth
 /// less at most (isochron_light_share).
 constexpr double kLightShare = 0.5;
@@ -102,15 +103,15 @@ struct MixChoice {
       const TechniqueTrial trial{small, gates, options, column, block, per_batch};
       const auto batches_of = [&](Term term) {
         const TrialBatches result = run_trial(trial, mixes[i], term, batches, stream, cache);
-        work += batches * trial.samples * result.work;
+        work += result.learning + batches * trial.samples * result.work;
         return result;
       };
       found[i].paths = batches_of(Term::interior);
       if (column && job.path_length > 0) found[i].jumps = batches_of(Term::path_length);
       if (!column || !(job.visibility > 0)) continue;
-      // Searches for boundaries have no light subpaths.
-      const bool known = i > 0 && mixes[i].connections == mixes[i - 1].connections;
-      found[i].boundaries = known ? found[i - 1].boundaries : batches_of(Term::visibility);
+      // One estimate for all: searches for boundaries are much the same whatever finds the paths, and their rare large contributions must
+      // not decide between mixes.
+      found[i].boundaries = i > 0 ? found[0].boundaries : batches_of(Term::visibility);
     }
     return found;
   }
@@ -132,19 +133,21 @@ struct MixChoice {
     if (!(affordable_samples >= kFewestBudget * terms * (static_cast<double>(mixes.size()) / 2))) return std::nullopt;
     // What each takes differs between scenes: a tiny image tells.
     const Scene tiny = reduced(scene, kTinyPixels);
+    const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     double least = kNone, work_of_batch = 0;
     const std::vector<Found> first = run(tiny, mixes, 1, stream, work);
     for (std::size_t i = 0; i < mixes.size(); ++i) {
-      const auto& [paths, jumps, boundaries] = first[i];
       least = std::min(least, work_of(first[i]));
-      work_of_batch += samples_of(mixes[i], tiny) * (paths.work + jumps.work + boundaries.work);
+      work_of_batch += samples_of(mixes[i], tiny) * (first[i].paths.work + first[i].jumps.work);
     }
+    const TrialBatches& boundaries = first[0].boundaries;
+    work_of_batch += samples_of(mixes[0], tiny) * boundaries.work + boundaries.learning / wanted;
     const double budget = affordable_samples * least / pixels_of(tiny) - work;
     const double affordable = budget / work_of_batch * pixels_of(tiny);  // pixels times batches
-    const double fewest = std::min<double>(kFewestPixels, pixels_of(scene));
+    const bool by_connections = std::ranges::any_of(mixes, &PathMix::connections);
+    const double fewest = std::min<double>(by_connections ? kFewestPixels : kTinyPixels, pixels_of(scene));
     if (!(affordable >= 2 * fewest)) return std::nullopt;
     const double most = std::min<double>(kPixels, kMostValues / (gates.size() * (scene.grey ? 1.0 : 3.0)));
-    const int wanted = sums ? kFewestBatchesOfSums : kFewestBatches;
     const Scene small = reduced(scene, std::clamp(affordable / wanted, fewest, std::max(fewest, most)));
     // As many samples as of images of the fewest pixels, where there are not as many pixels.
     const double most_batches = std::max<double>(kMostBatches, wanted * kFewestPixels / pixels_of(small));

@@ -104,11 +104,11 @@ TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int 
   EstimatorOptions options = trial.options;
   options.mix = mix.sampling_mix();
   options.light.reset();
-  options.guiding_samples = 0;  // learning takes longer than a trial; the visibility term looks noisier than it will be
   const Passes passes(trial.scene, trial.gates, options, trial.column, &cache);
   TrialBatches result;
   if (passes.scene.emitters.empty() || (trial.column && !passes.has(term))) return result;
   if (trial.column) passes.prepare(term);
+  result.learning = passes.work();
   const PassKind kind = trial.column ? pass_kind(term) : PassKind::primal;
   const bool moments = !mix.connections && (!trial.column || term == Term::interior);
   const Layout layout(passes, trial.block);
@@ -138,7 +138,7 @@ TrialBatches run_trial(const TechniqueTrial& trial, PathMix mix, Term term, int 
         (i == layout.size + BlockSink::kMoment ? result.moment : result.moment_without_light) += value;
     });
   }
-  result.work = passes.work() / (result.count * trial.samples);
+  result.work = (passes.work() - result.learning) / (result.count * trial.samples);
   for (double* moment : {&result.moment, &result.moment_without_light})
     *moment *= trial.samples / static_cast<double>(result.count);
   sums.finish();

@@ -23,7 +23,8 @@ struct PathMix {
 
 struct TrialBatches {
   int count = 0;
-  double work = 0;  ///< of one sample per pixel, see Renderer::work
+  double learning = 0;  ///< work before the first, of guiding (see Renderer::work)
+  double work = 0;      ///< of one sample per pixel
   double variance =
       0;  ///< times samples per pixel, summed over blocks and gates; 0: nothing was seen, or there is one batch
   bool has_others = false;  ///< paths that connections do not find

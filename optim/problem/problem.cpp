@@ -224,7 +224,8 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
       job.interior *= evaluations_;
       if (!experiment_.target.measured()) job.image += experiment_.target.samples;
     }
-    options.mix = measure_mix(scene, gates_, options, &basis, stream(Pass::mix), purpose, job);
+    options.mix =
+        measure_mix(scene, gates_, guided(options, samples.visibility), &basis, stream(Pass::mix), purpose, job);
     known = options;
   }
   return *known;
@@ -322,8 +323,11 @@ LossEstimate Problem::loss(const SplitImage& image, const GatedImage& target, co
 }
 
 EstimatorOptions Problem::estimator(int visibility_samples, Purpose purpose) const {
+  return guided(estimator(purpose), visibility_samples);
+}
+
+EstimatorOptions Problem::guided(EstimatorOptions options, int visibility_samples) const {
   constexpr double kLearningShare = 0.06;
-  EstimatorOptions options = estimator(purpose);
   if (experiment_.guiding) options.guiding_samples = kLearningShare * visibility_samples;
   return options;
 }

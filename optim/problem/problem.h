@@ -180,6 +180,7 @@ class Problem {
   bool leaves_out_jumps() const;
 
  private:
+  EstimatorOptions guided(EstimatorOptions options, int visibility_samples) const;
   /// As `target.histograms` says, in the readings and in the scene.
   void leave_out_histograms();
   /// The histograms of an iteration that redraws them.

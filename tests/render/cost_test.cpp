@@ -8,6 +8,7 @@
 #include "core/base/cpu_time.h"
 #include "core/base/parallel.h"
 #include "core/films/sinks.h"
+#include "core/render/passes.h"
 #include "core/techniques/secondary_boundary.h"
 #include "scene_building.h"
 #include "support.h"
@@ -177,6 +178,28 @@ TEST(BoundaryCost, SegmentsThatMeetNothingMovingCastNoRays) {
   };
   EXPECT_LT(rays(false), 1.4);
   EXPECT_LT(rays(true), 0.35);
+}
+
+struct SegmentSink final : Sink {
+  bool differential() const override { return true; }
+  void note_path(const Path& path) override { segments += path.size() - 1; }
+  void add(int, const Rgb&, double, GateUse) override {}
+  long long segments = 0;
+};
+
+/// In images by standard sampling work is rays alone; derivatives differentiate the paths that they find.
+TEST(Work, CountsDifferentiatedSegments) {
+  const Scene scene = bumpy_scene();
+  const GateSet gates(GateShape::gaussian(0.5), {4.0});
+  const TangentBasis basis = make_basis(scene, {translate(scene, "lamp", {0, 1, 0})});
+  const Passes passes(scene, gates, {.max_bounces = 3, .sampling = Sampling::standard}, &basis, nullptr);
+  const Stream stream{1, 2, 3};
+  const Pass pass{stream, {0, 2}};
+  SegmentSink sink;
+  passes.run_term(Term::interior, pass, {0, 1}, passes.every_gate, sink);
+  EXPECT_GT(sink.segments, 100);
+  EXPECT_DOUBLE_EQ(passes.work(),
+                   static_cast<double>(passes.rays()) + kRaysPerSegment * static_cast<double>(sink.segments));
 }
 
 }  // namespace

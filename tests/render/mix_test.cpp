@@ -193,8 +193,8 @@ TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {
   const auto mix = [&](double width, Sampling sampling = Sampling::automatic, Purpose purpose = Purpose::images,
                        unsigned seed = 1) {
     const GateSet gates(GateShape::gaussian(width * 5.4), {5.4});
-    return measure_mix(scene, gates, {.max_bounces = 4, .sampling = sampling}, &basis, {seed, 0, 0}, purpose,
-                       {.image = 256, .interior = 256});
+    return measure_mix(scene, gates, {.max_bounces = 4, .sampling = sampling, .guiding_samples = 4}, &basis,
+                       {seed, 0, 0}, purpose, {.image = 256, .interior = 256});
   };
   for (const double width : {1e-4, 0.005}) {
     EXPECT_TRUE(mix(width).image_connections) << width;
