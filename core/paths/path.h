@@ -25,6 +25,7 @@ class FixedStack {
   void pop_back() { --size_; }
   const T& back() const { return items_[size_ - 1]; }
   const T& operator[](std::size_t i) const { return items_[i]; }
+  T& operator[](std::size_t i) { return items_[i]; }
   const T* data() const { return items_.data(); }
   const T* begin() const { return data(); }
   const T* end() const { return data() + size_; }
@@ -35,18 +36,28 @@ class FixedStack {
   std::size_t size_ = 0;
 };
 
+/// Densities, per area, with which walks step to a vertex from its neighbours; negative: not computed since a vertex that they
+/// depend on has changed.
+struct StepDensities {
+  double from_camera = -1;  ///< depends on the vertex and the two before
+  double from_light = -1;   ///< depends on the vertex and the two behind
+};
+
 /// A path under construction: vertices from the camera on. `vertex[0]` is the camera or sensor point (or, for the light side of a
 /// boundary segment, the point that the walk looks from); its triangle is -1 for the former.
 struct Path {
   FixedStack<SurfacePoint> vertex;
   FixedStack<double> length;      ///< length[k]: optical, from vertex 0 to vertex k, plus what length[0] starts with
   FixedStack<char> has_gradient;  ///< has_gradient[k]: some vertex up to k can have a derivative
+  mutable FixedStack<StepDensities> steps;  ///< as far as weights were asked for (Balance)
 
-  explicit Path(int max_bounces) : vertex(max_bounces + 3), length(max_bounces + 3), has_gradient(max_bounces + 3) {}
+  explicit Path(int max_bounces)
+      : vertex(max_bounces + 3), length(max_bounces + 3), has_gradient(max_bounces + 3), steps(max_bounces + 3) {}
   void start(const SurfacePoint& origin, double length_so_far) {
     vertex.start(origin);
     length.start(length_so_far);
     has_gradient.start(0);
+    steps.start({});
   }
   void push(const PreparedScene& scene, const SurfacePoint& x) {
     push(scene, x, isochron::length(x.p - vertex.back().p));
@@ -56,11 +67,15 @@ struct Path {
     length.push_back(length.back() + distance * scene.index_between(back(), x));
     has_gradient.push_back(has_gradient.back() || scene.has_gradient(x.triangle));
     vertex.push_back(x);
+    forget_steps_from_behind();
+    steps.push_back({});
   }
   void pop() {
     vertex.pop_back();
     length.pop_back();
     has_gradient.pop_back();
+    steps.pop_back();
+    forget_steps_from_behind();
   }
   const SurfacePoint& back() const { return vertex.back(); }
   int size() const { return static_cast<int>(vertex.size()); }
@@ -68,6 +83,14 @@ struct Path {
   /// capture, flash at the camera): the two are visible together.
   bool is_confocal_return(const SurfacePoint& y) const {
     return vertex.size() == 2 && vertex[0].triangle == -1 && is_light(y.triangle) && y.p == vertex[0].p;
+  }
+
+ private:
+  /// Those of the last two vertices, whose neighbours behind change.
+  void forget_steps_from_behind() {
+    const std::size_t size = steps.size();
+    if (size > 0) steps[size - 1].from_light = -1;
+    if (size > 1) steps[size - 2].from_light = -1;
   }
 };
 

@@ -25,8 +25,8 @@ struct TrialBatches {
   int count = 0;
   double learning = 0;  ///< work before the first, of guiding (see Renderer::work)
   double work = 0;      ///< of one sample per pixel
-  double variance =
-      0;  ///< times samples per pixel, summed over blocks and gates; 0: nothing was seen, or there is one batch
+  /// Of one sample per pixel, summed over blocks and gates; 0: nothing was seen, or there is one batch.
+  double variance = 0;
   bool has_others = false;  ///< paths that connections do not find
   /// Sums of squares of single contributions: of standard sampling, with light subpaths if these are used, and what as many samples
   /// without them would have. A contribution v = f / (n_s p_s + n_l p_l) is the same whichever technique found it, so that the sum of

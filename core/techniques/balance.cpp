@@ -23,9 +23,9 @@ LightRatio Balance::light_ratio(const Path& path, int pixel, int joint) const {
   LightRatio ratio;
   // Over next-event estimation and BSDF sampling of y.
   const double pdf_y = scene_.emitter_pdf(y.triangle);
-  double product = pdf_y / (pdf_y + (is_light(y.triangle) ? 0 : step_pdf(path, last - 1, y)));
+  double product = pdf_y / (pdf_y + (is_light(y.triangle) ? 0 : step_pdf(path, last)));
   for (int k = last - 1; k > 0; --k) {
-    product *= step_from_light_pdf(path, k) / step_pdf(path, k - 1, path.vertex[k]);
+    product *= step_from_light_pdf(path, k) / step_pdf(path, k);
     // A light subpath is drawn for every sample of any pixel, and may be seen in every other.
     const double of_joint = k == 1 ? product / rate : product;
     ratio.all += of_joint;
@@ -56,13 +56,13 @@ double Balance::part_of_arc(const Path& path, int on_arc, double pdf_on_arc, boo
   const auto outside = [&](int k) { return scene_.outside(path.vertex[k], path.vertex[k + 1]); };
   const double pdf_y = scene_.emitter_pdf(y.triangle);
   if (outside(last - 1)) {
-    if (!is_light(y.triangle)) count(last, step_pdf(path, last - 2, q));
+    if (!is_light(y.triangle)) count(last, step_pdf(path, last - 1));
     if (outside(last - 2)) count(last - 1, pdf_y);
   }
   if (by_light && last > 2) {
     double others = pdf_y * step_from_light_pdf(path, last - 1);
     for (int k = last - 2; k > 0; --k) {
-      others /= step_pdf(path, k - 1, path.vertex[k]);
+      others /= step_pdf(path, k);
       if (outside(k - 1) && outside(k)) count(k, others * LightWalk::pick_probability(last - 2 - k));
       others *= step_from_light_pdf(path, k);
     }
@@ -96,31 +96,33 @@ double Balance::border(const Path& path, int pixel, double tau, const Vec3& tang
   const auto tries = [&](int from) {
     return from == 0 ? pick_.length_pdf(GatePick::kImage, tau) : pick_.rate(pixel) * pick_.length_pdf(pixel, tau);
   };
-  const double from_q = step_pdf(path, last - 2, q) * std::abs(dot(normalize(y.p - q.p), tangent)) * tries(last - 1);
+  const double from_q = step_pdf(path, last - 1) * std::abs(dot(normalize(y.p - q.p), tangent)) * tries(last - 1);
   const double by_arcs =
       !scene_.outside(x, q) ? 0 : border_pdf * (pdf_on_arc ? *pdf_on_arc : surface_arc_pdf(x, q, y)) * tries(last - 2);
   const double sum = from_q + by_arcs;
   return sum > 0 ? (pdf_on_arc ? by_arcs : from_q) / sum : 0;
 }
 
-/// Density per area with which a walk at the path's vertex `from` continues to q (from the camera: by a random point of a
-/// random pixel).
-double Balance::step_pdf(const Path& path, int from, const SurfacePoint& q) const {
-  const SurfacePoint& x = path.vertex[from];
+double Balance::step_pdf(const Path& path, int k) const {
+  double& pdf = path.steps[k].from_camera;
+  if (pdf >= 0) return pdf;
+  const SurfacePoint &x = path.vertex[k - 1], &q = path.vertex[k];
   const double to_area = solid_angle_to_area(x.p, q);
-  if (from == 0)
-    return scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) * to_area / scene_.camera.pixels();
-  const Scattering s(path.vertex[from - 1].p, x, q.p);
-  return scene_.bsdf_of(x.triangle).pdf(s) * to_area;
+  const double per_solid_angle =
+      k == 1 ? scene_.camera.image_area_per_solid_angle(normalize(q.p - x.p)) / scene_.camera.pixels()
+             : scene_.bsdf_of(x.triangle).pdf(Scattering(path.vertex[k - 2].p, x, q.p));
+  return pdf = per_solid_angle * to_area;
 }
 
-/// Density per area with which a light subpath continues from the vertex behind to vertex number `to` of the path.
-double Balance::step_from_light_pdf(const Path& path, int to) const {
-  const SurfacePoint &x = path.vertex[to], &from = path.vertex[to + 1];
+double Balance::step_from_light_pdf(const Path& path, int k) const {
+  double& pdf = path.steps[k].from_light;
+  if (pdf >= 0) return pdf;
+  const SurfacePoint &x = path.vertex[k], &from = path.vertex[k + 1];
   const double to_area = solid_angle_to_area(from.p, x);
-  if (to + 2 == path.size()) return scene_.emission_pdf(from, normalize(x.p - from.p)) * to_area;
-  const Scattering s(x.p, from, path.vertex[to + 2].p);
-  return scene_.bsdf_of(from.triangle).pdf(s.reversed()) * to_area;
+  const double per_solid_angle =
+      k + 2 == path.size() ? scene_.emission_pdf(from, normalize(x.p - from.p))
+                           : scene_.bsdf_of(from.triangle).pdf(Scattering(x.p, from, path.vertex[k + 2].p).reversed());
+  return pdf = per_solid_angle * to_area;
 }
 
 /// Density of q on its triangle's arc between foci x and y, per area and length.

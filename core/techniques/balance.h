@@ -68,8 +68,9 @@ class Balance {
   /// Of all techniques of connections that one by `on_arc` is, its part.
   template <class LengthPdf>
   double part_of_arc(const Path& path, int on_arc, double pdf_on_arc, bool gathered, LengthPdf&& length_pdf) const;
-  double step_pdf(const Path& path, int from, const SurfacePoint& q) const;
-  double step_from_light_pdf(const Path& path, int to) const;
+  /// Densities per area of walks that step to vertex k: from the camera (by a random point of a random pixel) and from the light.
+  double step_pdf(const Path& path, int k) const;
+  double step_from_light_pdf(const Path& path, int k) const;
   double surface_arc_pdf(const SurfacePoint& x, const SurfacePoint& q, const SurfacePoint& y) const;
   double emitter_arc_pdf(const SurfacePoint& q, const SurfacePoint& y) const;
 

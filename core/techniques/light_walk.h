@@ -11,8 +11,10 @@ namespace isochron {
 struct LightVertex {
   SurfacePoint point;
   Vec3 towards_light;  ///< unit, to the vertex before
+  double distance;     ///< geometric, to the vertex before
   double length;       ///< optical, from the emitter
   Rgb throughput;      ///< contribution over density from the emitter to here, without the BSDF
+  StepDensities step;  ///< to here; `from_camera` by the two vertices that follow
 
   /// What it sends in the unit direction w, with the cosine there.
   Rgb leaving(const PreparedScene& scene, const Vec3& w) const {
@@ -36,18 +38,14 @@ class LightWalk {
   }
   static double pick_probability(int i) { return std::ldexp(1, -(i + 1)); }
   /// Completes a path that ends next to vertex i: by that and those before. `remove` undoes it.
-  void append(const PreparedScene& scene, int i, Path& path) const {
-    for (int k = i; k >= 0; --k) path.push(scene, vertices_[k].point);
-    path.push(scene, emitter_);
-  }
-  void remove(int i, Path& path) const {
-    for (int k = 0; k < i + 2; ++k) path.pop();
-  }
+  void append(const PreparedScene& scene, int i, Path& path) const;
+  void remove(int i, Path& path);
   /// Whether one of the vertices up to i, or the emitter, gives paths a derivative.
   bool has_gradient(const PreparedScene& scene, int i) const;
 
  private:
   SurfacePoint emitter_;
+  double step_to_emitter_ = -1;  ///< StepDensities::from_camera of the emitter, by the first two vertices
   std::vector<LightVertex> vertices_;
 };
 
