@@ -1,10 +1,10 @@
 #!/usr/bin/python3
-"""How good the smoothing is that `isochron reconstruct` chooses by evidence, against ten other weights of bending: the rabbit, and the
+"""How good the smoothing is that `isochron reconstruct` chooses by evidence, against ten other weights of variation: the rabbit, and the
 blob and the bust of shape_study.py, from three numbers of photons a point. The last level of each reconstruction is fitted again
 with every weight, from the same start. Writes smoothing.csv after every reconstruction:
 
     shape, photons          per point
-    factor, bending         of the weight over the chosen one, and the weight
+    factor, variation       of the weight over the chosen one, and the weight
     median_mm, within_80_mm of the differences in depth, where surface and truth are seen
     silhouette              intersection over union of what is seen
     loss                    at the end
@@ -26,7 +26,7 @@ from reproduction.measure import program, summary
 from reproduction.study import study
 from reproduction.tables import markdown
 
-COLUMNS = "shape", "photons", "factor", "bending", "median_mm", "within_80_mm", "silhouette", "loss"
+COLUMNS = "shape", "photons", "factor", "variation", "median_mm", "within_80_mm", "silhouette", "loss"
 SHAPES, PHOTONS = ("rabbit", "blob", "bust"), (20, 200, 2000)
 FACTORS = tuple(10 ** (half / 2) for half in range(-5, 6))  # the chosen weight among them
 ITERATIONS = 4
@@ -67,10 +67,10 @@ def reconstruction(shape, photons, folder):
 def grid(shape, photons, folder):
     run = reconstruction(shape, photons, folder)
     last = max((run / "levels").iterdir(), key=lambda level: int(level.name)) / "experiment.yaml"
-    chosen = yaml.safe_load(last.read_text(encoding="utf-8"))["parameters"][0]["smoothing"]["bending"]
+    chosen = yaml.safe_load(last.read_text(encoding="utf-8"))["parameters"][0]["smoothing"]["variation"]
     again = folder / "again"
     for factor in FACTORS:
-        program("run", last, "-o", again, "--force", "--set", f"parameters.shape.smoothing.bending={factor * chosen!r}", "--set",
+        program("run", last, "-o", again, "--force", "--set", f"parameters.shape.smoothing.variation={factor * chosen!r}", "--set",
                 f"optimizer.iterations={ITERATIONS}")
         numbers = factor, factor * chosen, *errors(shape, again / "geometry/final_surface.ply"), summary(again)["loss_final"]
         yield shape, photons, *(f"{number:.4g}" for number in numbers)
@@ -86,7 +86,7 @@ def table_of(rows):
         for error in "median_mm", "within_80_mm":
             best = min(own, key=lambda row: float(row[error]))
             cells += [chosen[error], f"{float(chosen[error]) / float(best[error]):.2f} ({float(best['factor']):.2g})"]
-        table.append([shape, photons, chosen["bending"], *cells])
+        table.append([shape, photons, chosen["variation"], *cells])
     return markdown(["shape", "photons", "weight", "median, mm", "over the best (its factor)", "80 %, mm", "over the best (its factor)"], table)
 
 

@@ -214,19 +214,24 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
                 "surface's squared curvature (twice the mean one), 50 for a sphere of any size; 0: none",
                 {.only = of({vertices})});
+    inner.value("variation", field::non_negative(spec.variation),
+                "for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the integral of the "
+                "squared slope of that curvature, times the squared radius of the sphere of the surface's area, 0 for "
+                "any sphere; not in the early ones of `remesh.coarse_levels`; 0: none",
+                {.only = of({vertices})});
     inner.value(
         "tangential", field::non_negative(spec.tangential),
         "for `loss: {kind: poisson}`: a prior whose negative logarithm is this times the squared motion of inner "
         "vertices within the surface, over the area of each; 0: none",
         {.only = of({vertices})});
-    inner.value("evidence", field::boolean(spec.evidence),
-                "for counts, in a run in levels: each finer level takes the weight of bending (without bending, that "
-                "of slopes) that "
-                "makes the data of the level before most probable");
+    inner.value(
+        "evidence", field::boolean(spec.evidence),
+        "for counts, in a run in levels: each finer level takes the weight of variation (without variation, that of "
+        "bending; without both, that of slopes) that makes the data of the level before most probable");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}),
-            .unset = spec.diffusion == 0 && spec.slopes == 0 && spec.bending == 0 && spec.tangential == 0});
+            .unset = spec.diffusion == 0 && spec.slopes == 0 && !spec.bends() && spec.tangential == 0});
   const auto remesh = [&](Keys& inner) {
     inner.value("levels", field::integer(spec.remesh.levels, 1, kMostLevels), "optimisations one after the other",
                 {.required = true});

@@ -96,6 +96,7 @@ struct ParameterSpec {
   RemeshSpec remesh;     ///< of type vertices
   /// Of type vertices, see bending.h; 0: none.
   double bending = 0;     ///< weight of a prior on curved surfaces
+  double variation = 0;   ///< and of one on surfaces whose curvature changes
   double tangential = 0;  ///< and of one on motion of inner vertices within the surface
   /// Of types vertices and texture: each level but the first takes the weights that the data of the one before ask
   /// for, see evidence.h.
@@ -107,6 +108,8 @@ struct ParameterSpec {
   std::map<std::string, YamlValue> where;
   /// All shapes that it changes, none where it changes something else.
   std::vector<std::string> shapes() const;
+  /// Whether there is a prior on how the surface bends.
+  bool bends() const { return bending > 0 || variation > 0; }
   /// Throws the one-line InputError at `key`, or at the parameter where the key was not given.
   [[noreturn]] void fail(const std::string& key, const std::string& wrong, const std::string& allowed = "") const;
 };

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
+#include <set>
 
 #include "core/base/frame.h"
 
@@ -19,6 +21,7 @@ struct Around {
   double area = 0;
   Vec3 normal;
   std::vector<int> along;  ///< neighbours along the border; empty inside
+  bool is_inside() const { return along.empty() && area > 0; }
 };
 
 std::vector<Around> surroundings(const Scene& scene, const Shape& shape) {
@@ -110,7 +113,14 @@ void add_border_curvature(const Forms& forms, int v, const Around& here, double 
   }
 }
 
-/// What `add(forms, vertex, its surroundings, area of the shape, result)` adds for each vertex of the field.
+LinearForm difference(const LinearForm& a, double factor_a, const LinearForm& b, double factor_b) {
+  std::map<int, double> entries;
+  for (const auto& [unknown, coefficient] : a.entries) entries[unknown] += factor_a * coefficient;
+  for (const auto& [unknown, coefficient] : b.entries) entries[unknown] -= factor_b * coefficient;
+  return {{entries.begin(), entries.end()}, factor_a * a.constant - factor_b * b.constant};
+}
+
+/// What `add(forms, vertex, surroundings(vertex), area of the shape, result)` adds for each vertex of the field.
 template <class F>
 std::vector<LinearForm> forms_of_vertices(const Parameters& parameters, const Parameters::VertexField& field,
                                           const std::vector<double>& theta, F&& add) {
@@ -122,9 +132,10 @@ std::vector<LinearForm> forms_of_vertices(const Parameters& parameters, const Pa
     return field.vertices.front() < s.first_vertex + s.vertex_count;
   });
   const std::vector<Around> around = surroundings(forms.scene(), shape);
+  const auto of = [&](int v) -> const Around& { return around[v - shape.first_vertex]; };
   double area = 0;
   for (const Around& each : around) area += each.area;
-  for (const int v : field.vertices) add(forms, v, around[v - shape.first_vertex], area, result);
+  for (const int v : field.vertices) add(forms, v, of, area, result);
   return result;
 }
 
@@ -132,21 +143,47 @@ std::vector<LinearForm> forms_of_vertices(const Parameters& parameters, const Pa
 
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta) {
+  return forms_of_vertices(parameters, field, theta,
+                           [](const Forms& forms, int v, const auto& of, double area, std::vector<LinearForm>& result) {
+                             const Around& here = of(v);
+                             if (here.along.size() == 2)
+                               add_border_curvature(forms, v, here, kBorderShare * std::sqrt(area), result);
+                             else if (here.is_inside())
+                               result.push_back(mean_curvature(forms, v, here));
+                           });
+}
+
+std::vector<LinearForm> variation_forms(const Parameters& parameters, const Parameters::VertexField& field,
+                                        const std::vector<double>& theta) {
+  const std::set<int> moved(field.vertices.begin(), field.vertices.end());
+  std::map<int, LinearForm> curvatures;
+  const auto curvature = [&](const Forms& forms, int v, const Around& here) -> const LinearForm& {
+    const auto [place, is_new] = curvatures.try_emplace(v);
+    if (is_new) place->second = mean_curvature(forms, v, here);
+    return place->second;
+  };
   return forms_of_vertices(
       parameters, field, theta,
-      [](const Forms& forms, int v, const Around& here, double area, std::vector<LinearForm>& result) {
-        if (here.along.size() == 2)
-          add_border_curvature(forms, v, here, kBorderShare * std::sqrt(area), result);
-        else if (here.along.empty() && here.area > 0)
-          result.push_back(mean_curvature(forms, v, here));
+      [&](const Forms& forms, int v, const auto& of, double area, std::vector<LinearForm>& result) {
+        const Around& here = of(v);
+        if (!here.is_inside()) return;
+        for (const auto& [neighbour, weight] : here.weight) {
+          const Around& there = of(neighbour);
+          if (neighbour < v || !moved.contains(neighbour) || !there.is_inside() || !(weight > 0)) continue;
+          const double size = weight * area / (4 * std::numbers::pi);
+          LinearForm form = difference(curvature(forms, v, here), std::sqrt(size / here.area),
+                                       curvature(forms, neighbour, there), std::sqrt(size / there.area));
+          if (!form.entries.empty()) result.push_back(std::move(form));
+        }
       });
 }
 
 std::vector<LinearForm> tangential_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                          const std::vector<double>& theta) {
   return forms_of_vertices(parameters, field, theta,
-                           [&](const Forms& forms, int v, const Around& here, double, std::vector<LinearForm>& result) {
-                             if (!here.along.empty() || !(here.area > 0)) return;
+                           [&](const Forms& forms, int v, const auto& of, double, std::vector<LinearForm>& result) {
+                             const Around& here = of(v);
+                             if (!here.is_inside()) return;
                              const Frame frame(normalize(here.normal));
                              for (const Vec3& tangent : {frame.s, frame.t}) {
                                LinearForm form = forms.of({{v, 1}}, tangent / std::sqrt(here.area));

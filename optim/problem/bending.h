@@ -27,6 +27,13 @@ struct LinearForm {
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta);
 
+/// Of each edge between vertices of the field that have triangles all around: the difference of 2 H at its ends, times the root of its
+/// weight (half the cotangents of the angles opposite to it) and the root of A / (4 pi), A being the area of the surface. The sum of their
+/// squares is the integral of the squared slope of 2 H, times the squared radius of a sphere of that area, which has no unit: 0 for
+/// any sphere and plane. Angles, areas and normals as above.
+std::vector<LinearForm> variation_forms(const Parameters& parameters, const Parameters::VertexField& field,
+                                        const std::vector<double>& theta);
+
 /// Of each vertex of the field that has triangles all around: how far it is from where it is at theta along two tangents of the surface there,
 /// over the root of a third of the area of its triangles. Such motion changes the mesh and not the surface.
 std::vector<LinearForm> tangential_forms(const Parameters& parameters, const Parameters::VertexField& field,

@@ -77,7 +77,7 @@ SampleRange half_of(int samples, int half) {
 
 std::vector<std::vector<double>> probe_readings(const Problem& problem, const std::vector<double>& theta,
                                                 const std::vector<double>& weights, std::uint32_t iteration,
-                                                Probes probes, const Poll& poll) {
+                                                Probes probes, std::uint32_t rendered, const Poll& poll) {
   std::vector<std::vector<double>> products;
   for (int done = 0; done < probes.count; done += kImagesTogether) {
     std::vector<GatedImage> signs(std::min(kImagesTogether, probes.count - done), problem.blank());
@@ -89,7 +89,7 @@ std::vector<std::vector<double>> probe_readings(const Problem& problem, const st
         values[i] = std::copysign(std::sqrt(weights[i]), rng.uniform() - 0.5);
       }
     });
-    for (std::vector<double>& product : problem.transpose_apply(theta, signs, iteration, poll))
+    for (std::vector<double>& product : problem.transpose_apply(theta, signs, rendered, poll))
       products.push_back(std::move(product));
   }
   return products;
@@ -98,7 +98,8 @@ std::vector<std::vector<double>> probe_readings(const Problem& problem, const st
 std::vector<std::vector<double>> probe_diagonals(const Problem& problem, const std::vector<double>& theta,
                                                  const std::vector<double>& weights, std::uint32_t iteration,
                                                  Probes probes, const Poll& poll) {
-  std::vector<std::vector<double>> diagonals = probe_readings(problem, theta, weights, iteration, probes, poll);
+  std::vector<std::vector<double>> diagonals =
+      probe_readings(problem, theta, weights, iteration, probes, iteration, poll);
   for (std::vector<double>& diagonal : diagonals)
     for (double& d : diagonal) d *= d;
   return diagonals;

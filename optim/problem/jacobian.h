@@ -28,10 +28,11 @@ SampleRange half_of(int samples, int half);
 inline constexpr int kImagesTogether = 4;
 
 /// J' W^(1/2) z with a random sign z for each reading, others for each probe: gradients as the noise of readings makes them, with
-/// the covariance J'WJ. All are from the same samples of the iteration.
+/// the covariance J'WJ and what the noise of the Jacobian adds. Signs are those of the iteration, samples those of iteration `rendered`, the
+/// same for all probes.
 std::vector<std::vector<double>> probe_readings(const Problem& problem, const std::vector<double>& theta,
                                                 const std::vector<double>& weights, std::uint32_t iteration,
-                                                Probes probes, const Poll& poll);
+                                                Probes probes, std::uint32_t rendered, const Poll& poll);
 
 /// Estimates of the diagonal of J'WJ: see Objective::probe_curvature(), without a penalty's part.
 std::vector<std::vector<double>> probe_diagonals(const Problem& problem, const std::vector<double>& theta,

@@ -44,8 +44,8 @@ void require_for_own_loss(const Problem& problem) {
     refuse("optimizer.method: " + std::string(name_of(method)), "adam, lbfgs");
   for (const ParameterSpec& spec : experiment.parameters) {
     if (spec.remesh.levels > 0) refuse(spec.name + ": remesh", "a mesh that stays as it is");
-    if (spec.slopes > 0 || spec.bending > 0 || spec.prior_width > 0)
-      refuse(spec.name + ": slopes, bending and prior_width", "diffusion");
+    if (spec.slopes > 0 || spec.bends() || spec.prior_width > 0)
+      refuse(spec.name + ": slopes, bending, variation and prior_width", "diffusion");
   }
 }
 

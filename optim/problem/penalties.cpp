@@ -14,6 +14,9 @@ QuadraticPenalty penalty_of(const std::vector<ParameterSpec>& specs, const Param
     if (spec.slopes > 0) penalty.add_slopes(scene, parameters.vertex_field(block), spec.slopes);
     if (spec.bending > 0)
       penalty.add_forms(bending_forms(parameters, parameters.vertex_field(block), parameters.initial()), spec.bending);
+    if (spec.variation > 0)
+      penalty.add_forms(variation_forms(parameters, parameters.vertex_field(block), parameters.initial()),
+                        spec.variation);
     if (spec.tangential > 0)
       penalty.add_forms(tangential_forms(parameters, parameters.vertex_field(block), parameters.initial()),
                         spec.tangential);
@@ -24,7 +27,7 @@ QuadraticPenalty penalty_of(const std::vector<ParameterSpec>& specs, const Param
 
 QuadraticPenalty prior_of(std::vector<ParameterSpec> specs, const Parameters& parameters, const Scene& scene) {
   for (ParameterSpec& spec : specs) {
-    if (!(spec.bending > 0)) continue;
+    if (!spec.bends()) continue;
     spec.slopes = 0;
     spec.tangential = std::max(kHeldTangents, spec.tangential);
   }

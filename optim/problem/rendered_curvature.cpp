@@ -18,6 +18,11 @@ constexpr std::uint32_t kProductsIteration = kMostIterations + 2u, kMatrixIterat
 /// Their scatter is known to a factor of about 1 +- 1 / sqrt(10).
 constexpr int kGradients = 6;
 
+/// Of what samples solve for, and of their pulls. The noise of one adds eight times as much as the readings determine, of a surface that
+/// `isochron reconstruct` finds.
+constexpr std::uint32_t kRenderings = 4, kSampleIteration = kMatrixIteration + kGradients,
+                        kPullIteration = kSampleIteration + kRenderings;
+
 /// Of a posterior's samples. In tests/optim/evidence_test.cpp, 81 unknowns, twelve steps and 24 give the same trace, 39.4, where the whole
 /// matrix has 37.5; six give 36.8.
 constexpr int kSampleSteps = 12;
@@ -113,10 +118,20 @@ std::vector<double> RenderedCurvature::penalty_product(PenaltyScale scale, const
   return product;
 }
 
-std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
+std::vector<std::vector<double>> RenderedCurvature::pulls(int count, std::uint32_t first) const {
+  std::vector<std::vector<double>> means(count, std::vector<double>(theta_.size(), 0.0));
+  for (std::uint32_t rendered = first; rendered < first + kRenderings; ++rendered) {
+    const std::vector<std::vector<double>> found =
+        probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, rendered, poll_);
+    for (int k = 0; k < count; ++k)
+      for (std::size_t i = 0; i < theta_.size(); ++i) means[k][i] += found[k][i] / kRenderings;
+  }
+  return means;
+}
+
+PosteriorSamples RenderedCurvature::samples(int count) const {
   const PenaltyScale scale{smoothing_.slopes, priors_.priors};
-  std::vector<std::vector<double>> gradients =
-      probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, poll_);
+  std::vector<std::vector<double>> gradients = pulls(count, kSampleIteration);
   for (int k = 0; k < count; ++k)
     prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration), static_cast<std::uint32_t>(kProbes + k),
                      gradients[k]);
@@ -127,9 +142,10 @@ std::vector<std::vector<double>> RenderedCurvature::samples(int count) const {
     if (at_first[i] > 0 && theta_[i] > low[i] && theta_[i] < high[i]) free.push_back(i);
   const std::vector<Coupling> couplings = prior_.couplings(scale);
   const Metric metric(at_first, couplings, std::move(free));
-  return solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
-               [&](const std::vector<double>& residual) { return metric.solve(residual); },
-               {.most_steps = kSampleSteps, .least_curvature = kLeastCurvature});
+  return {solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
+                [&](const std::vector<double>& residual) { return metric.solve(residual); },
+                {.most_steps = kSampleSteps, .least_curvature = kLeastCurvature}),
+          pulls(count, kPullIteration)};
 }
 
 std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<std::vector<double>>& vectors) const {

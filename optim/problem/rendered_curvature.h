@@ -7,11 +7,20 @@
 
 namespace isochron {
 
+/// Samples of a posterior, and with which gradients the readings pull at each.
+struct PosteriorSamples {
+  std::vector<std::vector<double>> unknowns;
+  /// The part of the readings in what a sample solves for, from other random numbers of the images: so the products with the samples are, on
+  /// average, tr((H + P)^-1 H), the number of unknowns that the readings determine, of each group of unknowns that P does not couple with others.
+  std::vector<std::vector<double>> pulls;
+  int count() const { return static_cast<int>(unknowns.size()); }
+};
+
 /// H of the readings and P of Problem::prior(), from random numbers that no iteration of a run has. Weights of the readings are those of an
 /// image of its own.
 class RenderedCurvature : public CurvatureProducts {
  public:
-  /// All must outlive this; theta is one that can be rendered.
+  /// Problem, target and theta must outlive this; theta is one that can be rendered.
   RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
                     const Poll& poll);
 
@@ -29,7 +38,7 @@ class RenderedCurvature : public CurvatureProducts {
   /// How the unknowns scatter about the optimum, `count` times: by the noise of the readings, and by what the prior leaves
   /// open. Their covariance is (H + P)^-1, which is that of the unknowns but for variance_scale(). The Jacobian's
   /// own noise adds to it. Unknowns that lie at a bound, or that nothing depends on, stay. Not for finite differences.
-  std::vector<std::vector<double>> samples(int count) const;
+  PosteriorSamples samples(int count) const;
   /// Diagonals of H + P, estimated and on average too large by the noise of the Jacobian (see Objective::probe_curvature), and of
   /// P, that of smoothing. The former is rendered when it is first asked for.
   const std::vector<double>& diagonal() const;
@@ -37,18 +46,20 @@ class RenderedCurvature : public CurvatureProducts {
 
  private:
   Curvatures readings(const TangentBasis& basis, std::uint32_t iteration) const;
+  /// The part of the readings in the gradients that samples solve for, the mean over renderings from iteration `first` on.
+  std::vector<std::vector<double>> pulls(int count, std::uint32_t first) const;
   std::vector<double> penalty_product(PenaltyScale scale, const std::vector<double>& vector) const;
 
   const Problem& problem_;
   const GatedImage& target_;
   const std::vector<double>& theta_;
-  const Poll& poll_;
+  const Poll poll_;
   const QuadraticPenalty prior_;
   PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
   Scene scene_;
   TangentBasis basis_;
   std::vector<double> weights_, first_gradient_;  ///< at theta
-  mutable std::vector<double> diagonal_;  ///< empty until it is asked for
+  mutable std::vector<double> diagonal_;          ///< empty until it is asked for
 };
 
 }  // namespace isochron

@@ -108,28 +108,8 @@ double QuadraticPenalty::value(const std::vector<double>& theta, PenaltyScale sc
   return scale.slopes * slopes + scale.priors * priors;
 }
 
-QuadraticPenalty::Share QuadraticPenalty::share(const Parameters::Block& block, const std::vector<double>& theta,
-                                                PenaltyScale scale) const {
-  Share share;
-  for (const Square& s : squares_) {
-    if (!s.of(block) || s.scaled(scale) == 0) continue;
-    const double form = s.form.at(theta);
-    share.value += s.scaled(scale) * form * form;
-    ++share.rank;
-  }
-  share.rank = std::min(share.rank, block.count - 1.0);
-  return share;
-}
-
-double QuadraticPenalty::curved(const Parameters::Block& block, const std::vector<double>& v,
-                                PenaltyScale scale) const {
-  double sum = 0;
-  for (const Square& s : squares_) {
-    if (!s.of(block)) continue;
-    const double form = s.form.at(v) - s.form.constant;
-    sum += 2 * s.scaled(scale) * form * form;
-  }
-  return sum;
+bool QuadraticPenalty::holds(const Parameters::Block& block) const {
+  return std::any_of(squares_.begin(), squares_.end(), [&](const Square& s) { return s.of(block); });
 }
 
 void QuadraticPenalty::add_gradient(const std::vector<double>& theta, PenaltyScale scale,

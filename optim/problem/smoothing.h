@@ -53,14 +53,8 @@ class QuadraticPenalty {
   bool empty() const { return squares_.empty(); }
   double value(const std::vector<double>& theta, PenaltyScale scale) const;
   void add_gradient(const std::vector<double>& theta, PenaltyScale scale, std::vector<double>& gradient) const;
-  /// What belongs to the unknowns of one block, and has a scale.
-  struct Share {
-    double value = 0;  ///< as above
-    double rank = 0;   ///< independent forms, one constant left open
-  };
-  Share share(const Parameters::Block& block, const std::vector<double>& theta, PenaltyScale scale) const;
-  /// v'Pv of the same, P being the second derivative.
-  double curved(const Parameters::Block& block, const std::vector<double>& v, PenaltyScale scale) const;
+  /// Whether it depends on unknowns of the block.
+  bool holds(const Parameters::Block& block) const;
   /// Adds the second derivative, n x n row after row.
   void add_curvature(int unknowns, PenaltyScale scale, std::vector<double>& curvature) const;
   /// The diagonal of that.

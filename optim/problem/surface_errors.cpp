@@ -7,7 +7,7 @@ namespace isochron {
 namespace {
 
 bool has_errors(const ParameterSpec& spec) {
-  return spec.type == ParameterType::vertices && spec.bending > 0;
+  return spec.type == ParameterType::vertices && spec.bends();
 }
 
 }  // namespace
@@ -18,7 +18,7 @@ bool has_surface_errors(const Problem& problem) {
          std::any_of(specs.begin(), specs.end(), has_errors);
 }
 
-std::vector<double> surface_errors(const Problem& problem, const std::vector<std::vector<double>>& samples,
+std::vector<double> surface_errors(const Problem& problem, const PosteriorSamples& samples,
                                    const std::vector<double>& theta, double scale) {
   const Parameters& parameters = problem.parameters();
   const Scene scene = parameters.apply(theta);
@@ -31,7 +31,7 @@ std::vector<double> surface_errors(const Problem& problem, const std::vector<std
     for (const int v : parameters.vertex_field(parameters.blocks()[i]).vertices) {
       const double size = length(normals[v]);
       double sum = 0;
-      for (const std::vector<double>& sample : samples) {
+      for (const std::vector<double>& sample : samples.unknowns) {
         double along = 0;
         for (int axis = 0; axis < 3; ++axis) {
           const int row = layout.vertex(v, axis);
@@ -42,7 +42,7 @@ std::vector<double> surface_errors(const Problem& problem, const std::vector<std
         }
         sum += along * along;
       }
-      if (size > 0) errors[v] = std::sqrt(scale * sum / static_cast<double>(samples.size()));
+      if (size > 0) errors[v] = std::sqrt(scale * sum / samples.count());
     }
   }
   return errors;

@@ -17,7 +17,7 @@ inline constexpr int kErrorSamples = 4;
 /// Standard errors of all vertices of the scene along their normals, scene units, at theta: root mean square of what `samples` of the posterior
 /// (RenderedCurvature::samples) move them by. NaN for vertices that no such parameter moves, and where `scale`, see variance_scale(), is
 /// not known.
-std::vector<double> surface_errors(const Problem& problem, const std::vector<std::vector<double>>& samples,
+std::vector<double> surface_errors(const Problem& problem, const PosteriorSamples& samples,
                                    const std::vector<double>& theta, double scale);
 
 }  // namespace isochron

@@ -63,7 +63,7 @@ parameters:
     direction: free
     initial: 0
     scale: {edge:.4g}   # so that steps of adam are shares of the edges
-    smoothing: {{bending: {bending}, slopes: {motion:.4g}, evidence: true}}
+    smoothing: {{bending: {bending}, variation: {bending}, slopes: {motion:.4g}, evidence: true}}
     remesh: {{levels: {levels}, more_levels: {more}, coarse_levels: {coarse}, fine_from: {fine}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
   - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo

@@ -2,7 +2,7 @@
 //
 // The start is a mesh of the albedos that make the counts most likely (likely_albedos.h, start_surface.h). The fit moves all vertices
 // freely, in levels, under four priors. The weights of the first and the third follow from the evidence of the level before (evidence.h).
-// - The surface bends little, and so do its borders (bending.h).
+// - The surface and its borders bend little, and evenly (bending.h).
 // - It does not move far from where a level began: offsets of neighbours differ by a sixteenth of their distance.
 // - Albedos differ little, by 6 % across the surface. One that falls off freely imitates a border that is elsewhere, and tilts
 //   the surface to do so.

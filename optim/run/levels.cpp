@@ -177,8 +177,10 @@ class Levels {
     const RemeshSpec& remesh = remeshed_.remesh;
     for (std::size_t i = 0; i < next.size(); ++i) {
       ParameterSpec& spec = next[i];
-      const bool weighs_slopes = spec.evidence && !(spec.bending > 0);
+      const bool weighs_slopes = spec.evidence && !spec.bends();
       if (!(evidence_follows && weighs_slopes)) spec.slopes = experiment_.parameters[i].slopes;
+      // Early levels have far to go, and coarse triangles bend unevenly.
+      if (!evidence_follows) spec.variation = remesh.comes_early(level) ? 0 : experiment_.parameters[i].variation;
       spec.tangential = experiment_.parameters[i].tangential;
       if (remesh.finds_outline(level) && spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
         spec.slopes = remesh.outline_slopes;
@@ -206,11 +208,7 @@ class Levels {
     if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
     const ProgressStage stage("weighing the smoothing", 1);
     const std::vector<double> factors = evidence_factors(former, former.read_target(folder + "/target.exr"), theta);
-    for (std::size_t i = 0; i < next.size(); ++i)
-      if (next[i].bending > 0)
-        next[i].bending *= factors[i];
-      else
-        next[i].slopes *= factors[i];
+    for (std::size_t i = 0; i < next.size(); ++i) next[i].*weight_by_evidence(next[i]) *= factors[i];
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {

@@ -201,7 +201,7 @@ class Run {
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
     write_exr(path("final.exr"), final.image, notes_);
     std::optional<RenderedCurvature> curvature;
-    std::vector<std::vector<double>> samples;
+    PosteriorSamples samples;
     const Poll never = [] {};  // as it ends, a run is not interrupted
     if (options_.errors && !options_.loss && has_errors()) {
       curvature.emplace(problem_, target_, state_.theta, never);
@@ -231,16 +231,16 @@ class Run {
   bool has_errors() const { return problem_.can_render(state_.theta) && (together() || !by_differences()); }
 
   /// Of the final parameters, where anything is made of them.
-  std::vector<std::vector<double>> posterior_samples(const RenderedCurvature& curvature) {
+  PosteriorSamples posterior_samples(const RenderedCurvature& curvature) {
     const bool surfaces = has_surface_errors(problem_);
     if (by_differences() || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty()))) return {};
-    std::vector<std::vector<double>> samples = curvature.samples(surfaces ? kErrorSamples : kTraceSamples);
-    determined_ = determined_unknowns(problem_, target_, free_unknowns(problem_, state_.theta), samples);
+    PosteriorSamples samples = curvature.samples(surfaces ? kErrorSamples : kEvidenceSamples);
+    determined_ = determined_unknowns(problem_, free_unknowns(problem_, state_.theta), samples);
     return samples;
   }
 
   /// Returns those of surfaces, where there are any.
-  std::vector<double> find_errors(const RenderedCurvature& curvature, const std::vector<std::vector<double>>& samples,
+  std::vector<double> find_errors(const RenderedCurvature& curvature, const PosteriorSamples& samples,
                                   const NoiseLevel& noise) {
     const std::vector<double>& theta = state_.theta;
     const std::vector<Parameters::Block>& blocks = parameters_.blocks();
@@ -248,7 +248,7 @@ class Run {
     errors_ = together() ? joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta)
                          : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
                                              curvature.gradients(), noise, blocks, names, theta);
-    if (samples.empty() || !has_surface_errors(problem_)) return {};
+    if (samples.count() == 0 || !has_surface_errors(problem_)) return {};
     std::vector<double> errors = surface_errors(problem_, samples, theta, noise.scale);
     if (!options_.earlier.meshes.empty())
       add_level_scatter(options_.earlier, parameters_.apply(offsets_alone(problem_, theta, options_.earlier.shape)),

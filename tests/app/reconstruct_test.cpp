@@ -81,15 +81,19 @@ TEST_F(Reconstruct, FindsAPlate) {
   const std::string summary = folder_.read("out/summary.yaml");
   for (const char* key : {"\nfit: {", "\nat_bounds: {}", "\nstart: {method: back_projection, seconds: ", "\nlevels:\n"})
     EXPECT_NE(summary.find(key), std::string::npos) << key;
-  // The evidence weighs bending, once the coarse levels are done; slopes of offsets are about motion within a level.
-  const auto smoothing = [&](const char* level) {
-    const std::string text = folder_.read(std::string("out/levels/") + level + "/experiment.yaml");
-    const auto number = [&](const char* key) { return std::stod(text.substr(text.find(key) + std::strlen(key))); };
-    return std::pair(number("slopes: "), number("bending: "));
+  // The evidence weighs the variation of curvature, once the coarse levels are done; slopes of offsets are about motion within a level.
+  const auto number = [&](const std::string& level, const std::string& key) {
+    const std::string text = folder_.read("out/levels/" + level + "/experiment.yaml");
+    const std::size_t at = text.find("\n      " + key + ": ");
+    return at == std::string::npos ? std::nan("") : std::stod(text.substr(at + key.size() + 9));
   };
-  EXPECT_EQ(smoothing("1"), smoothing("9"));
-  EXPECT_EQ(smoothing("1").first, smoothing("10").first);
-  EXPECT_NE(smoothing("1").second, smoothing("10").second);
+  for (const char* level : {"1", "2", "8"}) EXPECT_EQ(number(level, "variation"), 0) << level;
+  EXPECT_GT(number("1", "bending"), 0);
+  EXPECT_EQ(number("9", "variation"), number("1", "bending"));
+  EXPECT_GT(number("10", "variation"), 0);
+  EXPECT_NE(number("10", "variation"), number("9", "variation"));
+  for (const char* level : {"2", "9", "10"}) EXPECT_EQ(number(level, "bending"), number("1", "bending")) << level;
+  for (const char* level : {"9", "10"}) EXPECT_EQ(number(level, "slopes"), number("1", "slopes")) << level;
   const auto histograms = [&](const char* level) {
     const std::string text = folder_.read(std::string("out/levels/") + level + "/experiment.yaml");
     const std::size_t at = text.find("\n  histograms: ");

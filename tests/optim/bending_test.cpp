@@ -174,6 +174,46 @@ TEST(Bending, IsThatOfTheSurfaceAsItBegins) {
   EXPECT_NEAR(energy(bending_forms(flat, field, bump), bump) / expected, 1, 1e-9);
 }
 
+std::vector<LinearForm> variation(const Surface& surface) {
+  const Parameters& parameters = *surface.parameters;
+  return variation_forms(parameters, parameters.vertex_field(parameters.blocks()[0]), parameters.initial());
+}
+
+/// Triangles at the poles are uneven, which looks like 1.6 where bending is 16 pi.
+TEST(Variation, OfASphereOfAnySizeIsNone) {
+  for (const double radius : {0.02, 3.0}) {
+    const auto ball = surface(sphere(radius, 40), VertexDirection::normal);
+    EXPECT_GT(variation(*ball).size(), 1000u);
+    EXPECT_LT(energy(variation(*ball), ball->parameters->initial()), 2);
+  }
+}
+
+TEST(Variation, OfAPlaneIsNoneHoweverUnevenItsMesh) {
+  const auto plane = surface(sheet(12, 0.3), VertexDirection::fixed);
+  EXPECT_LT(energy(variation(*plane), plane->parameters->initial()), 1e-18);
+}
+
+/// As above, of any size: the slope of the curvature a k^2 sin(k x) is a k^3 cos(k x), its square's integral over whole waves a^2 k^6 / 2, of
+/// what has no border. The square of the radius of a sphere of the sheet's area is 1 / (4 pi).
+TEST(Variation, OfAWaveOnAPlane) {
+  constexpr int kSide = 64;
+  for (const double size : {0.01, 1.0, 300.0}) {
+    Mesh mesh = sheet(kSide, 0);
+    for (Vec3& p : mesh.positions) p = size * p;
+    const auto plane = surface(mesh, VertexDirection::fixed);
+    const Parameters& parameters = *plane->parameters;
+    const double a = 0.003 * size, k = 2 * std::numbers::pi / size;
+    std::vector<double> theta = parameters.initial();
+    const Parameters::VertexField field = parameters.vertex_field(parameters.blocks()[0]);
+    for (std::size_t i = 0; i < theta.size(); ++i)
+      theta[i] = a / 2 * std::sin(k * parameters.scene().positions[field.vertices[i]].x);
+    // The slope is largest where the border is, with cos(k x)^2 = 1: two of the columns of edges are missing.
+    const double across = 1 - 1.0 / kSide, along = 0.5 - 2.0 / kSide;
+    const double expected = across * along * a * a * std::pow(k, 6) * std::pow(size, 4) / (4 * std::numbers::pi);
+    EXPECT_NEAR(energy(variation(*plane), theta) / expected, 1, 0.01);
+  }
+}
+
 /// Squares of the way within the surface over a third of the area of a vertex's triangles; neither borders nor motion along the normal count.
 TEST(Tangential, IsMotionOfInnerVerticesWithinTheSurface) {
   Mesh mesh = sheet(6, 0.3);

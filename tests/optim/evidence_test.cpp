@@ -171,11 +171,18 @@ TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
   ASSERT_GT(expected, 15);
   ASSERT_LT(expected, 70);
   constexpr int kSamples = 40;
-  const Parameters::Block& paint = fit.problem->parameters().blocks()[0];
-  double sum = 0;
-  for (const std::vector<double>& sample : curvature.samples(kSamples))
-    sum += fit.problem->penalty().curved(paint, sample, fit.problem->penalty_scale(fit.target)) / kSamples;
-  EXPECT_NEAR(sum, expected, 5 * 2 + 0.05 * expected);
+  const std::size_t n = fit.theta.size();
+  const PosteriorSamples samples = curvature.samples(kSamples);
+  double held = 0, determined = 0;
+  for (int k = 0; k < kSamples; ++k)
+    for (std::size_t i = 0; i + 1 < n; ++i) {
+      const double at = samples.unknowns[k][i];
+      determined += samples.pulls[k][i] * at / kSamples;
+      for (std::size_t j = 0; j + 1 < n; ++j) held += at * all.prior[i * n + j] * samples.unknowns[k][j] / kSamples;
+    }
+  EXPECT_NEAR(held, expected, 5 * 2 + 0.05 * expected);
+  const double rest = static_cast<double>(n - 1) - expected;
+  EXPECT_NEAR(determined, rest, 5 * std::sqrt(3 * rest / kSamples) + 0.05 * rest);
 }
 
 /// Of vertices that move freely, along their normals, here z: by the whole matrix. The mean over 81 vertices of four samples, neighbours of
@@ -217,14 +224,13 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
       determined -=
           prior[i * n + j] * std::inner_product(inverse[i].begin(), inverse[i].end(), inverse[j].begin(), 0.0);
   double found = 0;
-  const std::vector<std::vector<double>> samples = curvature.samples(kErrorSamples);
+  const PosteriorSamples samples = curvature.samples(kErrorSamples);
   for (const double error : surface_errors(problem, samples, theta, scale)) found += error * error;
   EXPECT_NEAR(std::sqrt(found / expected), 1, 0.3) << found << " " << expected;
   // Of the gain, which nothing holds, all is determined. Sixteen samples know the trace of what the prior leaves, here 155, to sqrt(2 x 155 / 16) = 4.4;
   // false alarms at 4 of these: 6e-5. Conjugate gradients end 5 % off.
   constexpr int kSamples = 16;
-  const double found_determined =
-      determined_unknowns(problem, target, std::vector<char>(n, 1), curvature.samples(kSamples));
+  const double found_determined = determined_unknowns(problem, std::vector<char>(n, 1), curvature.samples(kSamples));
   const double left = static_cast<double>(m) - determined;
   EXPECT_NEAR(found_determined - 1, determined, 4 * std::sqrt(2 * left / kSamples) + 0.05 * left);
   EXPECT_GT(determined, 1.5 * (4 * std::sqrt(2 * left / kSamples) + 0.05 * left)) << "zero would do";
@@ -257,8 +263,7 @@ TEST_F(Painted, EvidenceHasOneFixedPoint) {
       const Fit fit = this->fit(weight, 4096);
       const Problem& problem = *fit.problem;
       const PenaltyScale scale = problem.penalty_scale(fit.target);
-      const auto [value, rank] =
-          problem.penalty().share(problem.parameters().blocks()[0], problem.parameters().target(), scale);
+      const double rank = kSide * (kSide + 2.0), value = problem.penalty().value(problem.parameters().target(), scale);
       of_truth = weight * rank * scale.priors / (2 * value);
       weight *= evidence_factors(problem, fit.target, fit.theta)[0];
     }

@@ -178,7 +178,7 @@ TEST(Experiment, MessagesAboutMapsNameTheirKeys) {
       {"seed: 7}", "noise: {}}", "8:30: target.noise: has to say how many"},
       {"type: translation, shape: block, direction: [0, 1, 0]",
        "type: vertices, shape: block, direction: normal, smoothing: 3",
-       "6:80: parameters[0].smoothing: is not a map (keys and values; its keys: diffusion, slopes, bending, "
+       "6:80: parameters[0].smoothing: is not a map (keys and values; its keys: diffusion, slopes, bending, variation, "
        "tangential, evidence)"},
       {"seed: 3", "loss: huber", "11:7: loss: is not a map (keys and values; its keys: kind, scale)"},
       {"seed: 3", "loss: {scale: 1}", "11:7: loss.kind: is missing"},

@@ -128,6 +128,7 @@ TEST(Reconstruction, PhotonsBeyondWhatSamplesTellDoNotWeighMore) {
     begun(capture, folder);
     const Experiment experiment = load_experiment(folder.file("experiment.yaml"));
     EXPECT_EQ(experiment.samples.primal, 16);
+    EXPECT_EQ(experiment.parameters[0].variation, experiment.parameters[0].bending);
     return experiment.parameters[0].bending;
   };
   const double many = bending_of(1);

@@ -165,7 +165,7 @@ class SmoothingTest(unittest.TestCase):
 
         def program(*words):
             self.assertEqual(words[:2], ("run", folder / "rabbit-20/levels/10/experiment.yaml"))
-            weights.append(float(words[words.index("--set") + 1].removeprefix("parameters.shape.smoothing.bending=")))
+            weights.append(float(words[words.index("--set") + 1].removeprefix("parameters.shape.smoothing.variation=")))
 
         with tempfile.TemporaryDirectory() as name:
             folder, weights = pathlib.Path(name), []
@@ -173,7 +173,7 @@ class SmoothingTest(unittest.TestCase):
                 (folder / "rabbit-20/levels" / level).mkdir(parents=True)
             (folder / "rabbit-20/geometry").mkdir()
             (folder / "rabbit-20/geometry/final_surface.ply").touch()
-            (folder / "rabbit-20/levels/10/experiment.yaml").write_text("parameters: [{name: shape, smoothing: {bending: 0.5}}]\n", encoding="utf-8")
+            (folder / "rabbit-20/levels/10/experiment.yaml").write_text("parameters: [{name: shape, smoothing: {variation: 0.5}}]\n", encoding="utf-8")
             with unittest.mock.patch.multiple(smoothing_study, program=program, FACTORS=tuple(errors), summary=lambda _: {"loss_final": 0.5},
                                               errors=lambda *_: (errors[weights[-1] / 0.5], 9.0, 0.9)):
                 rows = list(smoothing_study.grid("rabbit", 20, folder))
