@@ -4,7 +4,7 @@ blob and the bust of shape_study.py, from three numbers of photons a point. The 
 with every weight, from the same start. Writes smoothing.csv after every reconstruction:
 
     shape, photons          per point
-    factor, variation       of the weight over the chosen one, and the weight
+    factor, weight          the weight over the chosen one, and the weight
     median_mm, within_80_mm of the differences in depth, where surface and truth are seen
     silhouette              intersection over union of what is seen
     loss                    at the end
@@ -26,7 +26,7 @@ from reproduction.measure import program, summary
 from reproduction.study import study
 from reproduction.tables import markdown
 
-COLUMNS = "shape", "photons", "factor", "variation", "median_mm", "within_80_mm", "silhouette", "loss"
+COLUMNS = "shape", "photons", "factor", "weight", "median_mm", "within_80_mm", "silhouette", "loss"
 SHAPES, PHOTONS = ("rabbit", "blob", "bust"), (20, 200, 2000)
 FACTORS = tuple(10 ** (half / 2) for half in range(-5, 6))  # the chosen weight among them
 ITERATIONS = 4
@@ -86,7 +86,7 @@ def table_of(rows):
         for error in "median_mm", "within_80_mm":
             best = min(own, key=lambda row: float(row[error]))
             cells += [chosen[error], f"{float(chosen[error]) / float(best[error]):.2f} ({float(best['factor']):.2g})"]
-        table.append([shape, photons, chosen["variation"], *cells])
+        table.append([shape, photons, chosen["weight"], *cells])
     return markdown(["shape", "photons", "weight", "median, mm", "over the best (its factor)", "80 %, mm", "over the best (its factor)"], table)
 
 
