@@ -104,7 +104,7 @@ void EllipsoidalConnections::connect_light(const TargetLength& target, int pixel
   // Its number of vertices, and q, have to be left.
   if (picked < 0 || path.size() - 1 + picked + 2 > worker_.options.max_bounces) return;
   const LightVertex& z = light_.vertices()[picked];
-  const bool any_arc = !worker_.differential_sink || path.has_gradient.back() || light_.has_gradient(scene_, picked);
+  const bool any_arc = light_.contributes(worker_, path, picked);
   connect_arcs(
       target, z.length, scattering_focus(z.point, z.towards_light), any_arc, pixel,
       throughput * (1 / LightWalk::pick_probability(picked)), rng, z.point,

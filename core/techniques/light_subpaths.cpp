@@ -49,8 +49,7 @@ void LightSubpaths::join(int pixel, const Rgb& throughput) {
       value *= bsdf_value(scene_, x, at_x) * std::abs(at_x.cos_i);
     }
     if (value.is_black()) continue;
-    const bool contributes = !worker_.differential_sink || path_.has_gradient.back() || light_.has_gradient(scene_, i);
-    if (!contributes || !worker_.visible(x, z.point)) continue;
+    if (!light_.contributes(worker_, path_, i) || !worker_.visible(x, z.point)) continue;
     light_.append(scene_, i, path_);
     worker_.emit(path_, lands_on, value * worker_.balance.light(path_, lands_on, camera_vertices), path_.length.back(),
                  GateUse::value_and_slope);

@@ -58,8 +58,9 @@ void LightWalk::remove(int i, Path& path) {
   for (int k = 0; k < i + 2; ++k) path.pop();
 }
 
-bool LightWalk::has_gradient(const PreparedScene& scene, int i) const {
-  if (emitter_has_gradient(scene, emitter_.triangle)) return true;
+bool LightWalk::contributes(const Worker& worker, const Path& path, int i) const {
+  const PreparedScene& scene = worker.scene;
+  if (!worker.differential_sink || path_has_gradient(scene, path, path.size() - 1, emitter_.triangle)) return true;
   return std::any_of(vertices_.begin(), vertices_.begin() + i + 1,
                      [&](const LightVertex& z) { return scene.has_gradient(z.point.triangle); });
 }

@@ -40,8 +40,8 @@ class LightWalk {
   /// Completes a path that ends next to vertex i: by that and those before. `remove` undoes it.
   void append(const PreparedScene& scene, int i, Path& path) const;
   void remove(int i, Path& path);
-  /// Whether one of the vertices up to i, or the emitter, gives paths a derivative.
-  bool has_gradient(const PreparedScene& scene, int i) const;
+  /// Whether paths that begin with `path` and end with vertex i contribute, whatever they have between (Worker::contributes).
+  bool contributes(const Worker& worker, const Path& path, int i) const;
 
  private:
   SurfacePoint emitter_;

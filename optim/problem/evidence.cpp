@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "optim/problem/penalties.h"
+#include "optim/problem/vector_math.h"
 
 namespace isochron {
 namespace {
@@ -17,12 +18,6 @@ std::vector<double> determined_of(const Parameters::Block& block, const Posterio
     determined.push_back(sum);
   }
   return determined;
-}
-
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
 }
 
 double standard_error_of_mean(const std::vector<double>& values) {

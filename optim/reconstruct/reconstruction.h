@@ -1,7 +1,8 @@
 // From a capture to an experiment whose run finds the hidden surface.
 //
 // The start is a mesh of the albedos that make the counts most likely (likely_albedos.h, start_surface.h). The fit moves all vertices
-// freely, in levels, under four priors. The weights of the first and the third follow from the evidence of the level before (evidence.h).
+// freely, in levels, under four priors. Two weights follow from the evidence of the level before (evidence.h): in the first prior that of
+// how evenly the surface bends, and that of the third.
 // - The surface and its borders bend little, and evenly (bending.h).
 // - It does not move far from where a level began: offsets of neighbours differ by a sixteenth of their distance.
 // - Albedos differ little, by 6 % across the surface. One that falls off freely imitates a border that is elsewhere, and tilts

@@ -160,8 +160,8 @@ TEST_F(Painted, TheDiagonalIsThatOfTheWholeMatrix) {
   EXPECT_EQ(&curvature.diagonal(), &diagonal) << "rendered once";
 }
 
-/// Forty samples know the trace to a standard error of sqrt(2 x 80 / 40) = 2; false alarms at 5 of them: 6e-7. Conjugate gradients end 5 %
-/// below, and the noise of the Jacobian adds to the samples.
+/// Forty samples know the trace to a standard error of sqrt(2 x 80 / 40) = 2, and the number g of determined unknowns, here 43, to sqrt(3 g / 40);
+/// false alarms at 5 of them: 6e-7. Conjugate gradients end 5 % below, and the noise of the Jacobian adds to the samples.
 TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
   const Fit fit = this->fit(1e-6);
   const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta, [] {});
@@ -227,8 +227,9 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
   const PosteriorSamples samples = curvature.samples(kErrorSamples);
   for (const double error : surface_errors(problem, samples, theta, scale)) found += error * error;
   EXPECT_NEAR(std::sqrt(found / expected), 1, 0.3) << found << " " << expected;
-  // Of the gain, which nothing holds, all is determined. Sixteen samples know the trace of what the prior leaves, here 155, to sqrt(2 x 155 / 16) = 4.4;
-  // false alarms at 4 of these: 6e-5. Conjugate gradients end 5 % off.
+  // Of the gain, which nothing holds, all is determined. Sixteen samples know the number of the others, here 90, to about
+  // sqrt(3 x 90 / 16) = 4.1. The tolerance is four times sqrt(2 x 155 / 16) = 4.4, of the 155 that the prior leaves: false alarms 6e-5 at most.
+  // Conjugate gradients end 5 % off.
   constexpr int kSamples = 16;
   const double found_determined = determined_unknowns(problem, std::vector<char>(n, 1), curvature.samples(kSamples));
   const double left = static_cast<double>(m) - determined;
