@@ -5,6 +5,7 @@
 
 #include "core/base/progress.h"
 #include "core/base/quadratic.h"
+#include "core/techniques/cast_shadow.h"
 #include "core/techniques/secondary_boundary.h"
 #include "core/techniques/shadow_line.h"
 #include "core/techniques/shadowed_length.h"
@@ -51,21 +52,22 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
 }
 
 bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau) {
-  if (!join_camera_path(g, pixel, throughput) || g.light.triangle != emitter) return false;
+  return join_camera_path(g, pixel, throughput) && g.light.triangle == emitter &&
+         deliver_at_length(g, Found::from_camera, tau);
+}
+
+bool SecondaryBoundary::deliver_at_length(const Segment& g, Found found, double tau) {
   const Connection& c = connections_[0];
-  const double rate = length_over_random(g, c, tau);
+  const BoundaryDensities pdf = densities(g, c, tau);
   const Rgb radiance = scene_.emitted(g.light, -g.w);
-  if (!(rate > 0) || radiance.is_black()) return false;
-  const LocalDifferential& differential = with_kept_length(g, c, Found::from_camera);
+  if (!((found == Found::from_edge ? pdf.edge_at_length : pdf.camera_at_length) > 0) || radiance.is_black())
+    return false;
+  const LocalDifferential& differential = with_kept_length(g, c, found);
   if (differential.empty()) return false;
   worker_.sink.bind(differential);
-  const BoundaryShares shares(c.camera_over_edge, rate);
-  // Nothing else finds what a Dirac gate lets through.
-  const bool alone = worker_.gates.shape().is_dirac();
-  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0], alone ? 1 : 1 - shares.from_edge);
-  // Its share over its density is that of random edge points over theirs.
-  const double weight = alone ? 1 / rate : shares.from_camera;
-  worker_.sink.add(pixel, c.value * radiance * weight, tau, GateUse::value_only);
+  worker_.sink.note_boundary(c.bounces, g.y.edge->face[0], pdf.camera_part());
+  worker_.sink.add(c.pixel, c.value * radiance * (found == Found::from_edge ? pdf.of_edge() : pdf.of_camera()), tau,
+                   GateUse::value_only);
   return true;
 }
 
@@ -105,6 +107,58 @@ void SecondaryBoundary::connect_pixel_at_length(int pixel, int axis, double scal
   if (deliver_at_length(g, pixel, emitter, Rgb(scale * trials), tau)) worker_.sink.note_guide(table, g.y.x());
 }
 
+void SecondaryBoundary::connect_lamp_at_length(double scale, Rng& rng) {
+  const double u_edge = rng.fine_uniform(), start = rng.uniform(), gate_pick = rng.uniform(), u = rng.uniform();
+  const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
+  const double tau = worker_.pick.sample_length(GatePick::kImage, gate_pick, u).value_or(0);
+  double pdf_area;
+  const SurfacePoint lamp = scene_.sample_emitter(u0, u1, u2, pdf_area);
+  if (!(tau > 0) || is_light(lamp.triangle)) return;
+  Segment g;
+  g.y = edges_.sample_secondary(edge_warp().sample(u_edge));
+  const auto aim = [&](double s) {
+    g.y.s = s;
+    g.y.y = g.y.edge->point(s);
+    g.w = lamp.p - g.y.y;
+    g.r_s = length(g.w);
+    g.w *= 1 / g.r_s;
+    return g.r_s > 0 && dot(lamp.n, g.w) < 0 && g.orient();
+  };
+  const auto triangle_by = [&](double s) {
+    if (!aim(s)) return -1;
+    ++worker_.counts.rays;
+    return scene_.first_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
+  };
+  const int triangle = triangle_by(start);
+  if (triangle < 0) return;
+  const CastShadow shadow(scene_, lamp.p, *g.y.edge, triangle);
+  const auto roots = shadow.at_length(scene_.camera.position - lamp.p, tau);
+  if (!roots) return;
+  for (const double s : *roots) {
+    if (!shadow.within(s) || !aim(s) || !find_light_end(g) || g.light.triangle != lamp.triangle) continue;
+    if (!find_camera_end(g) || g.camera_end.triangle != triangle) continue;
+    connections_.clear();
+    const double random = g.y.pdf * edge_warp().density(g.y.x()) * direction_pdf(g);
+    walk_to_camera(g, GatePick::kImage, scale * g.sine / random, 1, rng);
+    if (connections_.empty()) continue;
+    // One over the probability that a random point finds the triangle: the mean number of trials until one does.
+    const Segment found = g;
+    int trials = 1;
+    for (; triangle_by(rng.uniform()) != triangle; ++trials) throw_if_stopped();
+    connections_[0].value *= trials * shadow.part();
+    if (deliver_at_length(found, Found::from_edge, tau))
+      worker_.sink.note_guide(BoundaryGuide::table(Technique::from_edge), found.y.x());
+  }
+}
+
+BoundaryDensities SecondaryBoundary::densities(const Segment& g, const Connection& c, double length) const {
+  const bool straight = length > 0;
+  return {.camera_over_edge = c.camera_over_edge,
+          .camera_at_length = straight ? length_over_random(g, c, length) : 0,
+          .edge_at_length = straight ? length_over_direction(g, c, length) : 0,
+          .random = !(straight && dirac_)};
+}
+
 double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c, double length) const {
   if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
   const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
@@ -114,6 +168,21 @@ double SecondaryBoundary::length_over_random(const Segment& g, const Connection&
   double rate = edge_probability / (g.y.share * warp.density(g.y.x())) * line.distance_rate(g.y.s);
   if (c.bounces == 1 && !scene_.captures()) rate += rate_in_pixel(g, c.pixel);
   return rate * scene_.emitter_pdf(t) * scene_.area(t) * worker_.pick.length_pdf(c.pixel, length);
+}
+
+double SecondaryBoundary::length_over_direction(const Segment& g, const Connection& c, double length) const {
+  const int t = g.light.triangle;
+  const double cosine = -dot(g.light.n, g.w);
+  if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(t) || !(cosine > 0) || !scene_.outside(g.camera_end, g.light))
+    return 0;
+  const CastShadow shadow(scene_, g.light.p, *g.y.edge, g.camera_end.triangle);
+  if (!shadow.within(g.y.s)) return 0;
+  const Warp& warp = edge_warp();
+  const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
+  const double aimed_pdf = scene_.emitter_pdf(t) * g.r_s * g.r_s / cosine;
+  return edge_probability / (g.y.share * warp.density(g.y.x())) *
+         shadow.length_rate(scene_.camera.position - g.light.p, g.y.s) * shadow.part() * aimed_pdf / direction_pdf(g) *
+         worker_.pick.length_pdf(GatePick::kImage, length);
 }
 
 double SecondaryBoundary::rate_in_pixel(const Segment& g, int pixel) const {

@@ -21,7 +21,9 @@ SecondaryBoundary::SecondaryBoundary(Worker& worker, const BoundaryEdges& edges,
       edges_(edges),
       guide_(guide),
       techniques_(worker.options.boundary),
+      dirac_(worker.gates.shape().is_dirac()),
       at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
+      edge_at_length_(narrow_gates && techniques_.at_length && !scene_.captures() && scene_.emitters.have_extent),
       camera_over_edge_rate_(guide.rate(Technique::from_camera) / guide.rate(Technique::from_edge)),
       aimed_share_(techniques_.aimed && scene_.emitters.have_extent ? 0.5 : 0),
       light_side_(worker, narrow_gates && techniques_.light_arcs),
@@ -42,6 +44,11 @@ Vec3 SecondaryBoundary::Segment::offset_ray_origin(double offset) const {
 }
 
 void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
+  if (!dirac_ || worker_.options.max_bounces > 1) search_from_edge(pixel, scale, rng);
+  if (edge_at_length_ && worker_.options.max_bounces > 0) connect_lamp_at_length(scale, rng);
+}
+
+void SecondaryBoundary::search_from_edge(int pixel, double scale, Rng& rng) {
   Segment g;
   const double x = edge_warp().sample(rng.fine_uniform());
   g.y = edges_.sample_secondary(x);
@@ -63,7 +70,8 @@ void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
   if (!(may_end_flowing || may_flow(g.light)) || !find_camera_end(g)) return;
 
   connections_.clear();
-  walk_to_camera(g, pixel, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)), rng);
+  walk_to_camera(g, pixel, scale * g.sine / (g.y.pdf * edge_warp().density(x) * direction_pdf(g)),
+                 worker_.options.max_bounces, rng);
   finish(g, Found::from_edge, rng);
   worker_.sink.note_guide(BoundaryGuide::table(Technique::from_edge), x);
 }
@@ -90,7 +98,8 @@ void SecondaryBoundary::sample_from_light(int pixel, double scale, Rng& rng) {
 
   connections_.clear();
   const double lights = scene_.captures() ? 1 : count;
-  walk_to_camera(g, pixel, scale * lights * g.sine / (g.r_s * g.r_s * g.y.pdf * guide_.warp(table).density(x)), rng);
+  walk_to_camera(g, pixel, scale * lights * g.sine / (g.r_s * g.r_s * g.y.pdf * guide_.warp(table).density(x)),
+                 worker_.options.max_bounces, rng);
   light_of_end_ = {intensity, 0, 0, -1};
   finish(g, Found::from_light, rng);
   worker_.sink.note_guide(table, x);
@@ -124,7 +133,7 @@ void SecondaryBoundary::walk_from_camera(int pixel, double scale, double tau, Rn
   scale *= weight;
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
     if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
-    connect_edge(pixel, throughput * scale, pick, rng);
+    if (!dirac_ || bounce < worker_.options.max_bounces) connect_edge(pixel, throughput * scale, pick, rng);
     if (at_length_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
     pick = pick_from_camera(pixel, bounce + 1, rng);
@@ -216,7 +225,7 @@ const LocalDifferential& SecondaryBoundary::with_kept_length(const Segment& g, c
   return following_;
 }
 
-void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng) {
+void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double scale, int vertices, Rng& rng) {
   const bool captures = scene_.captures();
   const SurfacePoint eye = scene_.sensor_point(of_pixel);
   const double extra = scene_.extra_length(of_pixel);
@@ -225,7 +234,7 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double sc
   WalkDensities densities;
   Vec3 from = g.w;  // unit, towards where the light comes from
   double walked = 0;
-  for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
+  for (int bounce = 1; bounce <= vertices; ++bounce) {
     const SurfacePoint x = walk_.back();
     const Vec3 to_camera = eye.p - x.p;
     const double distance = length(to_camera);
@@ -244,7 +253,7 @@ void SecondaryBoundary::walk_to_camera(const Segment& g, int of_pixel, double sc
                                 camera_over_edge(g, x, bounce, pixel, all), bounce > 1 ? walk_[1] : SurfacePoint{}});
       }
     }
-    if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
+    if (bounce == vertices || !russian_roulette(throughput, bounce, rng)) return;
     const auto next = trace_next_vertex(worker_, x, from, throughput, rng, TransportMode::importance);
     if (!next) return;
     from = -next->direction;
@@ -322,18 +331,18 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
     for (const GatheredLight& e : lights) {
       if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
       if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
+      if (dirac_ && e.bounces == 0) continue;
       const bool ends = keeps && e.bounces == 0;
       const LocalDifferential* differential = ends         ? &with_kept_length(g, c, found)
                                               : may_follow ? &with_following(g, c, e.next)
                                                            : &flow_of(c);
       if (differential->empty()) continue;
       if (ends || may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
-      const double rate = e.bounces == 0 ? length_over_random(g, c, before_[i].length) : 0;
-      const BoundaryShares shares(c.camera_over_edge, rate);
+      const BoundaryDensities pdf = densities(g, c, e.bounces == 0 ? before_[i].length : 0);
       const double weight = found == Found::from_light  ? 1
-                            : found == Found::from_edge ? shares.from_edge
-                                                        : shares.from_camera;
-      worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0], 1 - shares.from_edge);
+                            : found == Found::from_edge ? pdf.of_edge()
+                                                        : pdf.of_camera();
+      worker_.sink.note_boundary(c.bounces + e.bounces, g.y.edge->face[0], pdf.camera_part());
       worker_.sink.add(c.pixel, c.value * e.value * weight, e.whole_length(before_[i].length), GateUse::value_only);
     }
   }

@@ -6,7 +6,9 @@
 //     or a glossy surface sees;
 //   - under narrow gates, from the camera at a length drawn from the gates: y is where the shadow of a random edge, cast
 //     from D onto an emitter's plane, is at the distance that is left; or y is random, and D moved within its pixel, along either
-//     image axis, to where the length is right. Where one's density vanishes another's does not.
+//     image axis, to where the length is right;
+//   - or, for D that the camera sees, from the edge: y is where the shadow, cast from a random point of an emitter onto a surface, has the right
+//     length. Where one's density vanishes another's does not.
 // From the edge, the D side walks on and connects to the camera at every vertex. Segments that end at a light without an
 // extent, or begin at the sensor point of a capture, are found in one way each: from an edge point, which determines them.
 #pragma once
@@ -19,16 +21,24 @@
 
 namespace isochron {
 
-/// Which part of a segment each technique takes that finds it.
-struct BoundaryShares {
-  double from_edge, from_camera, at_length;
+/// Densities of finding a segment, and the weights that follow (balance heuristic).
+struct BoundaryDensities {
+  double
+      camera_over_edge;  ///< from the camera, by a random edge point, over from an edge; infinite: only the camera finds it
+  double camera_at_length = 0;  ///< from the camera at a length over that by a random edge point
+  double edge_at_length = 0;    ///< from an edge at a length over that in a random direction
+  bool random = true;           ///< whether random ones count: a Dirac gate lets none through
 
-  /// From densities: of finding it from the camera, by a random edge point, over that from an edge (infinite: only the camera
-  /// finds it), and of finding it from the camera at a length over that by a random edge point.
-  BoundaryShares(double camera_over_edge, double length_over_random)
-      : from_edge(1 / (1 + camera_over_edge * (1 + length_over_random))),
-        from_camera(1 / (1 / camera_over_edge + 1 + length_over_random)),
-        at_length(length_over_random * from_camera) {}
+  /// The weights of contributions, divided by the densities of random ones, of all that begins at an edge, and of all from the camera: at a
+  /// length the part of a segment is larger as the density is.
+  double of_edge() const { return 1 / (from_edge() + camera_over_edge * from_camera()); }
+  double of_camera() const { return camera_over_edge > 0 ? 1 / (from_edge() / camera_over_edge + from_camera()) : 0; }
+  /// The part that the camera takes in all.
+  double camera_part() const { return of_camera() * from_camera(); }
+
+ private:
+  double from_edge() const { return (random ? 1 : 0) + edge_at_length; }
+  double from_camera() const { return (random ? 1 : 0) + camera_at_length; }
 };
 
 class SecondaryBoundary {
@@ -37,8 +47,8 @@ class SecondaryBoundary {
   /// that draw lengths from the gates.
   SecondaryBoundary(Worker& worker, const BoundaryEdges& edges, const BoundaryGuide& guide, bool narrow_gates);
 
-  /// One segment from an edge; contributions are scaled by `scale` (one over the number of such segments).
-  /// `pixel`: which it serves in a capture; a camera's lands on any.
+  /// One segment from an edge, and under narrow gates one more at a length; contributions are scaled by `scale` (one over the number of such
+  /// samples). `pixel`: which it serves in a capture; a camera's lands on any.
   void sample_from_edge(int pixel, double scale, Rng& rng);
 
   /// One segment from an edge to a light without an extent, likewise. There must be such lights.
@@ -101,6 +111,8 @@ class SecondaryBoundary {
     return scene_.has_moving_vertex(x.triangle) || scene_.flows.possible_at(x.p);
   }
 
+  void search_from_edge(int pixel, double scale, Rng& rng);
+
   /// Traces from the edge point along w to S. False where there is none, or it faces away.
   bool find_light_end(Segment& g);
 
@@ -135,8 +147,8 @@ class SecondaryBoundary {
   }
 
   /// Walks on from D, away from the light, and collects a connection to the camera, or to the sensor point of the pixel, at
-  /// every vertex.
-  void walk_to_camera(const Segment& g, int of_pixel, double scale, Rng& rng);
+  /// every one of so many vertices at most.
+  void walk_to_camera(const Segment& g, int of_pixel, double scale, int vertices, Rng& rng);
 
   /// Includes the worker's last vertex but one, which is number `bounce`, in `camera_densities_`.
   void extend_camera_densities(int bounce);
@@ -154,14 +166,22 @@ class SecondaryBoundary {
   /// For light of one bounce on paths of length tau: a random edge point; a random one of the pixel's image coordinates, and the other
   /// (`axis`) such that the length is right.
   void connect_pixel_at_length(int pixel, int axis, double scale, double tau, Rng& rng);
+  /// For light of one bounce on paths of length tau: a random point of an emitter; the edge point whose shadow on a surface, found by a random
+  /// one, has the length.
+  void connect_lamp_at_length(double scale, Rng& rng);
   /// D, the last vertex of the worker's path, y and tau are given: hands the path by an emitter's triangle to the sink.
   bool deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau);
+  /// The same of a segment with its one connection.
+  bool deliver_at_length(const Segment& g, Found found, double tau);
 
-  /// Density of the segment when the length is drawn from the gates, over that of a random edge point from the camera; S is
-  /// on an emitter of a path so long. Lengths are drawn only for segments outside of dielectrics.
+  /// Of a segment, and of light straight from S if that is on an emitter of a path of such a `length`; 0: other light.
+  BoundaryDensities densities(const Segment& g, const Connection& c, double length) const;
+  /// Densities of the segment when the length is drawn from the gates, over that of a random edge point from the camera, and over that of a
+  /// random direction from the edge. Lengths are drawn only for segments outside of dielectrics.
   double length_over_random(const Segment& g, const Connection& c, double length) const;
+  double length_over_direction(const Segment& g, const Connection& c, double length) const;
 
-  /// The part of it that moves D within its pixel, where D is x1, without densities of the emitter and the length.
+  /// The part of the former that moves D within its pixel, where D is x1, without densities of the emitter and the length.
   double rate_in_pixel(const Segment& g, int pixel) const;
 
   /// D is the last vertex of the worker's path and y is given: completes the segment and its one connection.
@@ -175,7 +195,9 @@ class SecondaryBoundary {
   const BoundaryEdges& edges_;
   const BoundaryGuide& guide_;
   const BoundaryTechniques techniques_;
-  const bool at_length_;
+  const bool dirac_;                    ///< random segments have the right length by light that scatters beyond S alone
+  const bool at_length_;                ///< from the camera
+  const bool edge_at_length_;           ///< from edges
   const double camera_over_edge_rate_;  ///< samples of segments from the camera over those from an edge
   const double aimed_share_;            ///< of the directions from an edge
   LightSide light_side_;

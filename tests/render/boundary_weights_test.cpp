@@ -15,8 +15,8 @@ class BoundaryWeights {
   BoundaryWeights(Worker& worker, const BoundaryEdges& edges, const BoundaryGuide& guide)
       : worker_(worker), edges_(edges), boundary_(worker, edges, guide, true) {}
 
-  /// A segment from an edge, by a random direction in its wedge: f(bounces up to D, the parts from an edge, from the camera, at a
-  /// length) for each way on to the camera.
+  /// A segment from an edge, by a random direction in its wedge: f(bounces up to D, densities as seen from the edge and from the camera) for
+  /// each way on to the camera.
   template <class F>
   void look_from_edge(int pixel, Rng& rng, F&& f) {
     SecondaryBoundary::Segment g;
@@ -25,17 +25,16 @@ class BoundaryWeights {
     g.w = SecondaryBoundary::direction_in_wedge(g.y, u0, u1);
     if (!g.orient() || !boundary_.find_light_end(g) || !boundary_.find_camera_end(g)) return;
     boundary_.connections_.clear();
-    boundary_.walk_to_camera(g, pixel, 1, rng);
+    boundary_.walk_to_camera(g, pixel, 1, worker_.options.max_bounces, rng);
     const auto connections = boundary_.connections_;
     const auto walk = boundary_.walk_;
     for (const auto& c : connections) {
-      const double at_length = boundary_.length_over_random(g, c, c.length + g.r_d + g.r_s);
       SecondaryBoundary::Segment h;
       h.y = g.y;
       if (!look_from_camera(h, c.pixel, {walk.data(), static_cast<std::size_t>(c.bounces)})) continue;
       const auto& d = boundary_.connections_[0];
-      const BoundaryShares there(d.camera_over_edge, boundary_.length_over_random(h, d, d.length + h.r_d + h.r_s));
-      f(c.bounces, BoundaryShares(c.camera_over_edge, at_length).from_edge, there.from_camera, there.at_length);
+      f(c.bounces, boundary_.densities(g, c, c.length + g.r_d + g.r_s),
+        boundary_.densities(h, d, d.length + h.r_d + h.r_s));
     }
   }
 
@@ -94,22 +93,26 @@ TEST(BoundaryWeights, AddUpToOne) {
   const BoundaryGuide guide = uneven_guide();
   ASSERT_NE(guide.rate(Technique::from_edge), guide.rate(Technique::from_camera));
   BoundaryWeights weights(worker, edges, guide);
-  int found[4] = {0, 0, 0, 0}, shared[4] = {0, 0, 0, 0}, at_lengths = 0;
+  int found[4] = {0, 0, 0, 0}, shared[4] = {0, 0, 0, 0}, from_camera_at_length = 0, from_edge_at_length = 0;
   for (int i = 0; i < 100000; ++i) {
     Rng rng(Stream{test_seed(13), 0, 0}, i, 0);
-    weights.look_from_edge(0, rng, [&](int bounces, double edge, double camera, double at_length) {
-      EXPECT_NEAR(edge + camera + at_length, 1, 1e-8)
-          << bounces << " bounces: " << edge << ", " << camera << ", " << at_length;
+    weights.look_from_edge(0, rng, [&](int bounces, const BoundaryDensities& here, const BoundaryDensities& there) {
+      const double edge = here.of_edge(), edge_at_length = edge * here.edge_at_length;
+      const double camera = there.of_camera(), camera_at_length = camera * there.camera_at_length;
+      EXPECT_NEAR(edge + edge_at_length + camera + camera_at_length, 1, 1e-8) << bounces << " bounces";
+      EXPECT_NEAR(here.camera_part(), camera + camera_at_length, 1e-8);
       ++found[bounces];
       shared[bounces] += std::min(edge, camera) > 0.01;
-      at_lengths += at_length > 0.01;
+      from_camera_at_length += camera_at_length > 0.01;
+      from_edge_at_length += edge_at_length > 0.01;
     });
   }
   for (int bounces = 1; bounces <= 3; ++bounces) {
     EXPECT_GT(found[bounces], 100) << bounces;
     EXPECT_GT(shared[bounces], 50) << bounces;
   }
-  EXPECT_GT(at_lengths, 20);
+  EXPECT_GT(from_camera_at_length, 20);
+  EXPECT_GT(from_edge_at_length, 20);
 }
 
 }  // namespace
