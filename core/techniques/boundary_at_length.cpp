@@ -1,5 +1,6 @@
 // Boundary segments of light straight from an emitter, on paths of a given length (theory section 7). Of the three unknowns, the edge
 // point and both image coordinates of D, one is solved for.
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -47,21 +48,21 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
     if (!(s > 0 && s < 1) || !line.casts(s)) continue;
     g.y.s = s;
     g.y.y = g.y.edge->point(s);
-    if (deliver_at_length(g, pixel, emitter, throughput, tau)) worker_.sink.note_guide(table, g.y.x());
+    if (deliver_at_length(g, pixel, emitter, throughput, tau, rng)) worker_.sink.note_guide(table, g.y.x());
   }
 }
 
-bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau) {
+bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau,
+                                          Rng& rng) {
   return join_camera_path(g, pixel, throughput) && g.light.triangle == emitter &&
-         deliver_at_length(g, Found::from_camera, tau);
+         deliver_at_length(g, Found::from_camera, tau, in_line(g, connections_[0], rng));
 }
 
-bool SecondaryBoundary::deliver_at_length(const Segment& g, Found found, double tau) {
+bool SecondaryBoundary::deliver_at_length(const Segment& g, Found found, double tau, double in_line) {
   const Connection& c = connections_[0];
-  const BoundaryDensities pdf = densities(g, c, tau);
+  const BoundaryDensities pdf = densities(g, c, tau, in_line);
   const Rgb radiance = scene_.emitted(g.light, -g.w);
-  if (!((found == Found::from_edge ? pdf.edge_at_length : pdf.camera_at_length) > 0) || radiance.is_black())
-    return false;
+  if (!((found == Found::from_edge ? pdf.edge_at_length : pdf.camera_at_length) > 0) || radiance.is_black()) return false;
   const LocalDifferential& differential = with_kept_length(g, c, found);
   if (differential.empty()) return false;
   worker_.sink.bind(differential);
@@ -104,11 +105,12 @@ void SecondaryBoundary::connect_pixel_at_length(int pixel, int axis, double scal
   int trials = 1;
   for (; !in_plane(triangle_at(border + rng.uniform())); ++trials) throw_if_stopped();
   camera_densities_ = {};
-  if (deliver_at_length(g, pixel, emitter, Rgb(scale * trials), tau)) worker_.sink.note_guide(table, g.y.x());
+  if (deliver_at_length(g, pixel, emitter, Rgb(scale * trials), tau, rng)) worker_.sink.note_guide(table, g.y.x());
 }
 
 void SecondaryBoundary::connect_lamp_at_length(double scale, Rng& rng) {
   const double u_edge = rng.fine_uniform(), start = rng.uniform(), gate_pick = rng.uniform(), u = rng.uniform();
+  const double pick = rng.uniform();
   const double u0 = rng.uniform(), u1 = rng.uniform(), u2 = rng.uniform();
   const double tau = worker_.pick.sample_length(GatePick::kImage, gate_pick, u).value_or(0);
   double pdf_area;
@@ -116,47 +118,61 @@ void SecondaryBoundary::connect_lamp_at_length(double scale, Rng& rng) {
   if (!(tau > 0) || is_light(lamp.triangle)) return;
   Segment g;
   g.y = edges_.sample_secondary(edge_warp().sample(u_edge));
-  const auto aim = [&](double s) {
-    g.y.s = s;
-    g.y.y = g.y.edge->point(s);
-    g.w = lamp.p - g.y.y;
-    g.r_s = length(g.w);
-    g.w *= 1 / g.r_s;
-    return g.r_s > 0 && dot(lamp.n, g.w) < 0 && g.orient();
-  };
-  const auto triangle_by = [&](double s) {
-    if (!aim(s)) return -1;
-    ++worker_.counts.rays;
-    return scene_.first_hit(g.offset_ray_origin(scene_.caster.offset()), -g.w);
-  };
-  const int triangle = triangle_by(start);
-  if (triangle < 0) return;
-  const CastShadow shadow(scene_, lamp.p, *g.y.edge, triangle);
-  const auto roots = shadow.at_length(scene_.camera.position - lamp.p, tau);
-  if (!roots) return;
+  if (!find_in_line(g, lamp, start) || in_line_.empty()) return;
+  const auto count = static_cast<double>(in_line_.size());
+  const int triangle = in_line_[std::min(static_cast<std::size_t>(pick * count), in_line_.size() - 1)];
+  const CastShadow shadow(scene_, lamp, *g.y.edge, triangle);
+  const auto roots = shadow.at_length(scene_.camera.position, tau);
+  if (!roots || !shadow.within(start)) return;
   for (const double s : *roots) {
-    if (!shadow.within(s) || !aim(s) || !find_light_end(g) || g.light.triangle != lamp.triangle) continue;
+    if (!shadow.within(s) || !aim(g, lamp, s) || !find_light_end(g) || g.light.triangle != lamp.triangle) continue;
     if (!find_camera_end(g) || g.camera_end.triangle != triangle) continue;
     connections_.clear();
     const double random = g.y.pdf * edge_warp().density(g.y.x()) * direction_pdf(g);
     walk_to_camera(g, GatePick::kImage, scale * g.sine / random, 1, rng);
-    if (connections_.empty()) continue;
-    // One over the probability that a random point finds the triangle: the mean number of trials until one does.
-    const Segment found = g;
-    int trials = 1;
-    for (; triangle_by(rng.uniform()) != triangle; ++trials) throw_if_stopped();
-    connections_[0].value *= trials * shadow.part();
-    if (deliver_at_length(found, Found::from_edge, tau))
-      worker_.sink.note_guide(BoundaryGuide::table(Technique::from_edge), found.y.x());
+    if (!connections_.empty() && deliver_at_length(g, Found::from_edge, tau, 1 / count))
+      worker_.sink.note_guide(BoundaryGuide::table(Technique::from_edge), g.y.x());
   }
 }
 
-BoundaryDensities SecondaryBoundary::densities(const Segment& g, const Connection& c, double length) const {
+bool SecondaryBoundary::aim(Segment& g, const SurfacePoint& lamp, double s) {
+  g.y.s = s;
+  g.y.y = g.y.edge->point(s);
+  g.w = lamp.p - g.y.y;
+  g.r_s = length(g.w);
+  g.w *= 1 / g.r_s;
+  return g.r_s > 0 && dot(lamp.n, g.w) < 0 && g.orient();
+}
+
+bool SecondaryBoundary::find_in_line(Segment& g, const SurfacePoint& lamp, double s) {
+  in_line_.clear();
+  if (!aim(g, lamp, s)) return false;
+  const Vec3 start = g.offset_ray_origin(scene_.caster.offset());
+  ++worker_.counts.rays;
+  for (int t = scene_.first_hit(start, -g.w); t >= 0;) {
+    if (faces(t, g.w)) in_line_.push_back(t);
+    t = worker_.closest_hit(scene_.point_on_triangle(t, start, -g.w), -g.w);
+  }
+  return true;
+}
+
+BoundaryDensities SecondaryBoundary::densities(const Segment& g, const Connection& c, double length,
+                                               double in_line) const {
   const bool straight = length > 0;
   return {.camera_over_edge = c.camera_over_edge,
           .camera_at_length = straight ? length_over_random(g, c, length) : 0,
-          .edge_at_length = straight ? length_over_direction(g, c, length) : 0,
-          .random = !(straight && dirac_)};
+          .edge_at_length = straight && in_line > 0 ? in_line * length_over_direction(g, c, length) : 0,
+          .random = !(straight && only_at_length_)};
+}
+
+double SecondaryBoundary::in_line(const Segment& g, const Connection& c, Rng& rng) {
+  if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(g.light.triangle)) return 0;
+  const CastShadow shadow(scene_, g.light, *g.y.edge, g.camera_end.triangle);
+  if (!(shadow.part() > 0)) return 0;
+  Segment at = g;
+  find_in_line(at, g.light, shadow.point(rng.uniform()));
+  const bool found = std::ranges::find(in_line_, g.camera_end.triangle) != in_line_.end();
+  return found ? 1 / static_cast<double>(in_line_.size()) : 0;
 }
 
 double SecondaryBoundary::length_over_random(const Segment& g, const Connection& c, double length) const {
@@ -175,13 +191,13 @@ double SecondaryBoundary::length_over_direction(const Segment& g, const Connecti
   const double cosine = -dot(g.light.n, g.w);
   if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(t) || !(cosine > 0) || !scene_.outside(g.camera_end, g.light))
     return 0;
-  const CastShadow shadow(scene_, g.light.p, *g.y.edge, g.camera_end.triangle);
+  const CastShadow shadow(scene_, g.light, *g.y.edge, g.camera_end.triangle);
   if (!shadow.within(g.y.s)) return 0;
   const Warp& warp = edge_warp();
   const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
   const double aimed_pdf = scene_.emitter_pdf(t) * g.r_s * g.r_s / cosine;
   return edge_probability / (g.y.share * warp.density(g.y.x())) *
-         shadow.length_rate(scene_.camera.position - g.light.p, g.y.s) * shadow.part() * aimed_pdf / direction_pdf(g) *
+         shadow.length_rate(scene_.camera.position, g.y.s) * shadow.part() * aimed_pdf / direction_pdf(g) *
          worker_.pick.length_pdf(GatePick::kImage, length);
 }
 

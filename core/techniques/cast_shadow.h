@@ -12,19 +12,19 @@
 namespace isochron {
 
 /// Where the line from S through an edge meets the plane: D = S + p / m(s), p = a + s c, with m(s) linear in the fraction s along the edge.
-/// `eye`: the camera's place, from S.
 class CastShadow {
  public:
-  CastShadow(const PreparedScene& scene, const Vec3& s, const BoundaryEdge& edge, int receiver)
-      : a_(edge.origin - s), c_(edge.end - edge.origin) {
-    const double height = scene.height_over(receiver, s);
+  CastShadow(const PreparedScene& scene, const SurfacePoint& lamp, const BoundaryEdge& edge, int receiver)
+      : s_(lamp.p), a_(edge.origin - s_), c_(edge.end - edge.origin) {
+    const double height = scene.height_over(receiver, s_);
+    keep(dot(lamp.n, a_), dot(lamp.n, c_));
     m0_ = -dot(scene.normal(receiver), a_) / height;
     m1_ = -dot(scene.normal(receiver), c_) / height;
     // The edge lies between S and the plane, and the shadow inside of the triangle: S sees its sides on the same side of it.
     keep(m0_, m1_);
     keep(1 - m0_, -m1_);
     auto corners = scene.corners(receiver);
-    for (Vec3& corner : corners) corner -= s;
+    for (Vec3& corner : corners) corner -= s_;
     const double facing = height > 0 ? -1 : 1;
     for (int i = 0; i < 3; ++i) {
       const Vec3 side = cross(corners[i], corners[(i + 1) % 3]) * facing;
@@ -35,9 +35,12 @@ class CastShadow {
   /// The part of the edge whose shadow falls into the triangle, from 0 to 1.
   double part() const { return std::max(0.0, high_ - low_); }
   bool within(double s) const { return s > low_ && s < high_; }
+  /// A point of this part, for u in (0, 1).
+  double point(double u) const { return low_ + u * part(); }
 
   /// Where a path from S by D to the camera has length tau; the roots may be on the edge or not.
-  std::optional<std::array<double, 2>> at_length(const Vec3& eye, double tau) const {
+  std::optional<std::array<double, 2>> at_length(const Vec3& camera, double tau) const {
+    const Vec3 eye = camera - s_;
     // |D - eye| = tau - |D| squared: 2 tau |p| = (tau^2 - |eye|^2) m + 2 p.eye
     const double k = tau * tau - length_squared(eye), r0 = k * m0_ + 2 * dot(a_, eye), r1 = k * m1_ + 2 * dot(c_, eye);
     const double t2 = 4 * tau * tau;
@@ -49,8 +52,8 @@ class CastShadow {
     return roots;
   }
   /// |d length / ds|
-  double length_rate(const Vec3& eye, double s) const {
-    const Vec3 p = a_ + c_ * s;
+  double length_rate(const Vec3& camera, double s) const {
+    const Vec3 p = a_ + c_ * s, eye = camera - s_;
     const double m = m0_ + s * m1_;
     const Vec3 rate = (c_ - p * (m1_ / m)) / m;
     return std::abs(dot(normalize(p) + normalize(p / m - eye), rate));
@@ -68,7 +71,7 @@ class CastShadow {
       high_ = low_;
   }
 
-  Vec3 a_, c_;
+  Vec3 s_, a_, c_;
   double m0_ = 0, m1_ = 0, low_ = 0, high_ = 1;
 };
 

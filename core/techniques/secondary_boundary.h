@@ -27,7 +27,7 @@ struct BoundaryDensities {
       camera_over_edge;  ///< from the camera, by a random edge point, over from an edge; infinite: only the camera finds it
   double camera_at_length = 0;  ///< from the camera at a length over that by a random edge point
   double edge_at_length = 0;    ///< from an edge at a length over that in a random direction
-  bool random = true;           ///< whether random ones count: a Dirac gate lets none through
+  bool random = true;           ///< whether random ones are drawn
 
   /// The weights of contributions, divided by the densities of random ones, of all that begins at an edge, and of all from the camera: at a
   /// length the part of a segment is larger as the density is.
@@ -166,16 +166,23 @@ class SecondaryBoundary {
   /// For light of one bounce on paths of length tau: a random edge point; a random one of the pixel's image coordinates, and the other
   /// (`axis`) such that the length is right.
   void connect_pixel_at_length(int pixel, int axis, double scale, double tau, Rng& rng);
-  /// For light of one bounce on paths of length tau: a random point of an emitter; the edge point whose shadow on a surface, found by a random
-  /// one, has the length.
+  /// For light of one bounce on paths of length tau: a random point of an emitter; a triangle in line with it and a random point of an edge; the
+  /// point of that edge whose shadow on the triangle has the length.
   void connect_lamp_at_length(double scale, Rng& rng);
+  /// Puts y at point s of the edge, and w towards the emitter's point. False where the edge casts no shadow of it.
+  static bool aim(Segment& g, const SurfacePoint& lamp, double s);
+  /// The same, and finds the triangles that the line from the emitter's point through point s of the edge meets behind it and that face it.
+  bool find_in_line(Segment& g, const SurfacePoint& lamp, double s);
   /// D, the last vertex of the worker's path, y and tau are given: hands the path by an emitter's triangle to the sink.
-  bool deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau);
-  /// The same of a segment with its one connection.
-  bool deliver_at_length(const Segment& g, Found found, double tau);
+  bool deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau, Rng& rng);
+  /// The same of a segment with its one connection; `in_line`: see `densities`.
+  bool deliver_at_length(const Segment& g, Found found, double tau, double in_line);
 
-  /// Of a segment, and of light straight from S if that is on an emitter of a path of such a `length`; 0: other light.
-  BoundaryDensities densities(const Segment& g, const Connection& c, double length) const;
+  /// Of a segment, and of light straight from S if that is on an emitter of a path of such a `length`; 0: other light. `in_line`: probability
+  /// of D's triangle in connect_lamp_at_length, given the random point of the edge; it belongs to the sample, and is drawn by `in_line` for
+  /// segments that others find.
+  BoundaryDensities densities(const Segment& g, const Connection& c, double length, double in_line) const;
+  double in_line(const Segment& g, const Connection& c, Rng& rng);
   /// Densities of the segment when the length is drawn from the gates, over that of a random edge point from the camera, and over that of a
   /// random direction from the edge. Lengths are drawn only for segments outside of dielectrics.
   double length_over_random(const Segment& g, const Connection& c, double length) const;
@@ -195,9 +202,11 @@ class SecondaryBoundary {
   const BoundaryEdges& edges_;
   const BoundaryGuide& guide_;
   const BoundaryTechniques techniques_;
-  const bool dirac_;                    ///< random segments have the right length by light that scatters beyond S alone
-  const bool at_length_;                ///< from the camera
-  const bool edge_at_length_;           ///< from edges
+  const bool at_length_;       ///< from the camera
+  const bool edge_at_length_;  ///< from edges
+  /// Light straight from emitters is found at lengths alone: where paths keep their lengths, gates let next to none of the random segments
+  /// through, and Dirac gates none.
+  const bool only_at_length_;
   const double camera_over_edge_rate_;  ///< samples of segments from the camera over those from an edge
   const double aimed_share_;            ///< of the directions from an edge
   LightSide light_side_;
@@ -210,6 +219,7 @@ class SecondaryBoundary {
   std::vector<Connection> connections_;
   GatheredLight light_of_end_;      ///< of a segment from a light
   std::vector<CameraSide> before_;  ///< up to S, one per connection
+  std::vector<int> in_line_;        ///< of find_in_line
 };
 
 }  // namespace isochron

@@ -27,6 +27,8 @@ struct Setting {
     edge.origin = around({0, 0.6 * side, 0}, 0.4);
     edge.end = around({0, 0.6 * side, 0}, 0.4);
   }
+  /// The lamp's point, which shines at the floor.
+  SurfacePoint shining() const { return {lamp, {0, lamp.y > 0 ? -1.0 : 1.0, 0}, 2}; }
   /// Where the line through s of the edge meets a triangle's plane.
   Vec3 shadow(const PreparedScene& prepared, int triangle, double s) const {
     const double h = prepared.height_over(triangle, lamp), h_y = prepared.height_over(triangle, edge.point(s));
@@ -52,9 +54,9 @@ TEST(CastShadow, FindsLengthsWhereTheyAre) {
     const Setting setting(rng);
     const PreparedScene prepared(setting.scene, nullptr);
     for (const int t : {0, 1}) {
-      const CastShadow shadow(prepared, setting.lamp, setting.edge, t);
+      const CastShadow shadow(prepared, setting.shining(), setting.edge, t);
       const double s = rng.uniform(), tau = setting.path_length(prepared, t, s), h = 1e-6;
-      const auto found = shadow.at_length(setting.eye - setting.lamp, tau);
+      const auto found = shadow.at_length(setting.eye, tau);
       ASSERT_TRUE(found);
       EXPECT_LT(std::min(std::abs((*found)[0] - s), std::abs((*found)[1] - s)), 1e-6);
       for (const double root : *found) {
@@ -63,7 +65,7 @@ TEST(CastShadow, FindsLengthsWhereTheyAre) {
         ++(std::abs(root - s) < 1e-6 ? roots : others);
       }
       const double rate = (setting.path_length(prepared, t, s + h) - setting.path_length(prepared, t, s - h)) / (2 * h);
-      EXPECT_NEAR(shadow.length_rate(setting.eye - setting.lamp, s), std::abs(rate), 1e-5 * (1 + std::abs(rate)));
+      EXPECT_NEAR(shadow.length_rate(setting.eye, s), std::abs(rate), 1e-5 * (1 + std::abs(rate)));
     }
   }
   EXPECT_GE(roots, 4000);
@@ -77,7 +79,7 @@ TEST(CastShadow, KnowsThePartInATriangle) {
     const Setting setting(rng);
     const PreparedScene prepared(setting.scene, nullptr);
     for (const int t : {0, 1}) {
-      const CastShadow shadow(prepared, setting.lamp, setting.edge, t);
+      const CastShadow shadow(prepared, setting.shining(), setting.edge, t);
       constexpr int kPoints = 64;
       int hits = 0;
       for (int k = 0; k < kPoints; ++k) {
@@ -102,7 +104,7 @@ TEST(CastShadow, NeedsTheEdgeBetween) {
   for (const double beyond : {-3.0, 4.0}) {
     setting.edge.origin = setting.lamp * 0.1 + down * beyond;
     setting.edge.end = setting.edge.origin + Vec3(0.3, 0, 0.1);
-    for (const int t : {0, 1}) EXPECT_EQ(CastShadow(prepared, setting.lamp, setting.edge, t).part(), 0) << beyond;
+    for (const int t : {0, 1}) EXPECT_EQ(CastShadow(prepared, setting.shining(), setting.edge, t).part(), 0) << beyond;
   }
 }
 
