@@ -2,6 +2,7 @@
 
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <stdexcept>
 
 namespace isochron {
@@ -12,7 +13,7 @@ constexpr double kMore = 1 + 0x1p-30;
 
 }  // namespace
 
-/// Of the free unknowns, in their order.
+/// Of the free unknowns, in their order; of the matrix the lower triangle.
 struct Metric::Factors {
   Eigen::SparseMatrix<double> matrix;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> cholesky;
@@ -33,8 +34,7 @@ Metric::Metric(const std::vector<double>& diagonal, const std::vector<Coupling>&
   for (const Coupling& c : couplings) {
     const int a = place[c.a], b = place[c.b];
     if (a < 0 || b < 0) continue;
-    entries.emplace_back(a, b, c.curvature);
-    entries.emplace_back(b, a, c.curvature);
+    entries.emplace_back(std::max(a, b), std::min(a, b), c.curvature);
   }
   const auto n = static_cast<Eigen::Index>(free_.size());
   auto factors = std::make_unique<Factors>();
@@ -69,7 +69,9 @@ double Metric::dot(const std::vector<double>& a, const std::vector<double>& b) c
 std::vector<double> Metric::times(const std::vector<double>& v) const {
   return of_free(
       v, [this](std::size_t i, double value) { return diagonal_[i] * value; },
-      [this](const Eigen::VectorXd& values) -> Eigen::VectorXd { return factors_->matrix * values; });
+      [this](const Eigen::VectorXd& values) -> Eigen::VectorXd {
+        return factors_->matrix.selfadjointView<Eigen::Lower>() * values;
+      });
 }
 
 std::vector<double> Metric::solve(const std::vector<double>& v) const {

@@ -135,14 +135,25 @@ void QuadraticPenalty::add_noise(PenaltyScale scale, const Stream& stream, std::
 }
 
 std::vector<Coupling> QuadraticPenalty::couplings(PenaltyScale scale) const {
-  std::vector<Coupling> result;
+  // A row for each square: their sum is the product of the matrix with itself.
+  std::vector<Eigen::Triplet<double>> entries;
+  int rows = 0, unknowns = 0;
   for (const Square& s : squares_) {
-    const auto& entries = s.form.entries;
-    for (std::size_t a = 0; s.scaled(scale) > 0 && a < entries.size(); ++a)
-      for (std::size_t b = 0; b < a; ++b)
-        result.push_back(
-            {entries[a].first, entries[b].first, 2 * s.scaled(scale) * entries[a].second * entries[b].second});
+    if (!(s.scaled(scale) > 0) || s.form.entries.size() < 2) continue;
+    const double root = std::sqrt(2 * s.scaled(scale));
+    for (const auto& [i, factor] : s.form.entries) {
+      entries.emplace_back(i, rows, root * factor);
+      unknowns = std::max(unknowns, i + 1);
+    }
+    ++rows;
   }
+  Eigen::SparseMatrix<double> forms(unknowns, rows);
+  forms.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SparseMatrix<double> sum = forms * forms.transpose();
+  std::vector<Coupling> result;
+  for (int column = 0; column < unknowns; ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(sum, column); entry; ++entry)
+      if (entry.row() > column) result.push_back({static_cast<int>(entry.row()), column, entry.value()});
   return result;
 }
 

@@ -40,6 +40,7 @@ class QuasiNewton : public Optimizer {
               double rate) override {
     update_diagonal(objective, now, theta, iteration);
     couplings_ = objective.couplings();
+    metric_.reset();
     rejected_ = true;
     Vector at = theta;
     Evaluation here = now;
@@ -61,6 +62,7 @@ class QuasiNewton : public Optimizer {
   bool stuck() const override { return stuck_; }
   bool scatters() const override { return true; }
   void reset() override {
+    metric_.reset();
     diagonal_.clear();
     probes_ = 0;
     pairs_.clear();
@@ -175,12 +177,14 @@ class QuasiNewton : public Optimizer {
 
   /// The two loops of L-BFGS over the unknowns that may move: those at a bound and drawn outwards stay there, else their part
   /// of the step would spoil that of the others. An unknown that nothing depends on has no curvature and does not move.
-  Vector find_direction(const Vector& at, const Vector& gradient, const Vector& low, const Vector& high) const {
+  Vector find_direction(const Vector& at, const Vector& gradient, const Vector& low, const Vector& high) {
     std::vector<std::size_t> free;
     for (std::size_t i = 0; i < at.size(); ++i)
       if (diagonal_[i] > 0 && !(at[i] <= low[i] && gradient[i] >= 0) && !(at[i] >= high[i] && gradient[i] <= 0))
         free.push_back(i);
-    const Metric metric(diagonal_, couplings_, std::move(free));
+    // The inner iterations share it, but for unknowns that reach a bound or leave one.
+    if (!metric_ || metric_->free() != free) metric_.emplace(diagonal_, couplings_, std::move(free));
+    const Metric& metric = *metric_;
     Vector direction(at.size(), 0.0);
     for (const std::size_t i : metric.free()) direction[i] = -gradient[i];
     struct Used {
@@ -213,6 +217,7 @@ class QuasiNewton : public Optimizer {
   double probes_ = 0;
   std::deque<Pair> pairs_;           ///< the newest last
   std::vector<Coupling> couplings_;  ///< of this iteration's objective
+  std::optional<Metric> metric_;     ///< of this iteration, once it is asked for
   double promised_ = 0;              ///< fall of the loss by the slope of the last search's full step
   bool rejected_ = false, stuck_ = false;
 };
