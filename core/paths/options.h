@@ -24,7 +24,7 @@ struct BoundaryTechniques {
   bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
   bool aimed = true;        ///< directions from the edge towards emitters
   bool from_camera = true;  ///< edge points seen from vertices of camera paths
-  bool at_length = true;    ///< the same at lengths drawn from the gates, where they are narrow
+  bool at_length = true;    ///< from the camera and from edges at lengths drawn from the gates, where they are narrow
   bool light_arcs = true;   ///< ellipsoidal connections beyond the segment, where gates are narrow
   bool operator==(const BoundaryTechniques&) const = default;
 };

@@ -18,7 +18,7 @@ constexpr BoundaryName kBoundaryNames[] = {
     {"wedge", "boundary segments by edges and their wedges; else in any direction", &BoundaryTechniques::wedge},
     {"aimed", "boundary segments aimed at emitters", &BoundaryTechniques::aimed},
     {"from_camera", "edges seen from camera paths", &BoundaryTechniques::from_camera},
-    {"at_length", "the same at lengths drawn from narrow gates", &BoundaryTechniques::at_length},
+    {"at_length", "boundary segments at lengths drawn from narrow gates", &BoundaryTechniques::at_length},
     {"light_arcs", "connections beyond boundary segments, where gates are narrow", &BoundaryTechniques::light_arcs},
 };
 
