@@ -1,4 +1,4 @@
-// Densities by which the techniques that find a boundary segment share it (BoundaryShares).
+// Densities by which the techniques that find a boundary segment share it (BoundaryDensities).
 #include "core/techniques/secondary_boundary.h"
 
 namespace isochron {

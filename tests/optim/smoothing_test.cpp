@@ -118,6 +118,7 @@ TEST(QuadraticPenalty, DerivativesAgreeWithFiniteDifferences) {
   QuadraticPenalty penalty;
   penalty.add_slopes(scene, f, 0.8);
   penalty.add_prior({"late", 0, 2}, {0.3, -0.2}, 0.7);
+  penalty.add_forms({{{{4, 1.5}, {1, -0.5}, {7, 0.25}}, 0.1}, {{{7, 2.0}, {4, 0.5}}, -0.3}}, 0.4);
   constexpr PenaltyScale kScale{.slopes = 2, .priors = 3};
   const int size = 1 + 3 * static_cast<int>(f.vertices.size());
   std::vector<double> theta(size), gradient(size, 1.0), curvature(static_cast<std::size_t>(size) * size, 0.0),
@@ -126,7 +127,13 @@ TEST(QuadraticPenalty, DerivativesAgreeWithFiniteDifferences) {
   penalty.add_gradient(theta, kScale, gradient);
   penalty.add_curvature(size, kScale, curvature);
   penalty.add_diagonal(kScale, diagonal);
+  std::vector<double> coupled(curvature.size(), 0.0);
+  for (const Coupling& c : penalty.couplings(kScale)) {
+    EXPECT_NE(c.a, c.b);
+    for (const int place : {c.a * size + c.b, c.b * size + c.a}) coupled[place] += c.curvature;
+  }
   for (int i = 0; i < size; ++i) {
+    for (int j = 0; j < size; ++j) EXPECT_NEAR(i == j ? 0 : curvature[i * size + j], coupled[i * size + j], 1e-12);
     // Quadratic: central differences are exact but for round-off.
     std::vector<double> up = theta, down = theta, slope_up(size, 0.0), slope_down(size, 0.0);
     up[i] += 0.5, down[i] -= 0.5;
