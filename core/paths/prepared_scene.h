@@ -144,7 +144,7 @@ class PreparedScene {
   /// Unit; zero when the triangle has no area.
   const Vec3& normal(int triangle) const { return records_[triangle].normal; }
   double area(int triangle) const { return records_[triangle].area; }
-  bool emits(int triangle) const { return records_[triangle].emits; }
+  bool emits(int triangle) const { return triangle >= 0 && records_[triangle].emits; }
   /// Whether a path through the triangle, or to the light in its place, can have a derivative because of it.
   bool has_gradient(int triangle) const {
     return triangle >= 0 ? records_[triangle].has_gradient

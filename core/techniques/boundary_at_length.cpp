@@ -1,8 +1,9 @@
-// Boundary segments of light straight from an emitter, on paths of a given length (theory section 7). Of the three unknowns, the edge
-// point and both image coordinates of D, one is solved for.
+// Boundary segments of light straight from an emitter, on paths of a given length (theory section 7). One unknown is solved for: of the edge
+// point and both image coordinates of D, or of the edge point and the two of S.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "core/base/progress.h"
 #include "core/base/quadratic.h"
@@ -55,14 +56,15 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
 bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau,
                                           Rng& rng) {
   return join_camera_path(g, pixel, throughput) && g.light.triangle == emitter &&
-         deliver_at_length(g, Found::from_camera, tau, in_line(g, connections_[0], rng));
+         deliver_at_length(g, Found::from_camera, tau, in_line(g, connections_[0], tau, rng));
 }
 
 bool SecondaryBoundary::deliver_at_length(const Segment& g, Found found, double tau, double in_line) {
   const Connection& c = connections_[0];
   const BoundaryDensities pdf = densities(g, c, tau, in_line);
   const Rgb radiance = scene_.emitted(g.light, -g.w);
-  if (!((found == Found::from_edge ? pdf.edge_at_length : pdf.camera_at_length) > 0) || radiance.is_black()) return false;
+  if (!((found == Found::from_edge ? pdf.edge_at_length : pdf.camera_at_length) > 0) || radiance.is_black())
+    return false;
   const LocalDifferential& differential = with_kept_length(g, c, found);
   if (differential.empty()) return false;
   worker_.sink.bind(differential);
@@ -98,7 +100,7 @@ void SecondaryBoundary::connect_pixel_at_length(int pixel, int axis, double scal
   if (!in_plane(met)) return;
   image[axis] = *root;
   const auto d = scene_.end_point(met, camera.position, camera.direction(image[0], image[1]));
-  if (!d || camera.project(d->p) != pixel) return;
+  if (!d || camera.project(d->p) != pixel || !sees_outside(*d)) return;
   worker_.start_at_sensor(worker_.path, pixel);
   worker_.path.push(scene_, *d);
   // One over the probability to start in the plane, which nobody knows: the mean number of trials until one does.
@@ -149,9 +151,15 @@ bool SecondaryBoundary::find_in_line(Segment& g, const SurfacePoint& lamp, doubl
   if (!aim(g, lamp, s)) return false;
   const Vec3 start = g.offset_ray_origin(scene_.caster.offset());
   ++worker_.counts.rays;
+  // Onwards only: a ray that is moved off one of two surfaces that cross may begin before the other.
+  double reached = -std::numeric_limits<double>::infinity();
   for (int t = scene_.first_hit(start, -g.w); t >= 0;) {
+    const SurfacePoint x = scene_.point_on_triangle(t, start, -g.w);
+    const double distance = dot(start - x.p, g.w);
+    if (!(distance > reached)) break;
+    reached = distance;
     if (faces(t, g.w)) in_line_.push_back(t);
-    t = worker_.closest_hit(scene_.point_on_triangle(t, start, -g.w), -g.w);
+    t = worker_.closest_hit(x, -g.w);
   }
   return true;
 }
@@ -162,11 +170,12 @@ BoundaryDensities SecondaryBoundary::densities(const Segment& g, const Connectio
   return {.camera_over_edge = c.camera_over_edge,
           .camera_at_length = straight ? length_over_random(g, c, length) : 0,
           .edge_at_length = straight && in_line > 0 ? in_line * length_over_direction(g, c, length) : 0,
-          .random = !(straight && only_at_length_)};
+          .random = !(straight && c.bounces <= at_length_alone_)};
 }
 
-double SecondaryBoundary::in_line(const Segment& g, const Connection& c, Rng& rng) {
+double SecondaryBoundary::in_line(const Segment& g, const Connection& c, double length, Rng& rng) {
   if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(g.light.triangle)) return 0;
+  if (!(worker_.pick.length_pdf(GatePick::kImage, length) > 0)) return 0;
   const CastShadow shadow(scene_, g.light, *g.y.edge, g.camera_end.triangle);
   if (!(shadow.part() > 0)) return 0;
   Segment at = g;
@@ -182,23 +191,22 @@ double SecondaryBoundary::length_over_random(const Segment& g, const Connection&
   const Warp& warp = camera_warp(c.pixel, c.bounces);
   const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
   double rate = edge_probability / (g.y.share * warp.density(g.y.x())) * line.distance_rate(g.y.s);
-  if (c.bounces == 1 && !scene_.captures()) rate += rate_in_pixel(g, c.pixel);
+  if (c.bounces == 1 && !scene_.captures() && sees_outside(g.camera_end)) rate += rate_in_pixel(g, c.pixel);
   return rate * scene_.emitter_pdf(t) * scene_.area(t) * worker_.pick.length_pdf(c.pixel, length);
 }
 
 double SecondaryBoundary::length_over_direction(const Segment& g, const Connection& c, double length) const {
   const int t = g.light.triangle;
   const double cosine = -dot(g.light.n, g.w);
-  if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(t) || !(cosine > 0) || !scene_.outside(g.camera_end, g.light))
-    return 0;
+  if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(t) || !(cosine > 0)) return 0;
+  if (!scene_.outside(g.camera_end, g.light) || !sees_outside(g.camera_end)) return 0;
   const CastShadow shadow(scene_, g.light, *g.y.edge, g.camera_end.triangle);
   if (!shadow.within(g.y.s)) return 0;
   const Warp& warp = edge_warp();
   const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
   const double aimed_pdf = scene_.emitter_pdf(t) * g.r_s * g.r_s / cosine;
-  return edge_probability / (g.y.share * warp.density(g.y.x())) *
-         shadow.length_rate(scene_.camera.position, g.y.s) * shadow.part() * aimed_pdf / direction_pdf(g) *
-         worker_.pick.length_pdf(GatePick::kImage, length);
+  return edge_probability / (g.y.share * warp.density(g.y.x())) * shadow.length_rate(scene_.camera.position, g.y.s) *
+         shadow.part() * aimed_pdf / direction_pdf(g) * worker_.pick.length_pdf(GatePick::kImage, length);
 }
 
 double SecondaryBoundary::rate_in_pixel(const Segment& g, int pixel) const {

@@ -17,6 +17,7 @@ class CastShadow {
   CastShadow(const PreparedScene& scene, const SurfacePoint& lamp, const BoundaryEdge& edge, int receiver)
       : s_(lamp.p), a_(edge.origin - s_), c_(edge.end - edge.origin) {
     const double height = scene.height_over(receiver, s_);
+    if (height == 0) high_ = low_;
     keep(dot(lamp.n, a_), dot(lamp.n, c_));
     m0_ = -dot(scene.normal(receiver), a_) / height;
     m1_ = -dot(scene.normal(receiver), c_) / height;

@@ -23,9 +23,11 @@ SecondaryBoundary::SecondaryBoundary(Worker& worker, const BoundaryEdges& edges,
       techniques_(worker.options.boundary),
       at_length_(narrow_gates && techniques_.from_camera && techniques_.at_length),
       edge_at_length_(narrow_gates && techniques_.at_length && !scene_.captures() && scene_.emitters.have_extent),
-      only_at_length_(worker.gates.shape().is_dirac() || (scene_.flows.keep_length() && at_length_ && edge_at_length_)),
+      at_length_alone_(worker.gates.shape().is_dirac()                               ? worker.options.max_bounces
+                       : scene_.flows.keep_length() && at_length_ && edge_at_length_ ? 1
+                                                                                     : 0),
       camera_over_edge_rate_(guide.rate(Technique::from_camera) / guide.rate(Technique::from_edge)),
-      aimed_share_(techniques_.aimed && scene_.emitters.have_extent ? 0.5 : 0),
+      aimed_share_(techniques_.aimed && scene_.emitters.have_extent && !worker.gates.shape().is_dirac() ? 0.5 : 0),
       light_side_(worker, narrow_gates && techniques_.light_arcs),
       any_may_move_(scene_.flows.keep_length() &&
                     (worker.options.max_bounces > 1 || scene_.differentiable.every_path)) {}
@@ -44,8 +46,8 @@ Vec3 SecondaryBoundary::Segment::offset_ray_origin(double offset) const {
 }
 
 void SecondaryBoundary::sample_from_edge(int pixel, double scale, Rng& rng) {
-  if (!only_at_length_ || worker_.options.max_bounces > 1) search_from_edge(pixel, scale, rng);
   if (edge_at_length_ && worker_.options.max_bounces > 0) connect_lamp_at_length(scale, rng);
+  if (at_length_alone_ == 0 || worker_.options.max_bounces > 1) search_from_edge(pixel, scale, rng);
 }
 
 void SecondaryBoundary::search_from_edge(int pixel, double scale, Rng& rng) {
@@ -133,7 +135,8 @@ void SecondaryBoundary::walk_from_camera(int pixel, double scale, double tau, Rn
   scale *= weight;
   for (int bounce = 1; bounce <= worker_.options.max_bounces; ++bounce) {
     if (path.length.back() + scene_.distance_to_emitters(path.back().p) > worker_.gates.upper()) return;
-    if (!only_at_length_ || bounce < worker_.options.max_bounces) connect_edge(pixel, throughput * scale, pick, rng);
+    if (bounce > at_length_alone_ || bounce < worker_.options.max_bounces)
+      connect_edge(pixel, throughput * scale, pick, rng);
     if (at_length_) connect_edge_at_length(pixel, throughput * scale, tau, rng);
     if (bounce == worker_.options.max_bounces || !russian_roulette(throughput, bounce, rng)) return;
     pick = pick_from_camera(pixel, bounce + 1, rng);
@@ -331,7 +334,7 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
     for (const GatheredLight& e : lights) {
       if (c.bounces + e.bounces > worker_.options.max_bounces) continue;
       if (e.target >= 0 && e.target != static_cast<int>(i)) continue;
-      if (only_at_length_ && e.bounces == 0) continue;
+      if (e.bounces == 0 && c.bounces <= at_length_alone_) continue;
       const bool ends = keeps && e.bounces == 0;
       const LocalDifferential* differential = ends         ? &with_kept_length(g, c, found)
                                               : may_follow ? &with_following(g, c, e.next)
@@ -340,7 +343,7 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
       if (ends || may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
       const bool straight = e.bounces == 0;
       const BoundaryDensities pdf =
-          densities(g, c, straight ? before_[i].length : 0, straight ? in_line(g, c, rng) : 0);
+          densities(g, c, straight ? before_[i].length : 0, straight ? in_line(g, c, before_[i].length, rng) : 0);
       const double weight = found == Found::from_light  ? 1
                             : found == Found::from_edge ? pdf.of_edge()
                                                         : pdf.of_camera();

@@ -1,5 +1,5 @@
 // Secondary visibility boundary: a path segment D-S grazes an edge at y (theory section 5, "Secondary"). Several ways
-// to find such segments, combined by multiple importance sampling (balance heuristic; BoundaryShares):
+// to find such segments, combined by multiple importance sampling (balance heuristic; BoundaryDensities):
 //   - from the edge, direction within the wedge of grazing directions;
 //   - from the edge, aimed at a point on an emitter;
 //   - from the camera: D is a vertex of a camera path, y a point of a random edge. Finds what a narrow field of view
@@ -182,7 +182,9 @@ class SecondaryBoundary {
   /// of D's triangle in connect_lamp_at_length, given the random point of the edge; it belongs to the sample, and is drawn by `in_line` for
   /// segments that others find.
   BoundaryDensities densities(const Segment& g, const Connection& c, double length, double in_line) const;
-  double in_line(const Segment& g, const Connection& c, Rng& rng);
+  double in_line(const Segment& g, const Connection& c, double length, Rng& rng);
+  /// Whether the camera sees x through no dielectric.
+  bool sees_outside(const SurfacePoint& x) const { return scene_.outside(x, scene_.sensor_point(GatePick::kImage)); }
   /// Densities of the segment when the length is drawn from the gates, over that of a random edge point from the camera, and over that of a
   /// random direction from the edge. Lengths are drawn only for segments outside of dielectrics.
   double length_over_random(const Segment& g, const Connection& c, double length) const;
@@ -204,9 +206,9 @@ class SecondaryBoundary {
   const BoundaryTechniques techniques_;
   const bool at_length_;       ///< from the camera
   const bool edge_at_length_;  ///< from edges
-  /// Light straight from emitters is found at lengths alone: where paths keep their lengths, gates let next to none of the random segments
-  /// through, and Dirac gates none.
-  const bool only_at_length_;
+  /// Up to so many bounces light straight from emitters is found at lengths alone: under Dirac gates, which let no random segment through, any; of
+  /// other narrow gates where paths keep their lengths, one, for which there are enough techniques that find every segment.
+  const int at_length_alone_;
   const double camera_over_edge_rate_;  ///< samples of segments from the camera over those from an edge
   const double aimed_share_;            ///< of the directions from an edge
   LightSide light_side_;

@@ -11,7 +11,7 @@ namespace isochron {
 /// elsewhere counts as 0.
 class Metric {
  public:
-  /// diagonal > 0 at the `free` unknowns, and at least what the couplings need for a semidefinite matrix. Both must outlive this.
+  /// diagonal > 0 at the `free` unknowns, and at least what the couplings need for a semidefinite matrix. The diagonal must outlive this.
   Metric(const std::vector<double>& diagonal, const std::vector<Coupling>& couplings, std::vector<std::size_t> free);
   ~Metric();
   const std::vector<std::size_t>& free() const { return free_; }

@@ -115,9 +115,19 @@ TEST(LengthKeeping, WhereLightFromAWideLampComesFirst) {
                      GateSet(GateShape::gaussian(0.05), {5.1, 5.3, 5.5}), kDirect, 128, 64);
 }
 
+/// A shelf that passes through the floor: of two surfaces in line with the lamp and the screen's edges one hides the other.
+Scene floor_and_shelf_in_shadow() {
+  Scene scene = floor_in_shadow();
+  add_shape(scene, "shelf", quad({-0.6, 0.3, 0.4}, {0.3, 0.3, 0.4}, {0.3, -0.1, -0.4}, {-0.6, -0.1, -0.4}),
+            diffuse(Rgb(0.6), true));
+  return scene;
+}
+
 /// Segments at lengths drawn from the gates against those that chance brings there.
-TEST(LengthKeeping, ShadowEdgesAtLengths) {
-  const Scene scene = floor_in_shadow();
+class ShadowEdges : public ::testing::TestWithParam<bool> {};
+
+TEST_P(ShadowEdges, AtLengths) {
+  const Scene scene = GetParam() ? floor_and_shelf_in_shadow() : floor_in_shadow();
   const TangentBasis basis = make_basis(scene, {translate(scene, "screen", {1, 0.5, 0})});
   const GateSet gates(GateShape::gaussian(0.02), {5.4, 5.7, 6.0});
   EstimatorOptions random = kDirect;
@@ -125,6 +135,9 @@ TEST(LengthKeeping, ShadowEdgesAtLengths) {
   expect_equal(totals(scene, basis, gates, kDirect, true, 128, 64, 1),
                totals(scene, basis, gates, random, true, 128, 64, 2).sum);
 }
+
+INSTANTIATE_TEST_SUITE_P(Floor, ShadowEdges, ::testing::Bool(),
+                         [](const auto& test) { return test.param ? "and_shelf" : "alone"; });
 
 Scene box_with_panel() {
   Scene scene = load_scene(TEST_DATA "/validation/scene.yaml");
