@@ -118,7 +118,7 @@ TEST(LengthKeeping, WhereLightFromAWideLampComesFirst) {
 /// A shelf that passes through the floor: of two surfaces in line with the lamp and the screen's edges one hides the other.
 Scene floor_and_shelf_in_shadow() {
   Scene scene = floor_in_shadow();
-  add_shape(scene, "shelf", quad({-0.6, 0.3, 0.4}, {0.3, 0.3, 0.4}, {0.3, -0.1, -0.4}, {-0.6, -0.1, -0.4}),
+  add_shape(scene, "shelf", quad({-1.5, 0.4, 1}, {1.2, 0.4, 1}, {1.2, -0.1, -0.8}, {-1.5, -0.1, -0.8}),
             diffuse(Rgb(0.6), true));
   return scene;
 }
