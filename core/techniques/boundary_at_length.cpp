@@ -25,6 +25,11 @@ bool coplanar(const PreparedScene& scene, int a, int b) {
   return std::abs(scene.height_over(a, corners[0])) <= kCoplanarAngle * size;
 }
 
+/// Probability of the point's edge over the density of the point along it, both as `warp` draws them.
+double edge_over_point(const Warp& warp, const BoundaryEdges::Pick& y) {
+  return (warp.below(y.begin + y.share) - warp.below(y.begin)) / (y.share * warp.density(y.x()));
+}
+
 }  // namespace
 
 void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput, double tau, Rng& rng) {
@@ -56,7 +61,7 @@ void SecondaryBoundary::connect_edge_at_length(int pixel, const Rgb& throughput,
 bool SecondaryBoundary::deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau,
                                           Rng& rng) {
   return join_camera_path(g, pixel, throughput) && g.light.triangle == emitter &&
-         deliver_at_length(g, Found::from_camera, tau, in_line(g, connections_[0], tau, rng));
+         deliver_at_length(g, Found::from_camera, tau, draw_in_line(g, connections_[0], tau, rng));
 }
 
 bool SecondaryBoundary::deliver_at_length(const Segment& g, Found found, double tau, double in_line) {
@@ -120,7 +125,8 @@ void SecondaryBoundary::connect_lamp_at_length(double scale, Rng& rng) {
   if (!(tau > 0) || is_light(lamp.triangle)) return;
   Segment g;
   g.y = edges_.sample_secondary(edge_warp().sample(u_edge));
-  if (!find_in_line(g, lamp, start) || in_line_.empty()) return;
+  find_in_line(g, lamp, start);
+  if (in_line_.empty()) return;
   const auto count = static_cast<double>(in_line_.size());
   const int triangle = in_line_[std::min(static_cast<std::size_t>(pick * count), in_line_.size() - 1)];
   const CastShadow shadow(scene_, lamp, *g.y.edge, triangle);
@@ -146,9 +152,9 @@ bool SecondaryBoundary::aim(Segment& g, const SurfacePoint& lamp, double s) {
   return g.r_s > 0 && dot(lamp.n, g.w) < 0 && g.orient();
 }
 
-bool SecondaryBoundary::find_in_line(Segment& g, const SurfacePoint& lamp, double s) {
+void SecondaryBoundary::find_in_line(Segment& g, const SurfacePoint& lamp, double s) {
   in_line_.clear();
-  if (!aim(g, lamp, s)) return false;
+  if (!aim(g, lamp, s)) return;
   const Vec3 start = g.offset_ray_origin(scene_.caster.offset());
   ++worker_.counts.rays;
   // Onwards only: a ray that is moved off one of two surfaces that cross may begin before the other.
@@ -161,7 +167,6 @@ bool SecondaryBoundary::find_in_line(Segment& g, const SurfacePoint& lamp, doubl
     if (faces(t, g.w)) in_line_.push_back(t);
     t = worker_.closest_hit(x, -g.w);
   }
-  return true;
 }
 
 BoundaryDensities SecondaryBoundary::densities(const Segment& g, const Connection& c, double length,
@@ -173,7 +178,7 @@ BoundaryDensities SecondaryBoundary::densities(const Segment& g, const Connectio
           .random = !(straight && c.bounces <= at_length_alone_)};
 }
 
-double SecondaryBoundary::in_line(const Segment& g, const Connection& c, double length, Rng& rng) {
+double SecondaryBoundary::draw_in_line(const Segment& g, const Connection& c, double length, Rng& rng) {
   if (!edge_at_length_ || c.bounces != 1 || !scene_.emits(g.light.triangle)) return 0;
   if (!(worker_.pick.length_pdf(GatePick::kImage, length) > 0)) return 0;
   const CastShadow shadow(scene_, g.light, *g.y.edge, g.camera_end.triangle);
@@ -188,9 +193,7 @@ double SecondaryBoundary::length_over_random(const Segment& g, const Connection&
   if (!at_length_ || !scene_.emits(g.light.triangle) || !scene_.outside(g.camera_end, g.light)) return 0;
   const ShadowLine line(scene_, g.camera_end.p, *g.y.edge, g.light.triangle);
   const int t = g.light.triangle;
-  const Warp& warp = camera_warp(c.pixel, c.bounces);
-  const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
-  double rate = edge_probability / (g.y.share * warp.density(g.y.x())) * line.distance_rate(g.y.s);
+  double rate = edge_over_point(camera_warp(c.pixel, c.bounces), g.y) * line.distance_rate(g.y.s);
   if (c.bounces == 1 && !scene_.captures() && sees_outside(g.camera_end)) rate += rate_in_pixel(g, c.pixel);
   return rate * scene_.emitter_pdf(t) * scene_.area(t) * worker_.pick.length_pdf(c.pixel, length);
 }
@@ -202,11 +205,9 @@ double SecondaryBoundary::length_over_direction(const Segment& g, const Connecti
   if (!scene_.outside(g.camera_end, g.light) || !sees_outside(g.camera_end)) return 0;
   const CastShadow shadow(scene_, g.light, *g.y.edge, g.camera_end.triangle);
   if (!shadow.within(g.y.s)) return 0;
-  const Warp& warp = edge_warp();
-  const double edge_probability = warp.below(g.y.begin + g.y.share) - warp.below(g.y.begin);
   const double aimed_pdf = scene_.emitter_pdf(t) * g.r_s * g.r_s / cosine;
-  return edge_probability / (g.y.share * warp.density(g.y.x())) * shadow.length_rate(scene_.camera.position, g.y.s) *
-         shadow.part() * aimed_pdf / direction_pdf(g) * worker_.pick.length_pdf(GatePick::kImage, length);
+  return edge_over_point(edge_warp(), g.y) * shadow.length_rate(scene_.camera.position, g.y.s) * shadow.part() *
+         aimed_pdf / direction_pdf(g) * worker_.pick.length_pdf(GatePick::kImage, length);
 }
 
 double SecondaryBoundary::rate_in_pixel(const Segment& g, int pixel) const {

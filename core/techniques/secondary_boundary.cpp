@@ -343,7 +343,7 @@ void SecondaryBoundary::finish(const Segment& g, Found found, Rng& rng) {
       if (ends || may_follow || differential != bound) worker_.sink.bind(*(bound = differential));
       const bool straight = e.bounces == 0;
       const BoundaryDensities pdf =
-          densities(g, c, straight ? before_[i].length : 0, straight ? in_line(g, c, before_[i].length, rng) : 0);
+          densities(g, c, straight ? before_[i].length : 0, straight ? draw_in_line(g, c, before_[i].length, rng) : 0);
       const double weight = found == Found::from_light  ? 1
                             : found == Found::from_edge ? pdf.of_edge()
                                                         : pdf.of_camera();

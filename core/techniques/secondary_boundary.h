@@ -111,6 +111,7 @@ class SecondaryBoundary {
     return scene_.has_moving_vertex(x.triangle) || scene_.flows.possible_at(x.p);
   }
 
+  /// One segment from an edge in a random direction: within the wedge, or aimed at an emitter.
   void search_from_edge(int pixel, double scale, Rng& rng);
 
   /// Traces from the edge point along w to S. False where there is none, or it faces away.
@@ -171,18 +172,18 @@ class SecondaryBoundary {
   void connect_lamp_at_length(double scale, Rng& rng);
   /// Puts y at point s of the edge, and w towards the emitter's point. False where the edge casts no shadow of it.
   static bool aim(Segment& g, const SurfacePoint& lamp, double s);
-  /// The same, and finds the triangles that the line from the emitter's point through point s of the edge meets behind it and that face it.
-  bool find_in_line(Segment& g, const SurfacePoint& lamp, double s);
+  /// The same, and finds the triangles that the line from the emitter's point meets behind the edge and that face it; none without a shadow.
+  void find_in_line(Segment& g, const SurfacePoint& lamp, double s);
   /// D, the last vertex of the worker's path, y and tau are given: hands the path by an emitter's triangle to the sink.
   bool deliver_at_length(Segment& g, int pixel, int emitter, const Rgb& throughput, double tau, Rng& rng);
   /// The same of a segment with its one connection; `in_line`: see `densities`.
   bool deliver_at_length(const Segment& g, Found found, double tau, double in_line);
 
   /// Of a segment, and of light straight from S if that is on an emitter of a path of such a `length`; 0: other light. `in_line`: probability
-  /// of D's triangle in connect_lamp_at_length, given the random point of the edge; it belongs to the sample, and is drawn by `in_line` for
-  /// segments that others find.
+  /// of D's triangle in connect_lamp_at_length, given the random point of the edge; it belongs to the sample. For segments that others find
+  /// `draw_in_line` draws it.
   BoundaryDensities densities(const Segment& g, const Connection& c, double length, double in_line) const;
-  double in_line(const Segment& g, const Connection& c, double length, Rng& rng);
+  double draw_in_line(const Segment& g, const Connection& c, double length, Rng& rng);
   /// Whether the camera sees x through no dielectric.
   bool sees_outside(const SurfacePoint& x) const { return scene_.outside(x, scene_.sensor_point(GatePick::kImage)); }
   /// Densities of the segment when the length is drawn from the gates, over that of a random edge point from the camera, and over that of a

@@ -135,19 +135,19 @@ void QuadraticPenalty::add_noise(PenaltyScale scale, const Stream& stream, std::
 }
 
 std::vector<Coupling> QuadraticPenalty::couplings(PenaltyScale scale) const {
-  // A row for each square: their sum is the product of the matrix with itself.
+  // A column for each square: the sum of all is the product with the transpose.
   std::vector<Eigen::Triplet<double>> entries;
-  int rows = 0, unknowns = 0;
+  int squares = 0, unknowns = 0;
   for (const Square& s : squares_) {
     if (!(s.scaled(scale) > 0) || s.form.entries.size() < 2) continue;
     const double root = std::sqrt(2 * s.scaled(scale));
     for (const auto& [i, factor] : s.form.entries) {
-      entries.emplace_back(i, rows, root * factor);
+      entries.emplace_back(i, squares, root * factor);
       unknowns = std::max(unknowns, i + 1);
     }
-    ++rows;
+    ++squares;
   }
-  Eigen::SparseMatrix<double> forms(unknowns, rows);
+  Eigen::SparseMatrix<double> forms(unknowns, squares);
   forms.setFromTriplets(entries.begin(), entries.end());
   const Eigen::SparseMatrix<double> sum = forms * forms.transpose();
   std::vector<Coupling> result;

@@ -33,7 +33,7 @@ class BoundaryWeights {
       h.y = g.y;
       if (!look_from_camera(h, c.pixel, {walk.data(), static_cast<std::size_t>(c.bounces)})) continue;
       const auto& d = boundary_.connections_[0];
-      const double in_line = boundary_.in_line(g, c, c.length + g.r_d + g.r_s, rng);
+      const double in_line = boundary_.draw_in_line(g, c, c.length + g.r_d + g.r_s, rng);
       f(c.bounces, boundary_.densities(g, c, c.length + g.r_d + g.r_s, in_line),
         boundary_.densities(h, d, d.length + h.r_d + h.r_s, in_line));
     }
