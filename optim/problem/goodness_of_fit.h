@@ -54,6 +54,9 @@ const char* name(FitVerdict verdict);
 
 /// Probability below which a model is rejected: of right ones, one in so many.
 inline constexpr double kRejection = 0.01;
+/// Above, a fit is rejected, too: counts that lie so near to it are no Poisson numbers, or it has not come to rest, and what remains of
+/// backgrounds and gain hides its deviance. Of right ones, one in a million.
+inline constexpr double kMostLikely = 1 - 1e-6;
 
 struct GoodnessOfFit {
   DevianceTest fit;         ///< of the model's light, with those backgrounds that it makes most likely

@@ -118,7 +118,8 @@ std::string fit_report(const std::optional<GoodnessOfFit>& fit) {
     case FitVerdict::explained:
       return fmt::format("  fit: explains the data ({})\n", numbers);
     case FitVerdict::unexplained:
-      return fmt::format("  fit: does not explain the data ({})\n", numbers);
+      return fmt::format("  fit: does not explain the data ({}{})\n", numbers,
+                         test.p_value > kMostLikely ? ": no Poisson numbers, or not at rest" : "");
     case FitVerdict::no_signal:
       break;
   }

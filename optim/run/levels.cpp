@@ -21,6 +21,7 @@
 #include "optim/problem/evidence.h"
 #include "optim/problem/goodness_of_fit.h"
 #include "optim/problem/penalties.h"
+#include "optim/remesh/folds.h"
 #include "optim/remesh/remesh.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/level_log.h"
@@ -68,6 +69,10 @@ constexpr double kLeastFeature = 0.43;
 /// Factor of the albedos that the levels by adam begin with. Borders are drawn back more easily than they are extended, and light that is missing
 /// extends them. By trials with the rabbit (optim/README.md, Dim albedos).
 constexpr double kDimmed = 0.94;
+
+/// By how much evidence changes a weight from level to level, at most. The rule is about fits that have come to rest, and two iterations end
+/// short of that: what is still rough passes for what a weak prior allows (optim/README.md, Smoothing).
+constexpr double kMostChange = 10;
 
 /// A number, or null where it is none.
 double number_or_nan(const YamlValue& value) {
@@ -145,6 +150,7 @@ class Levels {
     next.seed = seed_of(level, experiment_.seed);
     if (remeshed_.remesh.spares_histograms(level)) next.target.histograms = remeshed_.remesh.coarse_histograms;
     if (remeshed_.remesh.steps_by_adam(level)) step_by_adam(remeshed_.remesh, level, next);
+    if (level < remeshed_.remesh.levels) next.output.frames = 0;  // reports show the last level
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
@@ -156,7 +162,10 @@ class Levels {
       const std::vector<double> theta =
           first ? former.parameters().initial() : final_values(before + "/summary.yaml", former.parameters());
       surface = found_surface(former, theta, remeshed_);
-      if (!first) surface = without_small_features(*surface, kLeastFeature * edge_length * edge_length);
+      if (!first) {
+        surface->mesh = unfolded(std::move(surface->mesh));
+        surface = without_small_features(*surface, kLeastFeature * edge_length * edge_length);
+      }
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,
                                  kLeastPart * edge_length * edge_length);
@@ -208,7 +217,8 @@ class Levels {
     if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
     const ProgressStage stage("weighing the smoothing", 1);
     const std::vector<double> factors = evidence_factors(former, former.read_target(folder + "/target.exr"), theta);
-    for (std::size_t i = 0; i < next.size(); ++i) next[i].*weight_by_evidence(next[i]) *= factors[i];
+    for (std::size_t i = 0; i < next.size(); ++i)
+      next[i].*weight_by_evidence(next[i]) *= std::clamp(factors[i], 1 / kMostChange, kMostChange);
   }
 
   void write_level(int level, const Experiment& next, const std::optional<LevelSurface>& surface) const {

@@ -37,6 +37,12 @@ class Fit {
     draw_counts(counts_, {test_seed(90), number, 0});
   }
 
+  /// The means themselves, but for rounding.
+  void round() {
+    for (int p = 0; p < kFitPixels; ++p)
+      for (int g = 0; g < kGates; ++g) counts_.at(p, g, 0) = std::round(background + gain * bump(p, g));
+  }
+
   /// Finds gain and background by Newton's method: of the likelihood's maximum, whose Hessian is J' diag(N / m^2) J.
   void maximise() {
     late = 0;
@@ -216,6 +222,18 @@ TEST(GoodnessOfFit, TellsWhatIsLeft) {
   EXPECT_EQ(found.verdict(), FitVerdict::unexplained);
   EXPECT_LT(found.fit.p_value, 1e-6);
   EXPECT_FALSE(found.lost());
+}
+
+// Rounded means in place of draws: their deviance is far below that of Poisson numbers.
+TEST(GoodnessOfFit, CountsThatScatterTooLittleAreNotExplained) {
+  Fit fit;
+  fit.gain = 150;
+  fit.background = 30;
+  fit.draw(1002);
+  fit.round();
+  const GoodnessOfFit found = fit.judge(1002);
+  EXPECT_GT(found.fit.p_value, kMostLikely);
+  EXPECT_EQ(found.verdict(), FitVerdict::unexplained);
 }
 
 // Counts of light that comes 12 gates late, of which a fit has taken all for background.
