@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/parallel.h"
 #include "optim/problem/count_deviance.h"
 #include "optim/problem/likely_backgrounds.h"
 
@@ -33,13 +34,7 @@ class Judge {
 
   DevianceTest result() const {
     DevianceTest test;
-    Totals all;
-    const double f = model_.image->first;
-    for (int pixel = 0; pixel < counts_.pixels(); ++pixel) {
-      double slopes = 0;  // of T by the image, times the halves' difference: gates of a pixel share their paths
-      for_each(pixel, [&](const Reading& r) { add(r, f, all, slopes); });
-      all.variance += f * (1 - f) * slopes * slopes;
-    }
+    const Totals all = sum_over_pixels();
     const double n = readings_.count(counts_);
     test.degrees_of_freedom = n - unknowns_;
     test.floor = all.floor - taken_;
@@ -58,19 +53,50 @@ class Judge {
     double excess = 0, projected = 0, floor = 0;
     double counted = 0, third = 0;  ///< moments by the counts
     double variance = 0;            ///< by the image's noise
+
+    void operator+=(const Totals& other) {
+      excess += other.excess;
+      projected += other.projected;
+      floor += other.floor;
+      counted += other.counted;
+      third += other.third;
+      variance += other.variance;
+    }
   };
+
+  /// The same for any number of threads.
+  Totals sum_over_pixels() const {
+    constexpr std::size_t kTogether = 16;
+    const std::size_t pixels = counts_.pixels();
+    std::vector<Totals> parts((pixels + kTogether - 1) / kTogether);
+    parallel_ranges(parts.size(), [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pixel = begin * kTogether; pixel < std::min(end * kTogether, pixels); ++pixel)
+        add(static_cast<int>(pixel), parts[pixel / kTogether]);
+    });
+    Totals all;
+    for (const Totals& part : parts) all += part;
+    return all;
+  }
+
+  void add(int pixel, Totals& all) const {
+    const double f = model_.image->first;
+    double slopes = 0;  // of T by the image, times the halves' difference: gates of a pixel share their paths
+    for_each(pixel, [&](const Reading& r) { add(r, f, all, slopes); });
+    all.variance += f * (1 - f) * slopes * slopes;
+  }
 
   void add(const Reading& r, double f, Totals& all, double& slopes) const {
     const DevianceMoments at = law_.moments(r.mean);
-    const double h1 = h(r.first), h2 = h(r.second);
+    const double floor1 = law_.moments(r.first).mean, floor2 = law_.moments(r.second).mean;
+    const double h1 = h(r.first, floor1), h2 = h(r.second, floor2);
     const double e = projected(r, r.mean), slope = r.mean > 0 ? at.covariance / r.mean : 0;
     // q(N) - h(m) - (N - m) L(m), twice.
     const double q = r.count * law_.logarithm(r.count) - law_.linear(r.count);
     const double linear =
         (r.count - r.first) * law_.logarithm(r.second) + (r.count - r.second) * law_.logarithm(r.first);
-    all.excess += 2 * (q - (2 * h(r.mean) - f * h1 - (1 - f) * h2)) - linear;
+    all.excess += 2 * (q - (2 * h(r.mean, at.mean) - f * h1 - (1 - f) * h2)) - linear;
     all.projected += ((r.count - r.first) * projected(r, r.second) + (r.count - r.second) * projected(r, r.first)) / 2;
-    all.floor += 2 * at.mean - f * law_.moments(r.first).mean - (1 - f) * law_.moments(r.second).mean;
+    all.floor += 2 * at.mean - f * floor1 - (1 - f) * floor2;
     all.counted += at.variance - 2 * e * at.covariance + e * e * r.mean;
     all.third += at.third[0] - 3 * e * at.third[1] + 3 * e * e * at.third[2] - e * e * e * r.mean;
     const double d = r.first - r.second;
@@ -137,7 +163,8 @@ class Judge {
         r.background < 0 || r.background >= std::ssize(background_factor_) ? 0 : background_factor_[r.background];
     return (one + light_factor_ * r.light) * law_.weight(mean);
   }
-  double h(double m) const { return law_.moments(m).mean / 2 - law_.linear(m) + m * law_.logarithm(m); }
+  /// `expected`: the mean deviance at m.
+  double h(double m, double expected) const { return expected / 2 - law_.linear(m) + m * law_.logarithm(m); }
 
   const CountModel& model_;
   const GatedImage& counts_;
@@ -147,6 +174,19 @@ class Judge {
   double light_factor_ = 0, taken_ = 0;  ///< taken: from the deviance by what was fitted
   double unknowns_ = 0;
 };
+
+DevianceTest test_background(CountModel model, const GatedImage& counts, const ReadingLoss& loss) {
+  SplitImage image = *model.image;
+  model.other_unknowns = 0;
+  model.background_free.assign(model.background_free.size(), 1);
+  image.difference.data.clear();
+  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
+    for_each_reading(counts, loss.readings, pixel,
+                     [&](std::size_t i) { image.image.data[i] = model.background[pixel]; });
+  model.image = &image;
+  take_likely_backgrounds(model, image, counts, loss);
+  return test_deviance(model, counts, loss);
+}
 
 }  // namespace
 
@@ -183,23 +223,15 @@ FitVerdict GoodnessOfFit::verdict() const {
   return fit.p_value >= kRejection && fit.p_value <= kMostLikely ? FitVerdict::explained : FitVerdict::unexplained;
 }
 
-GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss) {
+GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss,
+                        const std::optional<DevianceTest>& background) {
   GoodnessOfFit result;
   SplitImage image = *model.image;
   CountModel lit = model;
   lit.image = &image;
   take_likely_backgrounds(lit, image, counts, loss);
   result.fit = test_deviance(lit, counts, loss);
-  CountModel dark = model;
-  dark.other_unknowns = 0;
-  dark.background_free.assign(model.background_free.size(), 1);
-  image.difference.data.clear();
-  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
-    for_each_reading(counts, loss.readings, pixel,
-                     [&](std::size_t i) { image.image.data[i] = model.background[pixel]; });
-  dark.image = &image;
-  take_likely_backgrounds(dark, image, counts, loss);
-  result.background = test_deviance(dark, counts, loss);
+  result.background = background ? *background : test_background(model, counts, loss);
   const double k = std::max(1.0, model.other_unknowns);
   result.light_p_value =
       gamma_tail(result.background.deviance - result.fit.deviance, k, std::sqrt(2 * k), std::sqrt(8 / k));

@@ -17,6 +17,7 @@
 // p-values hold where the noise makes a small part of the spread (image_share); more samples are rendered until it does.
 // Probability. T is taken for a gamma variable of its first three moments (Wilson and Hilferty's cube root), which chi^2 is.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "optim/problem/loss.h"
@@ -72,7 +73,9 @@ struct GoodnessOfFit {
   bool lost() const { return !has_light() && background.p_value < kRejection; }
 };
 
-GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss);
+/// `background`: that of an earlier image with the same backgrounds and counts, of which it is the same.
+GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss,
+                        const std::optional<DevianceTest>& background = std::nullopt);
 
 /// Probability that a gamma variable of this mean, standard deviation and skewness (>= 0) exceeds `value`.
 double gamma_tail(double value, double mean, double deviation, double skewness);

@@ -57,7 +57,8 @@ std::vector<char> free_unknowns(const Problem& problem, const std::vector<double
 }
 
 GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
-                        const GatedImage& target, std::optional<double> determined) {
+                        const GatedImage& target, std::optional<double> determined,
+                        const std::optional<DevianceTest>& background) {
   const Scene scene = problem.parameters().apply(theta);
   CountModel model;
   model.image = &image;
@@ -75,7 +76,7 @@ GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta
     for (int pixel = 0; pixel < target.pixels(); ++pixel)
       model.background_unknown.push_back(block.count == 1 ? 0 : background_of(pixel));
   }
-  return judge_fit(model, target, problem.reading_loss(target));
+  return judge_fit(model, target, problem.reading_loss(target), background);
 }
 
 GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
@@ -85,7 +86,7 @@ GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<doubl
   GoodnessOfFit fit = judge_fit(problem, theta, image, target, determined);
   for (int i = 0; i < doublings && problem.scene().capture && fit.fit.image_share > kMostImageShare; ++i) {
     image = mean_of(std::move(image), render_expected(problem, theta, samples << i, i + 1));
-    fit = judge_fit(problem, theta, image, target, determined);
+    fit = judge_fit(problem, theta, image, target, determined, fit.background);
   }
   return fit;
 }

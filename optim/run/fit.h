@@ -22,8 +22,10 @@ int fit_samples(const Problem& problem);
 std::vector<char> free_unknowns(const Problem& problem, const std::vector<double>& theta);
 
 /// `image`: expected counts at theta. `determined`: of the free unknowns, where penalties hold some (determined_unknowns); else all are.
+/// `background`: see judge_fit in goodness_of_fit.h.
 GoodnessOfFit judge_fit(const Problem& problem, const std::vector<double>& theta, const SplitImage& image,
-                        const GatedImage& target, std::optional<double> determined = {});
+                        const GatedImage& target, std::optional<double> determined = {},
+                        const std::optional<DevianceTest>& background = std::nullopt);
 
 /// Most of the deviance's variance that noise of the expected counts may make (DevianceTest::image_share): whatever its law, the
 /// spread is then known to some per cent.
