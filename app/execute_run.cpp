@@ -30,8 +30,7 @@ std::optional<int> execute_run(const std::string& folder, const CommonOptions& c
     spdlog::warn("interrupted; continue with: isochron resume {}", folder);
     return 1;
   }
-  bool plotted = common.no_plots || draw_plots(folder);
-  plotted = (common.no_plots || write_report(folder)) && plotted;
+  const bool plotted = common.no_plots || draw_plots_and_report(folder);
   if (!common.quiet) fmt::print("{}{}", report, files_to_look_at(folder, !common.no_plots && plotted));
   if (status == RunStatus::diverged) {
     spdlog::error("{}: the run diverged; see log.csv and summary.yaml there", folder);

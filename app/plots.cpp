@@ -12,6 +12,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <future>
 #include <string_view>
 #include <vector>
 
@@ -110,16 +111,6 @@ bool draw(const std::string& module, const std::string& folder) {
   return false;
 }
 
-}  // namespace
-
-bool draw_plots(const std::string& folder) {
-  return !first_rank() || draw("isochron.plot", folder);
-}
-
-bool draw_charts(const std::string& folder) {
-  return !first_rank() || draw("isochron.plot_chart", folder);
-}
-
 bool write_report(const std::string& folder) {
   try_final_derivatives(folder);
   if (!first_rank()) return true;
@@ -130,6 +121,22 @@ bool write_report(const std::string& folder) {
   else
     spdlog::warn("report: failed: {}", result.message);
   return false;
+}
+
+}  // namespace
+
+bool draw_plots(const std::string& folder) {
+  return !first_rank() || draw("isochron.plot", folder);
+}
+
+bool draw_charts(const std::string& folder) {
+  return !first_rank() || draw("isochron.plot_chart", folder);
+}
+
+bool draw_plots_and_report(const std::string& folder) {
+  std::future<bool> drawn = std::async(std::launch::async, [&] { return draw_plots(folder); });
+  const bool reported = write_report(folder);
+  return drawn.get() && reported;
 }
 
 void try_final_derivatives(const std::string& folder) {
