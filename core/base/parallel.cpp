@@ -62,8 +62,11 @@ void parallel(int count, const std::function<void(int)>& f) {
 
 void parallel_ranges(std::size_t count, const std::function<void(std::size_t, std::size_t)>& f) {
   constexpr std::size_t kRange = std::size_t{1} << 15;  // long beside what it takes to share one out; not tuned
-  run(static_cast<int>((count + kRange - 1) / kRange),
-      [&](int range) { f(range * kRange, std::min((range + 1) * kRange, count)); });
+  parallel_ranges(count, kRange, f);
+}
+
+void parallel_ranges(std::size_t count, std::size_t range, const std::function<void(std::size_t, std::size_t)>& f) {
+  run(static_cast<int>((count + range - 1) / range), [&](int i) { f(i * range, std::min((i + 1) * range, count)); });
 }
 
 }  // namespace isochron

@@ -16,5 +16,7 @@ void parallel(int count, const std::function<void(int)>& f);
 /// f(begin, end) of ranges that together are [0, count): loops over large arrays, of which each number is for itself. Is no progress and
 /// not stopped, so that no array is left half done.
 void parallel_ranges(std::size_t count, const std::function<void(std::size_t, std::size_t)>& f);
+/// The same in ranges of `range`.
+void parallel_ranges(std::size_t count, std::size_t range, const std::function<void(std::size_t, std::size_t)>& f);
 
 }  // namespace isochron

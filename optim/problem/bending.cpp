@@ -15,7 +15,7 @@ namespace {
 /// Of the root of the surface's area, see bending_forms.
 constexpr double kBorderShare = 0.1;
 
-/// Least height of a triangle over its longest edge, by which it counts, so that curvatures at thinner ones stay finite. Regular triangles have
+/// Triangles thinner than this, height over longest edge, count as if they were this high, so that curvatures stay finite. Regular triangles have
 /// 0.87, those at the pole of a ball in 80 slices 0.08.
 constexpr double kLeastHeight = 0.01;
 
@@ -25,7 +25,7 @@ struct Around {
   double area = 0;
   Vec3 normal;
   std::vector<int> along;  ///< neighbours along the border; empty inside
-  bool is_inside() const { return along.empty() && area > 0; }
+  bool is_inside() const { return along.empty() && length_squared(normal) > 0; }
 };
 
 std::vector<Around> surroundings(const Scene& scene, const Shape& shape) {

@@ -18,6 +18,9 @@ struct Reading {
   int background;             ///< index of the unknown, -1: none
 };
 
+/// That a thread takes at a time.
+constexpr std::size_t kPixelsTogether = 16;
+
 double largest_entry(const GatedImage& image) {
   return image.data.empty() ? 0 : *std::max_element(image.data.begin(), image.data.end());
 }
@@ -66,12 +69,9 @@ class Judge {
 
   /// The same for any number of threads.
   Totals sum_over_pixels() const {
-    constexpr std::size_t kTogether = 16;
-    const std::size_t pixels = counts_.pixels();
-    std::vector<Totals> parts((pixels + kTogether - 1) / kTogether);
-    parallel_ranges(parts.size(), [&](std::size_t begin, std::size_t end) {
-      for (std::size_t pixel = begin * kTogether; pixel < std::min(end * kTogether, pixels); ++pixel)
-        add(static_cast<int>(pixel), parts[pixel / kTogether]);
+    std::vector<Totals> parts(counts_.pixels());
+    parallel_ranges(parts.size(), kPixelsTogether, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pixel = begin; pixel < end; ++pixel) add(static_cast<int>(pixel), parts[pixel]);
     });
     Totals all;
     for (const Totals& part : parts) all += part;

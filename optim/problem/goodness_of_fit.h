@@ -73,7 +73,7 @@ struct GoodnessOfFit {
   bool lost() const { return !has_light() && background.p_value < kRejection; }
 };
 
-/// `background`: that of an earlier image with the same backgrounds and counts, of which it is the same.
+/// `background`: result of an earlier call with the same counts and backgrounds; it does not depend on the light.
 GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss,
                         const std::optional<DevianceTest>& background = std::nullopt);
 

@@ -52,8 +52,7 @@ Mesh unfolded(Mesh mesh) {
     std::vector<Middle> middles(mesh.positions.size());
     for (const Edge& edge : edges)
       for (int k = 0; k < 2; ++k)
-        if (const int v = edge.vertex[k]; moves[v] && (!on_border[v] || is_border(edge)))
-          middles[v].add(mesh.positions[edge.vertex[1 - k]]);
+        if (const int v = edge.vertex[k]; moves[v] && !on_border[v]) middles[v].add(mesh.positions[edge.vertex[1 - k]]);
     for (std::size_t v = 0; v < middles.size(); ++v)
       if (middles[v].count > 0) mesh.positions[v] = middles[v].sum / middles[v].count;
   }

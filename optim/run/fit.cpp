@@ -93,8 +93,8 @@ GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<doubl
 
 bool left_its_data(const GoodnessOfFit& fit, const Checkpoint& state, const LogRow& last) {
   const double noise = std::hypot(last.loss_noise, state.loss_noise_initial);
-  return fit.lost() || (fit.verdict() == FitVerdict::unexplained && state.iteration > 0 &&
-                        last.loss > state.loss_initial + 3 * noise);
+  return fit.lost() || (fit.verdict() == FitVerdict::unexplained && fit.fit.p_value < kRejection &&
+                        state.iteration > 0 && last.loss > state.loss_initial + 3 * noise);
 }
 
 std::string fit_yaml(const std::optional<GoodnessOfFit>& fit) {

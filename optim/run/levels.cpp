@@ -70,8 +70,8 @@ constexpr double kLeastFeature = 0.43;
 /// extends them. By trials with the rabbit (optim/README.md, Dim albedos).
 constexpr double kDimmed = 0.94;
 
-/// By how much evidence changes a weight from level to level, at most. The rule is about fits that have come to rest, and two iterations end
-/// short of that: what is still rough passes for what a weak prior allows (optim/README.md, Smoothing).
+/// By how much evidence changes a weight from level to level, at most. Its rule holds where a fit has come to rest. After two iterations a surface
+/// is still rough, which evidence would take for its nature (optim/README.md, Smoothing).
 constexpr double kMostChange = 10;
 
 /// A number, or null where it is none.
@@ -150,7 +150,6 @@ class Levels {
     next.seed = seed_of(level, experiment_.seed);
     if (remeshed_.remesh.spares_histograms(level)) next.target.histograms = remeshed_.remesh.coarse_histograms;
     if (remeshed_.remesh.steps_by_adam(level)) step_by_adam(remeshed_.remesh, level, next);
-    if (level < remeshed_.remesh.levels) next.output.frames = 0;  // reports show the last level
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};

@@ -142,7 +142,7 @@ TEST(Bending, OfADiscsBorderIsTwicePiToTheThreeHalves) {
 }
 
 /// A vertex of a plane that comes close to its neighbour, a little above it, makes triangles between them slivers. Below a hundredth of height
-/// over length what they add grows no more, and it is finite where they have no area.
+/// over length what they add grows no more.
 TEST(Variation, OfSliversIsBounded) {
   const auto energy_at = [](double part) {
     Mesh mesh = sheet(8, 0);

@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
+#include "core/base/parallel.h"
 #include "optim/problem/count_deviance.h"
 #include "optim/problem/likely_backgrounds.h"
 #include "optim/problem/photon_noise.h"
@@ -63,7 +65,7 @@ class Fit {
     }
   }
 
-  GoodnessOfFit judge(std::uint32_t number) const {
+  GoodnessOfFit judge(std::uint32_t number, const std::optional<DevianceTest>& dark = std::nullopt) const {
     GatedImage halves[] = {counts_, counts_};
     for (int h : {0, 1})
       for (int p = 0; p < kFitPixels; ++p)
@@ -75,7 +77,7 @@ class Fit {
     const SplitImage image = join_halves(halves[0], 1, halves[1], 1);
     const CountModel model{
         &image, std::vector<double>(kFitPixels, background), std::vector<int>(kFitPixels, 0), {1}, 1};
-    return judge_fit(model, counts_, loss_of_counts());
+    return judge_fit(model, counts_, loss_of_counts(), dark);
   }
 
   const GatedImage& counts() const { return counts_; }
@@ -222,6 +224,25 @@ TEST(GoodnessOfFit, TellsWhatIsLeft) {
   EXPECT_EQ(found.verdict(), FitVerdict::unexplained);
   EXPECT_LT(found.fit.p_value, 1e-6);
   EXPECT_FALSE(found.lost());
+}
+
+// The same bits for any number of threads, and with the test of background from another image.
+TEST(GoodnessOfFit, DependsOnNoThreads) {
+  Fit fit;
+  fit.draw(1003);
+  fit.maximise();
+  set_thread_count(1);
+  const GoodnessOfFit alone = fit.judge(1003);
+  set_thread_count(4);
+  const GoodnessOfFit together = fit.judge(1003), later = fit.judge(1003, fit.judge(1004).background);
+  set_thread_count(0);
+  for (const GoodnessOfFit& other : {together, later}) {
+    EXPECT_EQ(other.fit.deviance, alone.fit.deviance);
+    EXPECT_EQ(other.fit.spread, alone.fit.spread);
+    EXPECT_EQ(other.fit.p_value, alone.fit.p_value);
+    EXPECT_NEAR(other.light_p_value, alone.light_p_value, 1e-9);
+    EXPECT_EQ(other.verdict(), alone.verdict());
+  }
 }
 
 // Rounded means in place of draws: their deviance is far below that of Poisson numbers.
