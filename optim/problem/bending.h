@@ -23,8 +23,8 @@ struct LinearForm {
 /// which has no unit: 16 pi for any sphere, 0 for any plane, however uneven its mesh. Of each vertex of the field on a border: the
 /// border's curvature as a vector, so that the sum of squares is the integral of its square along the border times a tenth of the root
 /// of the surface's area, without a unit, too: 0.2 pi^1.5 for any disc. With the whole root borders of thin parts are drawn back
-/// (optim/README.md, Bending). Angles, areas, lengths and normals are those at theta, where the forms are exact but
-/// for triangles a hundred times longer than high.
+/// (optim/README.md, Bending). Angles, areas, lengths and normals are those at theta, where the forms are exact, but for
+/// triangles that are more than a hundred times longer than high.
 std::vector<LinearForm> bending_forms(const Parameters& parameters, const Parameters::VertexField& field,
                                       const std::vector<double>& theta);
 

@@ -220,7 +220,7 @@ const char* name(FitVerdict verdict) {
 
 FitVerdict GoodnessOfFit::verdict() const {
   if (!has_light() && background.p_value >= kRejection) return FitVerdict::no_signal;
-  return fit.p_value >= kRejection && fit.p_value <= kMostLikely ? FitVerdict::explained : FitVerdict::unexplained;
+  return fit.is_rejected() ? FitVerdict::unexplained : FitVerdict::explained;
 }
 
 GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss,

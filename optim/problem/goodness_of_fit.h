@@ -35,6 +35,11 @@ struct CountModel {
   double other_unknowns = 0;
 };
 
+/// Probability below which a model is rejected: of right ones, one in so many.
+inline constexpr double kRejection = 0.01;
+/// Above, a fit is rejected, too: of right ones, one in a million.
+inline constexpr double kMostLikely = 1 - 1e-6;
+
 struct DevianceTest {
   double deviance = 0;
   double floor = 0;               ///< its expectation if the counts are Poisson numbers of the model's means
@@ -42,6 +47,11 @@ struct DevianceTest {
   double spread = 0;              ///< standard deviation of deviance - floor, both noises included
   double p_value = 1;             ///< of a deviance as large as this or larger
   double image_share = 0;         ///< fraction of spread^2 that the image's noise makes
+
+  /// The counts are nearer to the model than Poisson numbers are: they are none, or gain and background have not come to rest, and the
+  /// correction for them hides the deviance.
+  bool is_too_near() const { return p_value > kMostLikely; }
+  bool is_rejected() const { return !(p_value >= kRejection) || is_too_near(); }
 };
 
 /// Whether the readings that count are whole numbers, as Poisson numbers are: scaled or corrected ones are no counts.
@@ -52,12 +62,6 @@ DevianceTest test_deviance(const CountModel& model, const GatedImage& counts, co
 
 enum class FitVerdict { explained, unexplained, no_signal };
 const char* name(FitVerdict verdict);
-
-/// Probability below which a model is rejected: of right ones, one in so many.
-inline constexpr double kRejection = 0.01;
-/// Above, a fit is rejected, too: counts that lie so near to it are no Poisson numbers, or it has not come to rest, and what remains of
-/// backgrounds and gain hides its deviance. Of right ones, one in a million.
-inline constexpr double kMostLikely = 1 - 1e-6;
 
 struct GoodnessOfFit {
   DevianceTest fit;         ///< of the model's light, with those backgrounds that it makes most likely

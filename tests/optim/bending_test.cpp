@@ -159,6 +159,20 @@ TEST(Variation, OfSliversIsBounded) {
   EXPECT_NEAR(energy_at(0) / thin, 1, 0.05);
 }
 
+/// Triangles without area, and a vertex that has no other: forms are finite.
+TEST(Variation, OfTrianglesWithoutAreaIsFinite) {
+  Mesh mesh = sheet(8, 0);
+  const int middle = static_cast<int>(mesh.positions.size()) / 2;
+  for (const int neighbour : {middle + 1, middle - 1, middle + 10, middle - 10})
+    mesh.positions[neighbour] = mesh.positions[middle] + Vec3{0.01 * (neighbour - middle), 0, 0};
+  for (const int neighbour : {middle + 9, middle - 9}) mesh.positions[neighbour] = mesh.positions[middle];
+  const auto plane = surface(mesh, VertexDirection::free);
+  const Parameters& parameters = *plane->parameters;
+  const Parameters::VertexField field = parameters.vertex_field(parameters.blocks()[0]);
+  for (const auto& forms : {bending_forms, variation_forms, tangential_forms})
+    EXPECT_TRUE(std::isfinite(energy(forms(parameters, field, parameters.initial()), parameters.initial())));
+}
+
 /// z = a sin(k x): the curvature is a k^2 sin(k x), its square's integral over whole waves a^2 k^4 / 2. The direction is 2 long.
 /// Single vertices of uneven triangles see curvature that is not there, which adds to the sum of squares: 1.6 % here, up to 30 % where
 /// triangles are uneven by 0.3.

@@ -1,11 +1,15 @@
 // Runs in levels: what is carried over, and what happens between levels.
 #include "optim/run/levels.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
@@ -186,6 +190,40 @@ TEST_F(LevelsTest, PartsThatShrankToNothingAreLeftOut) {
   EXPECT_NEAR(widest("2"), 1, 1e-12);
   EXPECT_EQ(load_experiment(folder_.file("out/levels/2/experiment.yaml")).parameters[1].initial.size(),
             found("out/levels/2").positions.size());
+}
+
+/// Two vertices beyond their neighbours, one above them and one below: remeshing would leave such a fold as it is, as it passes through the
+/// sheet. The second level begins without it.
+TEST_F(LevelsTest, BeginWithoutFolds) {
+  std::string text = sheet(12, flat);
+  for (const auto& [y, z] : {std::pair{"0.000000", "0.03"}, {"0.166667", "-0.03"}})
+    text = replaced(text, fmt::format("v 0.000000 {} 0.000000\n", y), fmt::format("v 0.283333 {} {}\n", y, z));
+  folder_.write("flat.obj", text);
+  Experiment two =
+      load_experiment(experiment("flat", "remesh: {levels: 2, coarse_levels: 2}, target: 0", "{samples: 4}"));
+  two.optimizer.iterations = 0;
+  start_run(two, options());
+  const auto turned_over = [&](const std::string& level) {
+    const Mesh mesh = found("out/levels/" + level);
+    return std::ranges::count_if(mesh.faces, [&](const std::array<int, 3>& f) {
+      const Vec3& a = mesh.positions[f[0]];
+      return cross(mesh.positions[f[1]] - a, mesh.positions[f[2]] - a).z < 0;
+    });
+  };
+  EXPECT_GT(turned_over("1"), 0);
+  EXPECT_EQ(turned_over("2"), 0);
+}
+
+/// The truth has one albedo, so that the data of a level determine far more than ten unknowns for each nat of the penalty.
+TEST_F(LevelsTest, EvidenceChangesAWeightByTenAtMost) {
+  write_target();
+  const std::string more =
+      "  - {name: paint, type: albedo, per: vertex, shape: hill, initial: 0.5, smoothing: {slopes: 1e-12, evidence: "
+      "true}}\n"
+      "loss: {kind: poisson}\n";
+  start_run(load_experiment(experiment("hill", "remesh: {levels: 2, edge_length: 0.3}", "{images: hill.exr}", more)),
+            options());
+  EXPECT_NEAR(load_experiment(folder_.file("out/levels/2/experiment.yaml")).parameters[1].slopes, 1e-11, 1e-17);
 }
 
 TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {

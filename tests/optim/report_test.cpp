@@ -164,6 +164,8 @@ TEST_F(Report, SaysWhetherTheDataAreExplained) {
       std::string::npos)
       << screen(fit_of(0.25, 0, 0));
   EXPECT_NE(screen(fit_of(1e-4, 0, 0)).find("  fit: does not explain the data ("), std::string::npos);
+  EXPECT_EQ(screen(fit_of(1e-4, 0, 0)).find("no Poisson numbers"), std::string::npos);
+  EXPECT_NE(screen(fit_of(1, 0, 0)).find("p = 1: no Poisson numbers, or not at rest)\n"), std::string::npos);
   EXPECT_NE(screen(fit_of(1e-4, 0.5, 0)).find("  fit: has lost the light of the data ("), std::string::npos);
   EXPECT_NE(screen(fit_of(0.25, 0.5, 0.5)).find("  fit: no signal, "), std::string::npos);
   const std::string summary = summary_yaml({}, state_, last_, parameters, {}, {}, fit_of(1e-4, 0, 0));
@@ -180,6 +182,7 @@ TEST_F(Report, ARunLeftItsDataWhereItsLightIsGoneOrItIsWorseThanItsStart) {
   last_.loss = state_.loss_initial + 3.1 * std::hypot(last_.loss_noise, state_.loss_noise_initial);
   EXPECT_TRUE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));
   EXPECT_FALSE(left_its_data(fit_of(0.25, 0, 0), state_, last_));
+  EXPECT_FALSE(left_its_data(fit_of(1, 0, 0), state_, last_)) << "too near is no worse than before";
   last_.loss = state_.loss_initial + 2.9 * std::hypot(last_.loss_noise, state_.loss_noise_initial);
   EXPECT_FALSE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));
 }

@@ -159,6 +159,13 @@ class ReportTest(unittest.TestCase):
         self.assertIn("0 of 20 iterations so far", page.words)
         self.assertIn("±", page.words)
 
+    def test_a_fit_that_is_too_near(self):
+        write_run(self.folder)
+        with open(self.folder / "summary.yaml", "a") as summary:
+            summary.write("fit: {deviance: 800, degrees_of_freedom: 1000, floor: 1100, p_value: 1, verdict: unexplained}\n")
+        self.assertIn("The fit does not explain the data: deviance 800, expected 1100, p = 1: no Poisson numbers, or not at rest.",
+                      self.page().words)
+
     def test_unknowns_at_bounds(self):
         write_run(self.folder)
         self.assertNotIn("bound", self.page().words)
@@ -168,6 +175,7 @@ class ReportTest(unittest.TestCase):
             summary.write("fit: {deviance: 1234.5, degrees_of_freedom: 1000, floor: 1100, p_value: 0.001, verdict: unexplained}\n")
         words = self.page().words
         self.assertIn("The fit does not explain the data: deviance 1234.5, expected 1100, p = 0.001.", words)
+        self.assertNotIn("no Poisson numbers", words)
         self.assertIn("height ended at its lower bound −0.5", words)
         self.assertIn("colour: 2 of 3 ended at their upper bound 1 (0, 2)", words)
 

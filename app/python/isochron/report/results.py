@@ -294,9 +294,11 @@ def fit(run):
     found = None if run.going else run.whole.get("fit") or run.summary.get("fit")
     if not isinstance(found, dict) or found.get("verdict") not in FIT:
         return ""
-    too_near = ": no Poisson numbers, or not at rest" if found["verdict"] == "unexplained" and found["p_value"] > 0.5 else ""
+    # A fit is rejected at either end of p.
+    too_near = found["verdict"] == "unexplained" and found["p_value"] > 0.5
+    why = ": no Poisson numbers, or not at rest" if too_near else ""
     return element("p", f"{FIT[found['verdict']]}: deviance {number(found['deviance'], 6)}, expected "
-                   f"{number(found['floor'], 6)}, p = {number(found['p_value'], 2)}{too_near}.", class_="fit")
+                   f"{number(found['floor'], 6)}, p = {number(found['p_value'], 2)}{why}.", class_="fit")
 
 
 def bounds(run):
