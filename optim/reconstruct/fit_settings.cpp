@@ -14,11 +14,11 @@ namespace isochron {
 namespace {
 
 /// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 438 for 300 s. It takes some 160 s.
-constexpr double kLevelSamplesPerSecond = 60000;
+constexpr double kLevelSamplesPerSecond = 54000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// The first finds the outline and the second the albedo; six of adam move borders, the last of these with half the edges, as a rim that
 /// turns away is finer than the others' triangles; the last has all histograms.
-constexpr int kCoarseLevels = 9, kFineFrom = 8;
+constexpr int kCoarseLevels = 8, kFineFrom = 8;
 /// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
