@@ -1,15 +1,32 @@
 #include "core/films/sinks.h"
 
+#include <algorithm>
 #include <iterator>
 #include <numeric>
 
 namespace isochron {
+namespace {
+
+/// f(0), f(1) ... for all gates of a run. A number of turns that the compiler knows makes them one vector.
+template <class F>
+void for_each_of(const GateSet::Run& run, F&& f) {
+  if (run.size == GateSet::kRun) {
+    for (int k = 0; k < GateSet::kRun; ++k) f(k);
+  } else {
+    for (int k = 0; k < run.size; ++k) f(k);
+  }
+}
+
+/// What a run of gates makes of so many adjoints is summed side by side.
+constexpr int kAdjointsTogether = 4;
+
+}  // namespace
 
 void PrimalSink::add(int pixel, const Rgb& value, double length, GateUse) {
   if (film_.channels() == 1) {
     gates_.for_each_run(length, [&](const GateSet::Run& run) {
       double* out = film_.at(pixel, run.first, run.size);
-      for (int k = 0; k < run.size; ++k) out[k] += run.value[k] * value.r;
+      for_each_of(run, [&](int k) { out[k] += run.value[k] * value.r; });
     });
     return;
   }
@@ -50,6 +67,17 @@ void ColumnRates::for_each_column(int dof, F&& f) {
 }
 
 void TangentSink::add(int pixel, const Rgb& value, double length, GateUse use) {
+  if (films_[0].channels() == 1) {
+    gates_.for_each_run(length, [&](const GateSet::Run& run) {
+      for (int column : rates_.touched()) {
+        const double log_f = value.r * rates_[column].log_f[0],
+                     along = value.r * slope_factor(use) * rates_[column].length;
+        double* out = films_[column].at(pixel, run.first, run.size);
+        for_each_of(run, [&](int k) { out[k] += log_f * run.value[k] + along * run.slope[k]; });
+      }
+    });
+    return;
+  }
   gates_.for_each_derivative(length, [&](int g, double w, double slope) {
     for (int column : rates_.touched())
       splat(column, pixel, g, value, w, slope_factor(use) * slope * rates_[column].length);
@@ -67,68 +95,73 @@ void TangentSink::splat(int column, int pixel, int gate, const Rgb& value, doubl
 }
 
 void AdjointSink::add(int pixel, const Rgb& value, double length, GateUse use) {
-  for (std::size_t a = 0; a < adjoints_.size(); ++a) add(a, pixel, value, length, use);
+  const std::size_t count = adjoints_.size();
+  std::size_t first = 0;
+  for (; first + kAdjointsTogether <= count; first += kAdjointsTogether)
+    add<kAdjointsTogether>(first, pixel, value, length, use);
+  for (; first < count; ++first) add<1>(first, pixel, value, length, use);
 }
 
-void AdjointSink::add(std::size_t which, int pixel, const Rgb& value, double length, GateUse use) {
-  const GatedImage& adjoint = adjoints_[which];
+template <int N>
+void AdjointSink::add(std::size_t first, int pixel, const Rgb& value, double length, GateUse use) {
   // All gates collapse into one function of length: a(l) = sum_g adjoint_g W_g(l), and its slope.
-  Rgb weight;
-  double slope_weight = 0;
-  if (adjoint.channels == 1) {
-    double values[GateSet::kRun] = {}, slopes[GateSet::kRun] = {};
+  Pull pulls[N];
+  const GatedImage* adjoints = &adjoints_[first];
+  if (adjoints->channels == 1) {
+    double values[N][GateSet::kRun] = {}, slopes[N][GateSet::kRun] = {};
     gates_.for_each_run(length, [&](const GateSet::Run& run) {
-      const double* a = &adjoint.data[adjoint.index(pixel, run.first)];
-      const auto accumulate = [&](int count) {
-        for (int k = 0; k < count; ++k) {
-          values[k] += a[k] * run.value[k];
-          slopes[k] += a[k] * run.slope[k];
-        }
-      };
-      // A number of turns that the compiler knows makes them one vector.
-      if (run.size == GateSet::kRun) {
-        accumulate(GateSet::kRun);
-      } else {
-        accumulate(run.size);
+      const std::size_t begin = adjoints->index(pixel, run.first);
+      for (int i = 0; i < N; ++i) {
+        const double* a = &adjoints[i].data[begin];
+        for_each_of(run, [&](int k) {
+          values[i][k] += a[k] * run.value[k];
+          slopes[i][k] += a[k] * run.slope[k];
+        });
       }
     });
-    weight.r = std::accumulate(values, std::end(values), 0.0) * value.r;
-    slope_weight = std::accumulate(slopes, std::end(slopes), 0.0) * value.r;
+    for (int i = 0; i < N; ++i) {
+      pulls[i].weight.r = std::accumulate(values[i], std::end(values[i]), 0.0) * value.r;
+      pulls[i].slope = slope_factor(use) * std::accumulate(slopes[i], std::end(slopes[i]), 0.0) * value.r;
+    }
   } else {
     gates_.for_each_derivative(length, [&](int g, double w, double slope) {
-      const double* a = &adjoint.data[adjoint.index(pixel, g)];
-      for (int c = 0; c < adjoint.channels; ++c) {
-        weight[c] += a[c] * w * value[c];
-        slope_weight += a[c] * slope * value[c];
+      for (int i = 0; i < N; ++i) {
+        const double* a = &adjoints[i].data[adjoints->index(pixel, g)];
+        for (int c = 0; c < adjoints->channels; ++c) {
+          pulls[i].weight[c] += a[c] * w * value[c];
+          pulls[i].slope += slope_factor(use) * a[c] * slope * value[c];
+        }
       }
     });
   }
-  scatter(which, weight, slope_factor(use) * slope_weight);
+  scatter(first, pulls);
 }
 
 void AdjointSink::add_length_rate(int pixel, int gate, const Rgb& value) {
   for (std::size_t which = 0; which < adjoints_.size(); ++which) {
     const GatedImage& adjoint = adjoints_[which];
     const double* a = &adjoint.data[adjoint.index(pixel, gate)];
-    double slope_weight = 0;
-    for (int c = 0; c < adjoint.channels; ++c) slope_weight += a[c] * value[c];
-    scatter(which, {}, slope_weight);
+    Pull pull[1];
+    for (int c = 0; c < adjoint.channels; ++c) pull[0].slope += a[c] * value[c];
+    scatter(which, pull);
   }
 }
 
-void AdjointSink::scatter(std::size_t adjoint, const Rgb& weight, double slope_weight) {
-  const auto add = [&](int dof, double value) {
-    gradient_.add(static_cast<std::size_t>(dof) * adjoints_.size() + adjoint, value);
+template <int N>
+void AdjointSink::scatter(std::size_t first, const Pull (&pulls)[N]) {
+  if (std::all_of(pulls, std::end(pulls), [](const Pull& pull) { return pull.slope == 0 && pull.weight.is_black(); }))
+    return;
+  double sums[N];
+  for (int i = 0; i < N; ++i) sums[i] = pulls[i].weight.r + pulls[i].weight.g + pulls[i].weight.b;
+  const auto add = [&](int dof, int channel, double log_f, double length) {
+    if (!basis_.differentiates(dof)) return;
+    double* out = gradient_.at(static_cast<std::size_t>(dof) * adjoints_.size() + first, N);
+    for (int i = 0; i < N; ++i)
+      out[i] += (channel < 0 ? sums[i] : pulls[i].weight[channel]) * log_f + pulls[i].slope * length;
   };
-  const double sum = weight.r + weight.g + weight.b;
-  if (sum == 0 && slope_weight == 0 && weight.is_black()) return;
   for (const VertexGradient& v : differential_->vertices)
-    for (int axis = 0; axis < 3; ++axis)
-      if (const int dof = layout_.vertex(v.vertex, axis); basis_.differentiates(dof))
-        add(dof, (v.channel < 0 ? sum : weight[v.channel]) * v.log_f[axis] + slope_weight * v.length[axis]);
-  for (const ScalarGradient& s : differential_->scalars)
-    if (basis_.differentiates(s.dof))
-      add(s.dof, (s.channel < 0 ? sum : weight[s.channel]) * s.log_f + slope_weight * s.length);
+    for (int axis = 0; axis < 3; ++axis) add(layout_.vertex(v.vertex, axis), v.channel, v.log_f[axis], v.length[axis]);
+  for (const ScalarGradient& s : differential_->scalars) add(s.dof, s.channel, s.log_f, s.length);
 }
 
 }  // namespace isochron

@@ -122,8 +122,17 @@ class AdjointSink final : public Sink {
   void add_length_rate(int pixel, int gate, const Rgb& value) override;
 
  private:
-  void add(std::size_t adjoint, int pixel, const Rgb& value, double length, GateUse use);
-  void scatter(std::size_t adjoint, const Rgb& weight, double slope_weight);
+  /// What an adjoint makes of a contribution: per unit of d ln F, by channel, and of dl.
+  struct Pull {
+    Rgb weight;
+    double slope = 0;
+  };
+
+  /// Of N adjoints from `first` on, together.
+  template <int N>
+  void add(std::size_t first, int pixel, const Rgb& value, double length, GateUse use);
+  template <int N>
+  void scatter(std::size_t first, const Pull (&pulls)[N]);
 
   const GateSet& gates_;
   const DofLayout layout_;
