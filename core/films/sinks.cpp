@@ -17,7 +17,7 @@ void for_each_of(const GateSet::Run& run, F&& f) {
   }
 }
 
-/// What a run of gates makes of so many adjoints is summed side by side.
+/// What so many adjoints make of a run of gates is summed side by side.
 constexpr int kAdjointsTogether = 4;
 
 }  // namespace

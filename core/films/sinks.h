@@ -91,7 +91,7 @@ class ColumnRates {
 
 class TangentSink final : public Sink {
  public:
-  /// One film per column.
+  /// One film per column, of which there is one at least.
   TangentSink(const GateSet& gates, const DofLayout& layout, const TangentBasis& basis, std::span<const Film> films)
       : gates_(gates), films_(films), rates_(layout, basis) {}
 

@@ -241,16 +241,13 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "that may follow, as long as the fit of a capture's counts is `unexplained`",
                 {.unset = spec.remesh.more_levels == 0});
     inner.value("edge_length", field::positive(spec.remesh.edge_length),
-                "of the first level's triangles; those of each further level have half of it",
+                "of the first level's triangles; those of each further level that is not coarse have half of it",
                 {.unit = "scene units", .unset = spec.remesh.edge_length == 0, .otherwise = "the mesh as it is"});
     inner.value(
         "coarse_levels", field::integer(spec.remesh.coarse_levels, 1, kMostLevels),
         "number of levels with the first one's edge length, so that a surface that moves far keeps triangles of "
-        "even size",
+        "even size; with `adam` the last two of them have half the edges already",
         {.unset = spec.remesh.coarse_levels == 1});
-    inner.value("fine_from", field::integer(spec.remesh.fine_from, 0, kMostLevels),
-                "of the coarse levels, the first that has half the edges already; 0: none",
-                {.unset = spec.remesh.fine_from == 0});
     const auto outline = [&spec](Keys& keys_of_outline) {
       keys_of_outline.value(
           "albedo", field::number(spec.remesh.outline, {.low = 0, .high = 1, .low_open = true, .high_open = true}),
@@ -268,13 +265,13 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.value(
         "coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
         "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
-        "evenly, those by adam to half as many (from `fine_from` on to as many), others in each iteration; 0: to all",
+        "evenly, those by adam to half as many, others in each iteration; 0: to all",
         {.unset = spec.remesh.coarse_histograms == 0});
     const auto adam = [&spec](Keys& keys_of_adam) {
       keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
-                         "of each such level", {.required = true});
+                         "of the last such level; the others have six tenths of it", {.required = true});
       keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate),
-                         "see `optimizer`; from `fine_from` on half of it",
+                         "see `optimizer`; half of it in the last such level",
                          {.required = true, .unit = "the parameter's `scale`"});
       keys_of_adam.value("slopes", field::non_negative(spec.remesh.adam_slopes),
                          "weight of the offsets' slopes in these levels, in place of their own `smoothing`",
@@ -282,9 +279,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     };
     inner.map(
         "adam", adam,
-        "coarse levels are fitted by adam, with steps that shrink towards the end of each, so that borders go all of "
-        "their way, and with twice `samples.interior`. The first (with `outline` two) and the last are not. Albedos by "
-        "vertex without `lower` begin 6 % lower",
+        "coarse levels are fitted by adam, with steps that shrink towards the end of the last of them, so that borders "
+        "go all of their way, and with twice `samples.interior`. The first coarse level (with `outline` two) and the "
+        "last are not. Albedos by vertex without `lower` begin 6 % lower",
         {.unset = spec.remesh.adam_iterations == 0});
   };
   keys.map("remesh", remesh,

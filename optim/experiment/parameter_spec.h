@@ -41,21 +41,21 @@ struct Selection {
 struct RemeshSpec {
   int levels = 0;          ///< 0: the mesh stays as it is
   int more_levels = 0;     ///< that may follow, as long as the fit of counts is rejected (FitVerdict::unexplained)
-  int coarse_levels = 1;   ///< so many have the first one's edge length, but for those from `fine_from` on; at most all
-  int fine_from = 0;       ///< the first with half of that length; 0: the first after the coarse ones
+  int coarse_levels = 1;   ///< so many have the first one's edge length, with adam but for the last two; at most all
   double edge_length = 0;  ///< of the first level, scene units; 0: that of the loaded mesh, which is used as it is
   /// Of albedos by vertex: the surface ends where the first level finds less than this share of their mean (within_outline). 0: where it is.
   double outline = 0;
   double outline_slopes = 0;  ///< weight of their slopes in that level, in place of ParameterSpec::slopes
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
-  int adam_iterations = 0;    ///< of levels that adam fits, see steps_by_adam; 0: none
+  int adam_iterations = 0;    ///< of the last level that adam fits, see steps_by_adam; 0: there is none
   double adam_rate = 0;       ///< their OptimizerSpec::learning_rate
   double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 
   int most_levels() const { return levels + more_levels; }
-  /// How often edges are halved before level `level`.
+  /// How often edges are halved before level `level`. With adam its last level, the last but one of the coarse ones, is the first to have half
+  /// of them.
   int halvings(int level) const {
-    return std::max({0, level - coarse_levels, fine_from > 0 && level >= fine_from ? 1 : 0});
+    return std::max({0, level - coarse_levels, adam_iterations > 0 && level >= coarse_levels - 1 ? 1 : 0});
   }
   bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
   /// Whether level `level` comes before the last coarse one, which evidence is taken from.

@@ -13,12 +13,11 @@
 namespace isochron {
 namespace {
 
-/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in ten levels, has 438 for 300 s. It takes some 160 s.
-constexpr double kLevelSamplesPerSecond = 54000;
+/// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in eleven levels, has 398 for 300 s.
+constexpr double kLevelSamplesPerSecond = 60000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// The first finds the outline and the second the albedo; six of adam move borders, the last of these with half the edges, as a rim that
-/// turns away is finer than the others' triangles; the last has all histograms.
-constexpr int kCoarseLevels = 8, kFineFrom = 8;
+/// The first finds the outline and the second the albedo; seven of adam move borders; the last has all histograms.
+constexpr int kCoarseLevels = 10;
 /// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
@@ -31,8 +30,8 @@ constexpr double kFreeSlope = 0.5;
 /// Expected change of the first level's albedos from vertex to vertex: half of what they are on average, so that both dark and bright
 /// neighbours are likely.
 constexpr double kOutlineChange = 0.5 * 0.25;
-/// Of an image in the coarse levels, per second of the whole: of the rabbit 1197 histograms with 438 each (optim/README.md, Histograms).
-constexpr double kCoarseSamplesPerSecond = 1024 * 512 / 300.0;
+/// Of an image in the coarse levels, per second of the whole: of the rabbit 1206 histograms with 398 each (optim/README.md, Histograms).
+constexpr double kCoarseSamplesPerSecond = 1600;
 constexpr int kLeastCoarseHistograms = 256;
 /// Beyond so many photons of a histogram for each sample the noise of the images is far above theirs, and counts say no more: priors weigh as
 /// if there were no more (optim/README.md, Bright captures).
@@ -112,7 +111,6 @@ FitSettings fit_settings(const Mesh& start, double resolution, int histograms, d
   const double area = surface_area(start);
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
   settings.levels = settings.coarse_levels = kCoarseLevels;
-  settings.fine_from = kFineFrom;
   double edge = settings.edge_length / 2;
   const auto fits = [&] { return vertices_of(area, edge) <= kMostVertices; };
   for (; edge > std::numbers::sqrt2 / 4 * resolution && fits(); edge /= 2) ++settings.levels;

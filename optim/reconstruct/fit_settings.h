@@ -18,12 +18,12 @@ struct TimeWindow {
 /// Lengths in metres. The defaults make a valid experiment of nothing.
 struct FitSettings {
   int samples = 16;  ///< of images, per histogram
-  int levels = 1, coarse_levels = 1, fine_from = 0;
+  int levels = 1, coarse_levels = 1;
   int more_levels = 0;     ///< while counts are not explained
   double edge_length = 1;  ///< of the first level
   double bending = 1;  ///< and first variation: nats per unit of curvature (a sphere has 50, the border of a disc 1.1)
   int coarse_histograms = 0;  ///< that coarse levels are fitted to; 0: all
-  /// Of each level by adam, and its largest step in edge lengths. From a silhouette of 0.85, one level of 150 comes to 0.90 with steps of 0.022, to
+  /// Of the last level by adam, and the largest step in edge lengths. From a silhouette of 0.85, one level of 150 comes to 0.90 with steps of 0.022, to
   /// 0.91 with 0.044 and 0.088, where more that is not there is left.
   int adam_iterations = 120;
   double adam_rate = 0.044;

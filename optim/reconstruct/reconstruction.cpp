@@ -64,7 +64,7 @@ parameters:
     initial: 0
     scale: {edge:.4g}   # so that steps of adam are shares of the edges
     smoothing: {{bending: {bending}, variation: {bending}, slopes: {motion:.4g}, evidence: true}}
-    remesh: {{levels: {levels}, more_levels: {more}, coarse_levels: {coarse}, fine_from: {fine}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
+    remesh: {{levels: {levels}, more_levels: {more}, coarse_levels: {coarse}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
   - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo
     shape: surface
@@ -85,7 +85,7 @@ output: {{histogram_samples: {primal}}}
       fmt::arg("name", name_of(spec.capture)), fmt::arg("seed", spec.seed),
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),
       fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("more", set.more_levels),
-      fmt::arg("coarse", set.coarse_levels), fmt::arg("fine", set.fine_from),
+      fmt::arg("coarse", set.coarse_levels),
       fmt::arg("histograms", set.coarse_histograms), fmt::arg("steps", set.adam_iterations),
       fmt::arg("rate", set.adam_rate), fmt::arg("free", set.adam_motion), fmt::arg("share", set.outline_share),
       fmt::arg("slopes", set.outline_slopes), fmt::arg("edge", set.edge_length), fmt::arg("albedo", set.albedo),

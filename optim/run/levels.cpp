@@ -79,20 +79,21 @@ double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
 }
 
-/// All iterations; their steps are halved six times over the last four tenths, so that their noise averages out. Half of the histograms, of
-/// which each iteration has others, with twice the samples of the gradient (optim/README.md, Histograms). Where edges are halved, steps are
-/// as well, and all histograms are drawn from: four times as many vertices share the photons.
+/// The last of these levels halves its steps six times over the last four tenths, so that their noise averages out. Those before it end where
+/// that would begin, as others follow. Where edges are half as long, steps are as well. Half of the histograms, of which each iteration has others, with twice the samples of the gradient
+/// (optim/README.md, Histograms).
 void step_by_adam(const RemeshSpec& remesh, int level, Experiment& experiment) {
-  const int halvings = remesh.halvings(level);
   OptimizerSpec& adam = experiment.optimizer;
   adam = {};
   adam.method = OptimizerMethod::adam;
-  adam.learning_rate = std::ldexp(remesh.adam_rate, -halvings);
-  adam.iterations = remesh.adam_iterations;
+  adam.learning_rate = std::ldexp(remesh.adam_rate, -remesh.halvings(level));
   adam.stop_window = 0;
-  adam.decay = {.start = remesh.adam_iterations * 6 / 10, .half_life = remesh.adam_iterations / 15.0};
+  const int steady = std::max(1, static_cast<int>(6LL * remesh.adam_iterations / 10));
+  const bool last = level >= remesh.levels || !remesh.steps_by_adam(level + 1);
+  adam.iterations = last ? remesh.adam_iterations : steady;
+  if (last) adam.decay = {.start = steady, .half_life = remesh.adam_iterations / 15.0};
   experiment.samples.interior *= 2;
-  if (halvings == 0) experiment.target.histograms = (experiment.target.histograms + 1) / 2;
+  experiment.target.histograms = (experiment.target.histograms + 1) / 2;
 }
 
 class Levels {
@@ -366,10 +367,6 @@ void require_levels(const Problem& problem) {
   if (remeshed->remesh.coarse_histograms > 0 && !problem.scene().capture)
     remeshed->fail("remesh", "coarse_histograms: belongs to captures; a camera's pixels are all used", "0");
   const RemeshSpec& remesh = remeshed->remesh;
-  if (remesh.fine_from == 1 || remesh.fine_from > remesh.coarse_levels)
-    remeshed->fail("remesh",
-                   fmt::format("fine_from: {} is none of the coarse levels behind the first", remesh.fine_from),
-                   fmt::format("2 to coarse_levels, {}; 0: none", remesh.coarse_levels));
   if (remesh.adam_iterations > 0) {
     int by_adam = 0;
     for (int level = 1; level <= remesh.levels; ++level) by_adam += remesh.steps_by_adam(level);

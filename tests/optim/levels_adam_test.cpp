@@ -41,7 +41,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     EXPECT_EQ(one.target.histograms, 0) << "a camera";
     EXPECT_EQ(one.parameters[0].tangential, 0) << "no likelihood";
     if (adam) {
-      EXPECT_EQ(one.optimizer.learning_rate, 0.02);
+      EXPECT_EQ(one.optimizer.learning_rate, 0.01);
       EXPECT_EQ(one.optimizer.window(), 0);
       EXPECT_NEAR(one.optimizer.decay.factor(10), 1.0 / 64, 1e-12);
     }
@@ -96,7 +96,7 @@ TEST(Remesh, AdamWaitsForAlbedosBehindAnOutline) {
   EXPECT_EQ(by_adam(), "");
 }
 
-TEST(Remesh, EdgesAreHalvedFromTheFirstFineLevelOn) {
+TEST(Remesh, EdgesAreHalvedBehindTheCoarseLevels) {
   RemeshSpec spec{.levels = 6, .coarse_levels = 4};
   const auto halvings = [&] {
     std::string each;
@@ -104,30 +104,44 @@ TEST(Remesh, EdgesAreHalvedFromTheFirstFineLevelOn) {
     return each;
   };
   EXPECT_EQ(halvings(), "000012");
-  spec.fine_from = 3;
-  EXPECT_EQ(halvings(), "001112");
+  spec.adam_iterations = 5;
+  EXPECT_EQ(halvings(), "001112") << "the third is adam's last";
 }
 
-/// The fine level by adam has edges and steps of half the length. Its histograms: Reconstruct.FindsAPlate.
-TEST_F(LevelsTest, AFineLevelByAdamTakesShorterSteps) {
+/// Steps shrink in the last level by adam alone, even if a run ends before its coarse levels do. The others end where they would begin to. The
+/// last coarse ones have edges and steps of half the length.
+TEST_F(LevelsTest, AdamsStepsShrinkOnceInTheEnd) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
   write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
-  start_run(load_experiment(experiment("flat",
-                                       "remesh: {levels: 4, coarse_levels: 4, fine_from: 3, edge_length: 0.5, adam: "
-                                       "{iterations: 2, learning_rate: 0.01, slopes: 1e-9}}",
-                                       "{images: target.exr}")),
-            options());
-  const auto rate = [&](int level) {
-    return load_experiment(folder_.file(fmt::format("out/levels/{}/experiment.yaml", level))).optimizer.learning_rate;
+  const auto run = [&](int levels) {
+    RunOptions anew = options();
+    anew.force = true;
+    start_run(load_experiment(experiment("flat",
+                                         fmt::format("remesh: {{levels: {}, coarse_levels: 4, edge_length: 0.5, adam: "
+                                                     "{{iterations: 10, learning_rate: 0.01, slopes: 1e-9}}}}",
+                                                     levels),
+                                         "{images: target.exr}")),
+              anew);
   };
-  EXPECT_EQ(rate(2), 0.01);
-  EXPECT_EQ(rate(3), 0.005);
+  run(4);
+  const auto adam = [&](int level) {
+    return load_experiment(folder_.file(fmt::format("out/levels/{}/experiment.yaml", level))).optimizer;
+  };
+  EXPECT_EQ(adam(2).iterations, 6);
+  EXPECT_EQ(adam(2).decay.factor(5), 1);
+  EXPECT_EQ(adam(3).iterations, 10);
+  EXPECT_EQ(adam(3).decay.factor(5), 1);
+  EXPECT_LT(adam(3).decay.factor(9), 0.1);
   const auto edge = [&](int level) {
     return mean_edge_length(
         mesh_of(load_scene(folder_.file(fmt::format("out/levels/{}/scene/scene.yaml", level))), "hill"));
   };
+  EXPECT_EQ(adam(2).learning_rate, 0.01);
+  EXPECT_EQ(adam(3).learning_rate, 0.005);
   EXPECT_NEAR(edge(3) / edge(2), 0.5, 0.1);
   EXPECT_NEAR(edge(4) / edge(3), 1, 0.1);
+  run(2);
+  EXPECT_EQ(adam(2).iterations, 10);
 }
 
 /// The last property of a binary PLY file's vertices, which have so many, all of them doubles.

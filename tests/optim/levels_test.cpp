@@ -237,8 +237,6 @@ TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
   says(of("remesh: {levels: 0}"), "remesh.levels");
   says(of("remesh: {edge_length: 0.1}"), "levels");
   says(of("remesh: {levels: 3, coarse_levels: 0}"), "remesh.coarse_levels");
-  says(of("remesh: {levels: 4, coarse_levels: 3, fine_from: 4}"), "fine_from: 4 is none of the coarse levels");
-  says(of("remesh: {levels: 4, coarse_levels: 3, fine_from: 1}"), "fine_from: 1 is none of the coarse levels");
   says(of("remesh: {levels: 2, size: 3}"), "remesh.size");
   says(of("remesh: {levels: 2, outline: {slopes: 1}}"), "remesh.outline.albedo");
   says(of("remesh: {levels: 2, outline: {albedo: 1.5}}"), "remesh.outline.albedo");

@@ -59,16 +59,16 @@ TEST(FitSettings, TheWorkOfALevelFallsWithTheirNumber) {
   EXPECT_NEAR(large.samples * large.levels, small.samples * small.levels, 2 * large.levels);
 }
 
-/// 1197 of 4096 with 438 samples each; more where each has fewer, so that an image of them has as many for the same time.
+/// 1206 of 4096 with 398 samples each; more where each has fewer, so that an image of them has as many for the same time.
 TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   const FitSettings usual = settings_for(0.04, 0.0137);
-  EXPECT_GT(usual.samples, 430);
-  EXPECT_EQ(usual.coarse_histograms, 1197);
+  EXPECT_EQ(usual.samples, 398);
+  EXPECT_EQ(usual.coarse_histograms, 1206);
   const FitSettings many = fit_settings({{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}}, {{0, 1, 2}}}, 0.0137, 1 << 16, 300);
   EXPECT_LT(many.samples, 64);
-  EXPECT_NEAR(many.coarse_histograms * many.samples, 1024 * 512, 64);
+  EXPECT_NEAR(many.coarse_histograms * many.samples, 480000, 64);
   const FitSettings quick = settings_for(0.04, 0.0137, 4096, 60), small = settings_for(0.04, 0.0137, 576, 60);
-  EXPECT_NEAR(quick.coarse_histograms, 1197, 28) << "a fifth of the work by a fifth of the samples";
+  EXPECT_NEAR(quick.coarse_histograms, 1206, 28) << "a fifth of the work by a fifth of the samples";
   const FitSettings tiny = settings_for(0.04, 0.0137, 64, 60);
   EXPECT_NEAR(small.coarse_histograms, 256, 1) << "the least, as samples are even";
   EXPECT_NEAR(small.coarse_histograms * small.samples, quick.coarse_histograms * quick.samples, 600);
