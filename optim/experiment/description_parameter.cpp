@@ -262,11 +262,10 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
               "are, so that gaps open "
               "and webs tear",
               {.unset = spec.remesh.outline == 0});
-    inner.value(
-        "coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
-        "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
-        "evenly, those by adam to half as many, others in each iteration; 0: to all",
-        {.unset = spec.remesh.coarse_histograms == 0});
+    inner.value("coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
+                "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "
+                "evenly, those by adam to half as many, others in each iteration; 0: to all",
+                {.unset = spec.remesh.coarse_histograms == 0});
     const auto adam = [&spec](Keys& keys_of_adam) {
       keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
                          "of the last such level; the others have six tenths of it", {.required = true});
