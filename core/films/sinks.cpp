@@ -121,7 +121,7 @@ void AdjointSink::add(std::size_t first, int pixel, const Rgb& value, double len
     });
     for (int i = 0; i < N; ++i) {
       pulls[i].weight.r = std::accumulate(values[i], std::end(values[i]), 0.0) * value.r;
-      pulls[i].slope = slope_factor(use) * std::accumulate(slopes[i], std::end(slopes[i]), 0.0) * value.r;
+      pulls[i].slope = std::accumulate(slopes[i], std::end(slopes[i]), 0.0) * value.r;
     }
   } else {
     gates_.for_each_derivative(length, [&](int g, double w, double slope) {
@@ -129,11 +129,12 @@ void AdjointSink::add(std::size_t first, int pixel, const Rgb& value, double len
         const double* a = &adjoints[i].data[adjoints->index(pixel, g)];
         for (int c = 0; c < adjoints->channels; ++c) {
           pulls[i].weight[c] += a[c] * w * value[c];
-          pulls[i].slope += slope_factor(use) * a[c] * slope * value[c];
+          pulls[i].slope += a[c] * slope * value[c];
         }
       }
     });
   }
+  for (Pull& pull : pulls) pull.slope *= slope_factor(use);
   scatter(first, pulls);
 }
 

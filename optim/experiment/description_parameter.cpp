@@ -227,9 +227,9 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     inner.value(
         "evidence", field::boolean(spec.evidence),
         "for counts, in a run in levels: each finer level takes the weight of variation (without variation, that of "
-        "bending; without both, that of slopes) that makes the data of the level before most probable, within ten "
-        "times "
-        "of the one before, up or down");
+        "bending; without both, that of slopes) that makes the data of the level before most probable. A weight "
+        "changes "
+        "by ten at most");
   };
   keys.map("smoothing", smoothing, "so that vertices move, or albedos change, in patches",
            {.only = of({vertices, texture}),

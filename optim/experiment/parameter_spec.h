@@ -52,10 +52,9 @@ struct RemeshSpec {
   double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 
   int most_levels() const { return levels + more_levels; }
-  /// How often edges are halved before level `level`. With adam its last level, the last but one of the coarse ones, is the first to have half
-  /// of them.
+  /// How often edges are halved before level `level`. Adam's last level is the first to have half of them.
   int halvings(int level) const {
-    return std::max({0, level - coarse_levels, adam_iterations > 0 && level >= coarse_levels - 1 ? 1 : 0});
+    return std::max({0, level - coarse_levels, adam_iterations > 0 && level >= last_by_adam() ? 1 : 0});
   }
   bool finds_outline(int level) const { return outline > 0 && level == 1 && levels > 1; }
   /// Whether level `level` comes before the last coarse one, which evidence is taken from.
@@ -63,9 +62,12 @@ struct RemeshSpec {
   bool spares_histograms(int level) const { return coarse_histograms > 0 && comes_early(level); }
   /// The others are the experiment's optimiser's, the first with all of its smoothing among them: what is far off, as a typical albedo
   /// is, is out of reach for adam's steps, which would shrink the surface instead.
-  bool steps_by_adam(int level) const { return adam_iterations > 0 && comes_early(level) && level >= first_by_adam(); }
-  /// If there is one.
+  bool steps_by_adam(int level) const {
+    return adam_iterations > 0 && level >= first_by_adam() && level <= last_by_adam();
+  }
+  /// If there are any.
   int first_by_adam() const { return finds_outline(1) ? 3 : 2; }
+  int last_by_adam() const { return std::min(levels, coarse_levels - 1); }
 };
 
 /// One named parameter. Values of translations, rotations (degrees) and vertices are offsets from the scene

@@ -16,7 +16,8 @@ namespace {
 /// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in eleven levels, has 398 for 300 s.
 constexpr double kLevelSamplesPerSecond = 60000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// The first finds the outline and the second the albedo; seven of adam move borders; the last has all histograms.
+/// The first finds the outline and the second the albedo; seven of adam move borders; the last has all histograms, for the
+/// evidence of the level after it.
 constexpr int kCoarseLevels = 10;
 /// Metrics of more take longer than rendering.
 constexpr double kMostVertices = 20000;

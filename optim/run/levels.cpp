@@ -80,8 +80,8 @@ double number_or_nan(const YamlValue& value) {
 }
 
 /// The last of these levels halves its steps six times over the last four tenths, so that their noise averages out. Those before it end where
-/// that would begin, as others follow. Where edges are half as long, steps are as well. Half of the histograms, of which each iteration has others, with twice the samples of the gradient
-/// (optim/README.md, Histograms).
+/// that would begin, as others follow. Where edges are half as long, so are steps. Each iteration has half of the histograms, and others than
+/// the one before, with twice the samples of the gradient (optim/README.md, Histograms).
 void step_by_adam(const RemeshSpec& remesh, int level, Experiment& experiment) {
   OptimizerSpec& adam = experiment.optimizer;
   adam = {};
@@ -89,7 +89,7 @@ void step_by_adam(const RemeshSpec& remesh, int level, Experiment& experiment) {
   adam.learning_rate = std::ldexp(remesh.adam_rate, -remesh.halvings(level));
   adam.stop_window = 0;
   const int steady = std::max(1, static_cast<int>(6LL * remesh.adam_iterations / 10));
-  const bool last = level >= remesh.levels || !remesh.steps_by_adam(level + 1);
+  const bool last = level == remesh.last_by_adam();
   adam.iterations = last ? remesh.adam_iterations : steady;
   if (last) adam.decay = {.start = steady, .half_life = remesh.adam_iterations / 15.0};
   experiment.samples.interior *= 2;
@@ -367,13 +367,9 @@ void require_levels(const Problem& problem) {
   if (remeshed->remesh.coarse_histograms > 0 && !problem.scene().capture)
     remeshed->fail("remesh", "coarse_histograms: belongs to captures; a camera's pixels are all used", "0");
   const RemeshSpec& remesh = remeshed->remesh;
-  if (remesh.adam_iterations > 0) {
-    int by_adam = 0;
-    for (int level = 1; level <= remesh.levels; ++level) by_adam += remesh.steps_by_adam(level);
-    if (by_adam == 0)
-      remeshed->fail("remesh", "adam: there is no coarse level for it",
-                     fmt::format("coarse_levels: at least {}", remesh.outline > 0 ? 4 : 3));
-  }
+  if (remesh.adam_iterations > 0 && remesh.last_by_adam() < remesh.first_by_adam())
+    remeshed->fail("remesh", "adam: there is no coarse level for it",
+                   fmt::format("coarse_levels: at least {}", remesh.outline > 0 ? 4 : 3));
   const Mesh loaded = mesh_of(problem.scene(), remeshed->shape);
   try {
     require_remeshable(loaded, edge_length_of(remeshed->remesh.most_levels(), remeshed->remesh, loaded));
