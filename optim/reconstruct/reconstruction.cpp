@@ -70,7 +70,7 @@ parameters:
     shape: surface
     per: vertex
     initial: 0.25
-    scale: 0.01
+    scale: 0.03
     smoothing: {{slopes: {albedo:.4g}, evidence: true}}
   - {{name: gain, type: gain, initial: {gain:.6g}, lower: {low:.6g}, upper: {high:.6g}}}
   - {{name: background, type: background{per}, scale: 0.01}}

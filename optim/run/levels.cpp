@@ -67,8 +67,13 @@ constexpr double kLeastPart = 2;
 constexpr double kLeastFeature = 0.43;
 
 /// Factor of the albedos that the levels by adam begin with. Borders are drawn back more easily than they are extended, and light that is missing
-/// extends them. By trials with the rabbit (optim/README.md, Dim albedos).
-constexpr double kDimmed = 0.94;
+/// extends them; as albedos rise again they come back. By trials with the rabbit (optim/README.md, Dim albedos).
+constexpr double kDimmed = 0.88;
+
+/// Diffusion of the gradient of albedos by vertex where adam moves borders, far above one over the least eigenvalues of the graph Laplacian of
+/// some hundred vertices: albedos of connected vertices move together. Vertex by vertex adam follows noise and hardly changes their mean, which
+/// decides how far borders go (optim/README.md, Dim albedos).
+constexpr double kTogether = 1000;
 
 /// By how much evidence changes a weight from level to level, at most. Its rule holds where a fit has come to rest. After two iterations a surface
 /// is still rough, which evidence would take for its nature (optim/README.md, Smoothing).
@@ -191,8 +196,10 @@ class Levels {
       // Early levels have far to go, and coarse triangles bend unevenly.
       if (!evidence_follows) spec.variation = remesh.comes_early(level) ? 0 : experiment_.parameters[i].variation;
       spec.tangential = experiment_.parameters[i].tangential;
-      if (remesh.finds_outline(level) && spec.type == ParameterType::texture && spec.shape == remeshed_.shape)
-        spec.slopes = remesh.outline_slopes;
+      if (spec.type == ParameterType::texture && spec.shape == remeshed_.shape) {
+        if (remesh.finds_outline(level)) spec.slopes = remesh.outline_slopes;
+        spec.diffusion = remesh.steps_by_adam(level) ? kTogether : experiment_.parameters[i].diffusion;
+      }
       if (remesh.steps_by_adam(level) && spec.name == remeshed_.name) free_borders(spec);
     }
   }

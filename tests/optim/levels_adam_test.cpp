@@ -199,8 +199,9 @@ TEST_F(LevelsTest, ErrorsCountHowFarLevelsAreApart) {
   }
 }
 
-/// The first level by adam begins with albedos that are 6 % lower than what the level before has found, unless they have a bound.
-TEST_F(LevelsTest, AlbedosAreDimmedOnceForAdam) {
+/// The first level by adam begins with albedos that are 12 % lower than what the level before has found, unless they have a bound. In all
+/// levels by adam albedos by vertex move together.
+TEST_F(LevelsTest, AlbedosAreDimmedOnceForAdamAndMoveTogether) {
   const std::string remesh =
       "target: 0, remesh: {levels: 4, coarse_levels: 4, edge_length: 0.5, adam: {iterations: 1, "
       "learning_rate: 1e-9, slopes: 1e-9}}";
@@ -213,16 +214,19 @@ TEST_F(LevelsTest, AlbedosAreDimmedOnceForAdam) {
     run.force = true;
     start_run(asked, run);
     std::vector<double> firsts;
-    for (int level = 1; level <= 4; ++level)
-      firsts.push_back(
-          load_experiment(folder_.file(fmt::format("out/levels/{}/experiment.yaml", level))).parameters[1].initial[0]);
+    for (int level = 1; level <= 4; ++level) {
+      const ParameterSpec paint =
+          load_experiment(folder_.file(fmt::format("out/levels/{}/experiment.yaml", level))).parameters[1];
+      firsts.push_back(paint.initial[0]);
+      EXPECT_EQ(paint.diffusion > 100, level == 2 || level == 3) << level;
+    }
     return firsts;
   };
   const std::vector<double> found = initial("");
   EXPECT_EQ(found[0], 0.5);
-  EXPECT_NEAR(found[1], 0.94 * 0.5, 1e-6);
-  EXPECT_NEAR(found[2], 0.94 * 0.5, 1e-6);
-  EXPECT_NEAR(found[3], 0.94 * 0.5, 1e-6);
+  EXPECT_NEAR(found[1], 0.88 * 0.5, 1e-6);
+  EXPECT_NEAR(found[2], 0.88 * 0.5, 1e-6);
+  EXPECT_NEAR(found[3], 0.88 * 0.5, 1e-6);
   EXPECT_NEAR(initial(", lower: 0.48")[1], 0.5, 1e-6);
 }
 
