@@ -100,9 +100,8 @@ TEST_P(Sinks, AdjointIsTheTransposeOfTheJacobian) {
       EXPECT_EQ(alone(4), dof_gradients[4]);
       const std::vector<double> second = alone(1);
       const double largest = std::abs(*std::ranges::max_element(second, {}, [](double g) { return std::abs(g); }));
-      for (std::size_t i = 0; i < second.size();
-           ++i)  // compilers may fuse products and sums of one otherwise than of four
-        EXPECT_NEAR(second[i], dof_gradients[1][i], 1e-12 * largest) << i;
+      // Compilers may fuse products and sums of one otherwise than of four.
+      for (std::size_t i = 0; i < second.size(); ++i) EXPECT_NEAR(second[i], dof_gradients[1][i], 1e-12 * largest) << i;
       TangentBasis absolute = basis;
       for (auto& e : absolute.entries) e.coefficient = std::abs(e.coefficient);
       for (std::size_t a = 0; a < adjoints.size(); ++a) {
