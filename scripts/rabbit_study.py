@@ -11,6 +11,8 @@ light-cone transform (light_cone.py). Each sweep writes a table, experiments/mea
     verdict                       of the fit
     covered                       share of the true depths within three standard errors of the fit's
 
+Sweep `verdicts` has photons as values, and reconstructions alone, of less work each: how often they explain, and what is covered then.
+
 The transform has two settings, its filter's ratio of signal to noise and how bright a surface has to be. They are chosen by the truth, in
 its favour: of all whose silhouette is within a tenth of the best, those with the least 80 % error.
 """
@@ -39,6 +41,8 @@ REACH = 0.7  # metres: beyond the rabbit as seen from the wall's corners
 RATIOS, BRIGHTNESSES = (0.1, 1, 10, 100), (0.1, 0.15, 0.2, 0.25, 0.3)
 METHODS = ("fit", "back_projection", "light_cone")
 USUAL = {"photons": 2000, "points": 64, "seconds": 300}
+SWEEPS = (*USUAL, "verdicts")
+VERDICT_SECONDS = 60
 COLUMNS = ("method", "photons", "points", "limit", "seed", "median_mm", "within_80_mm", "shared_median_mm", "shared_within_80_mm",
            "silhouette", "seconds", "verdict", "covered")
 
@@ -100,6 +104,9 @@ def measure(options, photons, points, limits, seed, folder):
 
 def sweep(options, name):
     values = {**{key: [value] for key, value in USUAL.items()}, name: getattr(options, name)}
+    if name == "verdicts":
+        values.update(photons=options.verdicts, seconds=[VERDICT_SECONDS])
+        options = argparse.Namespace(**{**vars(options), "methods": ["fit"]})
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
         for seed, photons, points in itertools.product(range(1, options.seeds + 1), values["photons"], values["points"]):
@@ -115,8 +122,22 @@ def spread(rows, key, factor=1.0, unit=""):
     return " to ".join(dict.fromkeys((texts[0], texts[-1]))) + unit if texts else ""
 
 
+def table_of_verdicts(rows):
+    """For experiments/README.md: a line for each number of photons, with the least that is covered of an explained fit."""
+    table = []
+    for photons in dict.fromkeys(row["photons"] for row in rows):
+        own = [row for row in rows if row["photons"] == photons]
+        explained = [row for row in own if row["verdict"] == "explained"]
+        least = min((float(row["covered"]) for row in explained), default=None)
+        table.append([photons, f"{len(explained)} of {len(own)}", "" if least is None else f"{100 * least:.3g} %",
+                      *(spread(own, key) for key in ("median_mm", "within_80_mm", "silhouette"))])
+    return markdown(["photons", "explained", "least within 3 errors, explained", "median, mm", "80 %, mm", "silhouette"], table)
+
+
 def table_of(rows, name):
     """For experiments/README.md: a line for each value of a sweep; the light-cone transform is in the figure alone."""
+    if name == "verdicts":
+        return table_of_verdicts(rows)
     column = {"seconds": "limit"}.get(name, name)
     fits, others = ([row for row in rows if row["method"] == method] for method in METHODS[:2])
     table = []
@@ -134,17 +155,18 @@ def main():
     parser.add_argument("--photons", type=float, nargs="+", help="sweep: 20 63 200 630 2000 6300 20000, for example")
     parser.add_argument("--points", type=int, nargs="+", help="sweep: 8 16 32 64")
     parser.add_argument("--seconds", type=float, nargs="+", help="sweep: 30 60 120 300")
+    parser.add_argument("--verdicts", type=float, nargs="+", help=f"sweep: 20 200 2000; reconstructions of {VERDICT_SECONDS} s")
     parser.add_argument("--seeds", type=int, default=1, help="captures of each kind (default 1)")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="default: all")
     parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
-    parser.add_argument("--table", choices=USUAL, help="print the table of a sweep that was measured before, as a page has it")
+    parser.add_argument("--table", choices=SWEEPS, help="print the table of a sweep that was measured before, as a page has it")
     options = parser.parse_args()
     if options.table:
         print(table_of(read_rows(options.output / f"rabbit_{options.table}.csv"), options.table))
         return 0
-    names = [name for name in USUAL if getattr(options, name)]
+    names = [name for name in SWEEPS if getattr(options, name)]
     if not names:
-        parser.error(f"no sweep: give one of {', '.join(f'--{name}' for name in USUAL)}")
+        parser.error(f"no sweep: give one of {', '.join(f'--{name}' for name in SWEEPS)}")
     for name in names:
         sweep(options, name)
     return 0

@@ -17,9 +17,6 @@ void for_each_of(const GateSet::Run& run, F&& f) {
   }
 }
 
-/// What so many adjoints make of a run of gates is summed side by side.
-constexpr int kAdjointsTogether = 4;
-
 }  // namespace
 
 void PrimalSink::add(int pixel, const Rgb& value, double length, GateUse) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/films/sinks.h"
 
 namespace isochron {
 namespace {
@@ -79,8 +80,8 @@ std::vector<std::vector<double>> probe_readings(const Problem& problem, const st
                                                 const std::vector<double>& weights, std::uint32_t iteration,
                                                 Probes probes, std::uint32_t rendered, const Poll& poll) {
   std::vector<std::vector<double>> products;
-  for (int done = 0; done < probes.count; done += kImagesTogether) {
-    std::vector<GatedImage> signs(std::min(kImagesTogether, probes.count - done), problem.blank());
+  for (int done = 0; done < probes.count; done += kAdjointsTogether) {
+    std::vector<GatedImage> signs(std::min(kAdjointsTogether, probes.count - done), problem.blank());
     parallel(static_cast<int>(signs.size()), [&](int k) {
       const auto probe = static_cast<std::uint32_t>(probes.first + done + k);
       std::vector<double>& values = signs[k].data;

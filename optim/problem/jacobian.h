@@ -23,10 +23,6 @@ JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>
 /// Half `half` (0 or 1) of so many samples, as above.
 SampleRange half_of(int samples, int half);
 
-/// Images that share their paths as they are multiplied by J'; all are in memory. With four in place of one the stated errors and the verdict of
-/// scenes/rabbit take 52 s in place of 89.
-inline constexpr int kImagesTogether = 4;
-
 /// J' W^(1/2) z with a random sign z for each reading, others for each probe: gradients as the noise of readings makes them, with
 /// the covariance J'WJ and what the noise of the Jacobian adds. Signs are those of the iteration, samples those of iteration `rendered`, the
 /// same for all probes.

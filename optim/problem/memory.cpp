@@ -11,6 +11,7 @@
 
 #include "core/base/error.h"
 #include "core/base/ranks.h"
+#include "core/films/sinks.h"
 #include "core/techniques/gate_pick.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/jacobian.h"
@@ -154,7 +155,7 @@ std::vector<MemoryUse> run_memory(const Problem& problem) {
   const OptimizerMethod method = experiment.optimizer.method;
   if (method == OptimizerMethod::quasi_newton) {
     parts.push_back({"images of a line search", 3 * image});
-    parts.push_back({"images of probes", kImagesTogether * image});
+    parts.push_back({"images of probes", kAdjointsTogether * image});
   }
   if (method != OptimizerMethod::levenberg_marquardt) {
     const Camera& camera = problem.scene().camera;

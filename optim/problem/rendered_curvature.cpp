@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/base/parallel.h"
+#include "core/films/sinks.h"
 #include "optim/problem/conjugate_gradients.h"
 #include "optim/problem/jacobian.h"
 #include "optim/problem/metric.h"
@@ -154,7 +155,7 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
       render_jacobian(problem_, theta_, combinations_of(basis_, vectors), kProductsIteration, poll_);
   const Renderer renderer = problem_.renderer(scene_, problem_.estimator(samples.visibility), &basis_);
   std::vector<std::vector<double>> products;
-  std::vector<GatedImage> images(std::min<std::size_t>(kImagesTogether, vectors.size()), problem_.blank());
+  std::vector<GatedImage> images(std::min<std::size_t>(kAdjointsTogether, vectors.size()), problem_.blank());
   while (products.size() < vectors.size()) {
     const std::size_t done = products.size();
     images.resize(std::min(images.size(), vectors.size() - done));

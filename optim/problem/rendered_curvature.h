@@ -30,7 +30,7 @@ class RenderedCurvature : public CurvatureProducts {
   /// differences.
   Curvatures within(const std::vector<std::vector<double>>& columns) const override;
   /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient and
-  /// another for every kImagesTogether vectors. Not for finite differences.
+  /// another for every kAdjointsTogether vectors. Not for finite differences.
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
   /// Some of the loss, penalty included, each from random numbers of its own (the first from those of the weights); 0 for unknowns that a
   /// bound keeps from following it.

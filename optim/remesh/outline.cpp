@@ -204,6 +204,24 @@ Remeshed without_small_holes(const Mesh& mesh, double least_area) {
   return result;
 }
 
+Remeshed without_bridges(const Mesh& mesh, double least_width) {
+  const std::vector<Vec3>& p = mesh.positions;
+  const std::set<std::pair<int, int>> edges = directed_edges(mesh);
+  constexpr int kInside = -1;
+  std::vector<int> border(p.size(), kInside);
+  int count = 0;
+  for (const std::vector<int>& loop : borders(edges)) {
+    for (const int v : loop) border[v] = count;
+    ++count;
+  }
+  std::vector<double> above(p.size(), 1.0);
+  for (const auto& [a, b] : edges) {
+    const bool joins = border[a] != kInside && border[b] != kInside && border[a] != border[b];
+    if (joins && length(p[a] - p[b]) < least_width) above[a] = above[b] = -1;
+  }
+  return Cut(mesh, above).left();
+}
+
 Remeshed within_outline(const Mesh& mesh, const std::vector<double>& albedo, double share, double least_area) {
   const std::vector<double> area = areas_of(mesh), typical = typical_albedos(mesh, albedo);
   // A part that is dark all over goes if another is not.

@@ -62,10 +62,6 @@ void write_surface(const std::string& file, const Mesh& mesh) {
 /// Least area of a part or a hole that an outline may cut, in squared edge lengths: smaller ones hold one or two vertices, which is noise.
 constexpr double kLeastPart = 2;
 
-/// The area of a regular triangle, in squared edge lengths. Parts that a fit has shrunk below it are left out, and such holes closed: they would
-/// shrink with every level, and penalties relative to the distance of their vertices would grow without bound.
-constexpr double kLeastFeature = 0.43;
-
 /// Factor of the albedos that the levels by adam begin with. Borders are drawn back more easily than they are extended, and light that is missing
 /// extends them; as albedos rise again they come back. By trials with the rabbit (optim/README.md, Dim albedos).
 constexpr double kDimmed = 0.88;
@@ -169,7 +165,7 @@ class Levels {
       surface = found_surface(former, theta, remeshed_);
       if (!first) {
         surface->mesh = unfolded(std::move(surface->mesh));
-        surface = without_small_features(*surface, kLeastFeature * edge_length * edge_length);
+        surface = without_small_features(*surface, edge_length);
       }
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,

@@ -137,13 +137,17 @@ LevelSurface within_outline(const LevelSurface& surface, const std::vector<Param
   return result;
 }
 
-LevelSurface without_small_features(const LevelSurface& surface, double least_area) {
-  const auto carried_where_changed = [](const LevelSurface& old, const Remeshed& left) {
-    const bool changed = left.mesh.faces.size() != old.mesh.faces.size();
-    return left.mesh.faces.empty() || !changed ? old : carried_over(old, left);
+LevelSurface without_small_features(const LevelSurface& surface, double edge_length) {
+  // A regular triangle's.
+  const double least_area = std::sqrt(3.0) / 4 * edge_length * edge_length;
+  const auto is_corner = [](const MeshPoint& point) { return std::ranges::max(point.weights) == 1; };
+  const auto carried_where_changed = [&](const LevelSurface& old, const Remeshed& left) {
+    const bool same = left.mesh.faces.size() == old.mesh.faces.size() && std::ranges::all_of(left.origins, is_corner);
+    return same || left.mesh.faces.empty() ? old : carried_over(old, left);
   };
-  const LevelSurface parts = carried_where_changed(surface, without_small_parts(surface.mesh, least_area));
-  return carried_where_changed(parts, without_small_holes(parts.mesh, least_area));
+  LevelSurface left = carried_where_changed(surface, without_small_holes(surface.mesh, least_area));
+  left = carried_where_changed(left, without_bridges(left.mesh, edge_length));
+  return carried_where_changed(left, without_small_parts(left.mesh, least_area));
 }
 
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length) {

@@ -139,6 +139,37 @@ TEST(Outline, SmallPartsAreNotClosed) {
   for (const double least : {0.7, 0.9, 2.0}) EXPECT_EQ(without_small_holes(mesh, least).mesh.faces.size(), 2u) << least;
 }
 
+/// A square of 8 x 8 cells without 2 x 5 of them: one cell is left beyond this hole at one end, two at the other. The strip of one cell is cut
+/// where its edges are short enough. The other one, with inner vertices, and both sides of the hole stay.
+TEST(Outline, NarrowBridgesAreCut) {
+  Mesh whole;
+  add_square(whole, {0, 0, 0}, 8);
+  Mesh mesh{whole.positions, {}};
+  for (std::size_t f = 0; f < whole.faces.size(); ++f) {
+    const std::size_t x = f / 2 % 8, y = f / 16;
+    if (!((x == 3 || x == 4) && y >= 1 && y < 6)) mesh.faces.push_back(whole.faces[f]);
+  }
+  const double area = 1 - 10.0 / 64;
+  EXPECT_NEAR(area_left(without_bridges(mesh, 0.999 / 8)), area, 1e-12);
+  const Remeshed cut = without_bridges(mesh, 1.001 / 8);
+  EXPECT_NEAR(area_left(cut), area - 0.055, 0.01);
+  double lowest = 1;  // of the strip
+  for (const Vec3& p : cut.mesh.positions)
+    if (std::abs(p.x - 0.5) < 1e-12) lowest = std::min(lowest, p.y);
+  EXPECT_NEAR(lowest, 0.75, 1e-12);
+}
+
+/// Of two squares that one cell joins, whose sides are one border.
+TEST(Outline, NecksStay) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 4);
+  add_square(mesh, {1.25, 0, 0}, 4);
+  const int right = 25;
+  mesh.faces.push_back({4, right, right + 5});
+  mesh.faces.push_back({4, right + 5, 9});
+  EXPECT_NEAR(area_left(without_bridges(mesh, 1)), 2 + 1.0 / 16, 1e-12);
+}
+
 /// A fit that pulls a hole together to a point leaves edges of no length, which remeshing takes away once it is closed.
 TEST(Outline, RemeshingMendsAClosedHole) {
   Mesh mesh;
