@@ -137,7 +137,8 @@ def capture(shape, options, path):
 
 def rows(name, shape, options, folder):
     path = folder / f"{name}.h5"
-    capture(shape, options, path)
+    if not path.exists():
+        capture(shape, options, path)
     true = seen(together(shape.parts), shape)
     *projected, spent = rabbit_errors.surface(path)
     shown = seen(projected, shape)
@@ -177,7 +178,7 @@ def main():
                         help="of the expected counts in all: their noise has to be far below that of the photons (default 2^28)")
     parser.add_argument("--seconds", type=float, default=300, help="of each reconstruction (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for captures and runs; default: a temporary one")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for captures, which are made unless they are there, and runs; default: a temporary one")
     return study(parser, "shapes.csv", COLUMNS,
                  lambda options, folder: (rows(name, known[name], options, folder) for name in options.shapes), table_of)
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "optim/problem/loss.h"
 #include "optim/problem/problem.h"
@@ -16,11 +16,12 @@ namespace {
 /// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in eleven levels, has 398 for 300 s.
 constexpr double kLevelSamplesPerSecond = 60000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
+/// A sample's work where light goes and comes back on two ways, over that of a confocal one: levels by adam of the blob under 8 x 8 spots took 20.7 s,
+/// confocal ones 15.2.
+constexpr double kTwoWays = 1.35;
 /// The first finds the outline and the second the albedo; seven of adam move borders; the last has all histograms, for the
 /// evidence of the level after it.
 constexpr int kCoarseLevels = 10;
-/// Metrics of more take longer than rendering.
-constexpr double kMostVertices = 20000;
 /// Of coarse levels at most: more take longer to settle, and borders of larger surfaces are worth less each.
 constexpr double kCoarseVertices = 500;
 /// By trials with the rabbit (optim/README.md): expected change of offsets over the distance, and of albedos, a quarter on average, across
@@ -51,26 +52,27 @@ Range distances(const Vec3& from, const std::vector<Vec3>& places) {
   return range;
 }
 
-/// Whether Poisson numbers of one mean scatter less than these, by five standard deviations.
+/// Whether Poisson numbers of one mean scatter less than these, by five standard deviations. A mean below one tells too little.
 bool vary(const std::vector<double>& numbers) {
   if (numbers.size() < 2) return false;
   const auto n = static_cast<double>(numbers.size());
   const double mean = std::accumulate(numbers.begin(), numbers.end(), 0.0) / n;
   double squares = 0;
   for (const double number : numbers) squares += (number - mean) * (number - mean);
-  return mean > 0 && squares / (n - 1) > mean * (1 + 5 * std::sqrt(2 / (n - 1) + 1 / (n * mean)));
+  return mean >= 1 && squares / (n - 1) > mean * (1 + 5 * std::sqrt(2 / (n - 1) + 1 / (n * mean)));
 }
 
-/// What each sensor point counts before light of the surface can arrive at any. Dark bins after that hold tails of light.
-std::vector<double> counted_before(const GatedImage& counts, const Problem& problem, double time, int points) {
-  std::vector<double> sums(points, 0.0);
-  const Readings& readings = problem.readings();
-  for (int p = 0; p < counts.pixels(); ++p)
-    for (int g = 0; g < counts.gates && readings.uses_pixel(p); ++g)
-      if (readings.uses_gate(g) && problem.gates().center(g) < time) sums[p % points] += counts.at(p, g);
-  for (int p = points - 1; p >= 0; --p)
-    if (!readings.uses_pixel(p)) sums.erase(sums.begin() + p);
-  return sums;
+/// The bins before light comes, by what is counted in each: from the first that counts until one counts more than the least so far by eight
+/// standard deviations. Dark bins after the light hold its tails.
+std::pair<int, int> dark_before_light(const std::vector<double>& counted) {
+  constexpr double kClearly = 8;
+  const auto first = std::ranges::find_if(counted, [](double sum) { return sum > 0; });
+  double least = std::numeric_limits<double>::infinity();
+  const auto last = std::find_if(first, counted.end(), [&](double sum) {
+    least = std::min(least, std::max(sum, 0.0));
+    return sum > least + kClearly * std::sqrt(least + 1);
+  });
+  return {static_cast<int>(first - counted.begin()), static_cast<int>(last - counted.begin())};
 }
 
 /// Sums over the points, of each gate that counts.
@@ -107,22 +109,38 @@ double vertices_of(double area, double edge_length) {
 
 }  // namespace
 
-FitSettings fit_settings(const Mesh& start, double resolution, int histograms, double seconds) {
+FitSettings fit_settings(const Mesh& start, double resolution, const FitWork& work) {
   FitSettings settings;
   const double area = surface_area(start);
   settings.edge_length = std::max(resolution, std::sqrt(vertices_of(area, 1) / kCoarseVertices));
-  settings.levels = settings.coarse_levels = kCoarseLevels;
-  double edge = settings.edge_length / 2;
-  const auto fits = [&] { return vertices_of(area, edge) <= kMostVertices; };
-  for (; edge > std::numbers::sqrt2 / 4 * resolution && fits(); edge /= 2) ++settings.levels;
-  settings.more_levels = fits() ? 1 : 0;
+  settings.coarse_levels = kCoarseLevels;
+  settings.levels = kCoarseLevels + 1;
+  settings.more_levels = 1;
   // An image of a coarse level has kLeastCoarseHistograms at least, or all that there are: more samples of each would take too long.
-  const double of_coarse_image = kCoarseSamplesPerSecond * seconds,
-               each = std::min(kLevelSamplesPerSecond * seconds / (settings.levels * histograms),
-                               of_coarse_image / std::min(histograms, kLeastCoarseHistograms));
+  const double seconds = work.seconds / (work.confocal ? 1 : kTwoWays),
+               of_coarse_image = kCoarseSamplesPerSecond * seconds,
+               each = std::min(kLevelSamplesPerSecond * seconds / (settings.levels * work.histograms),
+                               of_coarse_image / std::min(work.histograms, kLeastCoarseHistograms));
   settings.samples = static_cast<int>(std::clamp(each, 1.0 * kLeastSamples, 1.0 * kMostSamples)) / 2 * 2;
   settings.coarse_histograms = std::max(kLeastCoarseHistograms, static_cast<int>(of_coarse_image / settings.samples));
   return settings;
+}
+
+bool backgrounds_differ(const CaptureFile& capture, const std::vector<std::uint8_t>& used) {
+  const GatedImage& counts = capture.counts;
+  const auto points = static_cast<int>(capture.geometry.sensor.size());
+  const auto is_used = [&](int point) { return used.empty() || used[point] != 0; };
+  const auto for_each_count = [&](int first, int last, auto&& f) {
+    for (int p = 0; p < counts.pixels(); ++p)
+      for (int g = first; g < last && is_used(p % points); ++g) f(p % points, g, counts.at(p, g));
+  };
+  std::vector<double> by_bin(counts.gates, 0.0), by_point(points, 0.0);
+  for_each_count(0, counts.gates, [&](int, int bin, double count) { by_bin[bin] += count; });
+  const auto [first, last] = dark_before_light(by_bin);
+  for_each_count(first, last, [&](int point, int, double count) { by_point[point] += count; });
+  for (int point = points - 1; point >= 0; --point)
+    if (!is_used(point)) by_point.erase(by_point.begin() + point);
+  return vary(by_point);
 }
 
 TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
@@ -145,8 +163,7 @@ TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const 
     all.most += response->upper();
   }
   const double margin = std::max(8 * depth_resolution, 0.25 * (all.most - all.least));
-  // A start is known to a resolution, which counts on the way there and back.
-  return {all.least - margin, all.most + margin, all.least - 4 * depth_resolution};
+  return {all.least - margin, all.most + margin};
 }
 
 void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
@@ -154,8 +171,6 @@ void measure(const std::string& experiment, const Mesh& start, FitSettings& sett
   const Problem problem(load_experiment(experiment), warning);
   const GatedImage counts = problem.make_target([] {});
   const Readings& readings = problem.readings();
-  const int points = static_cast<int>(problem.scene().capture->sensor.size());
-  settings.background_per_point = vary(counted_before(counts, problem, settings.window.dark_until, points));
   std::vector<double> theta = problem.parameters().initial();
   for (const Parameters::Block& block : problem.parameters().blocks())
     if (block.name == "background") std::fill_n(theta.begin() + block.begin, block.count, 0.0);

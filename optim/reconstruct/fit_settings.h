@@ -1,7 +1,9 @@
 // What a reconstruction's experiment says that follows from the capture and its start.
 #pragma once
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "core/image/capture_file.h"
 #include "core/scene/mesh.h"
@@ -12,7 +14,6 @@ namespace isochron {
 /// Optical paths.
 struct TimeWindow {
   double first = 0, last = 1;
-  double dark_until = 0;  ///< no light of the surface comes before
 };
 
 /// Lengths in metres. The defaults make a valid experiment of nothing.
@@ -37,16 +38,27 @@ struct FitSettings {
   TimeWindow window;
 };
 
-/// Levels, the coarse ones with edges as long as the resolution (of a surface much larger than that, longer) and the last one with edges of
-/// half of it (one with a quarter may follow), and samples for a fit of so many seconds on two cores.
-FitSettings fit_settings(const Mesh& start, double resolution, int histograms, double seconds);
+/// What a fit may take.
+struct FitWork {
+  int histograms = 1;
+  bool confocal = true;  ///< light comes back the way it went, which is to be tested once
+  double seconds = 300;  ///< on two cores
+};
+
+/// Levels, the coarse ones with edges as long as the resolution (of a surface much larger than that, longer), the last one with half of that and,
+/// where the data are not explained, another with a quarter; and samples for a fit of that work.
+FitSettings fit_settings(const Mesh& start, double resolution, const FitWork& work);
+
+/// Whether points count backgrounds of their own: whether what they count before any light comes varies among them more than Poisson numbers
+/// of one mean. `used`: zero for points that are left out; empty: none is.
+bool backgrounds_differ(const CaptureFile& capture, const std::vector<std::uint8_t>& used);
 
 /// Times, as optical paths, at which light of the mesh may be counted at any point, and a quarter as much before and after, for the
 /// background.
 TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,
                        double depth_resolution);
 
-/// Gain, background and weights of slopes, by the counts and a rendering of the start under a gain of 1: `experiment` is the file of
+/// Gain and weights of slopes, by the counts and a rendering of the start under a gain of 1: `experiment` is the file of
 /// such a one.
 void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
              const std::function<void(const std::string&)>& warning);

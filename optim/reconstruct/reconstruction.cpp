@@ -217,8 +217,10 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   result.photons_needed = photons_needed(capture, volume);
   result.has_signal = !start.faces.empty();
   if (result.has_signal) {
-    settings = fit_settings(start, likely.resolution, capture.counts.pixels(), spec.seconds);
+    settings =
+        fit_settings(start, likely.resolution, {capture.counts.pixels(), capture.geometry.confocal, spec.seconds});
     settings.bin = capture.delta_t;
+    settings.background_per_point = backgrounds_differ(capture, used);
     settings.window = time_window(start, capture.geometry, response, volume.depth_resolution);
     result.files["back_projection.ply"] = ply(first.mesh, first.albedo);
     result.files["start.ply"] = ply(start);

@@ -192,6 +192,32 @@ TEST_F(LevelsTest, PartsThatShrankToNothingAreLeftOut) {
             found("out/levels/2").positions.size());
 }
 
+/// Eight cells each way without 2 x 5 in the middle of one side: a strip of one cell is left there. In the next level the strip is open.
+TEST_F(LevelsTest, NarrowStripsAreCut) {
+  const std::string whole = sheet(8, flat);
+  std::size_t line = whole.find('f');
+  std::string text = whole.substr(0, line);
+  for (int face = 0; line < whole.size(); ++face) {
+    const std::size_t next = whole.find('\n', line) + 1;
+    const int x = face / 2 % 8, y = face / 16;
+    if (!((x == 3 || x == 4) && y >= 1 && y < 6)) text += whole.substr(line, next - line);
+    line = next;
+  }
+  folder_.write("flat.obj", text);
+  Experiment two =
+      load_experiment(experiment("flat", "remesh: {levels: 2, coarse_levels: 2}, target: 0", "{samples: 4}"));
+  two.optimizer.iterations = 0;
+  start_run(two, options());
+  const auto lowest_in_the_middle = [&](const std::string& level) {
+    double y = 1;
+    for (const Vec3& p : found("out/levels/" + level).positions)
+      if (std::abs(p.x) < 0.2) y = std::min(y, p.y);
+    return y;
+  };
+  EXPECT_EQ(lowest_in_the_middle("1"), -1);
+  EXPECT_NEAR(lowest_in_the_middle("2"), 0.5, 1e-6);
+}
+
 /// Two vertices beyond their neighbours, one above them and one below: remeshing would leave such a fold as it is, as it passes through the
 /// sheet. The second level begins without it.
 TEST_F(LevelsTest, BeginWithoutFolds) {

@@ -3,7 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <random>
+#include <vector>
 
 #include "optim/reconstruct/back_projection.h"
 #include "tests/reconstruct/simulated.h"
@@ -21,7 +25,7 @@ BackProjection wall_projected(const CaptureGeometry& wall) {
 FitSettings settings_for(double area, double resolution, int histograms = 4096, double seconds = 300) {
   const double side = std::sqrt(area);
   return fit_settings({{{0, 0, 0}, {side, 0, 0}, {side, side, 0}, {0, side, 0}}, {{0, 1, 2}, {0, 2, 3}}}, resolution,
-                      histograms, seconds);
+                      {histograms, true, seconds});
 }
 
 TEST(FitSettings, NeitherTheLayoutNorThePointsLimitTheResolution) {
@@ -45,18 +49,19 @@ TEST(FitSettings, EdgesOfAResolutionAndOneLevelWithHalfOfThat) {
 
 /// 500 triangles' pairs of 4.8 cm make a square metre.
 TEST(FitSettings, LargeSurfacesBeginCoarser) {
-  const FitSettings large = settings_for(1, 0.0137);
+  const FitSettings small = settings_for(0.04, 0.0137), large = settings_for(1, 0.0137);
   EXPECT_NEAR(large.edge_length, 0.048, 0.0005);
-  EXPECT_EQ(large.levels, large.coarse_levels + 2) << "2.4 and 1.2 cm; 0.6 would make 32000 vertices";
-  EXPECT_EQ(large.more_levels, 0);
-  EXPECT_EQ(settings_for(1, 0.03).levels, large.coarse_levels + 2) << "2.4 and 1.2 cm, which is no finer than half";
-  EXPECT_EQ(settings_for(0.5, 0.0137).levels, large.coarse_levels + 2) << "1.7 and 0.8 cm";
+  EXPECT_EQ(large.levels, small.levels);
+  EXPECT_EQ(large.samples, small.samples);
 }
 
-TEST(FitSettings, TheWorkOfALevelFallsWithTheirNumber) {
-  const FitSettings small = settings_for(0.04, 0.0137), large = settings_for(1, 0.0137);
-  ASSERT_LT(small.levels, large.levels);
-  EXPECT_NEAR(large.samples * large.levels, small.samples * small.levels, 2 * large.levels);
+/// A level takes as long whether light comes back the way it went or not, which is two rays for a sample.
+TEST(FitSettings, SamplesOfTwoWaysAreFewer) {
+  const Mesh start{{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}}, {{0, 1, 2}}};
+  const FitSettings one = fit_settings(start, 0.0137, {4096, true, 300}),
+                    two = fit_settings(start, 0.0137, {4096, false, 300});
+  EXPECT_NEAR(1.35 * two.samples, one.samples, 2);
+  EXPECT_NEAR(two.coarse_histograms, one.coarse_histograms, 10);
 }
 
 /// 1206 of 4096 with 398 samples each; more where each has fewer, so that an image of them has as many for the same time.
@@ -64,7 +69,8 @@ TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   const FitSettings usual = settings_for(0.04, 0.0137);
   EXPECT_EQ(usual.samples, 398);
   EXPECT_EQ(usual.coarse_histograms, 1206);
-  const FitSettings many = fit_settings({{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}}, {{0, 1, 2}}}, 0.0137, 1 << 16, 300);
+  const FitSettings many =
+      fit_settings({{{0, 0, 0}, {0.2, 0, 0}, {0, 0.2, 0}}, {{0, 1, 2}}}, 0.0137, {.histograms = 1 << 16});
   EXPECT_LT(many.samples, 64);
   EXPECT_NEAR(many.coarse_histograms * many.samples, 480000, 64);
   const FitSettings quick = settings_for(0.04, 0.0137, 4096, 60), small = settings_for(0.04, 0.0137, 576, 60);
@@ -73,6 +79,37 @@ TEST(FitSettings, CoarseLevelsHaveSamplesEnough) {
   EXPECT_NEAR(small.coarse_histograms, 256, 1) << "the least, as samples are even";
   EXPECT_NEAR(small.coarse_histograms * small.samples, quick.coarse_histograms * quick.samples, 600);
   EXPECT_NEAR(64 * tiny.samples, quick.coarse_histograms * quick.samples, 600) << "all that there are";
+}
+
+/// 400 points: three bins before the detector is on, some that are dark, and light that differs from point to point.
+CaptureFile lit_after(int dark_bins, double spread) {
+  std::mt19937 random(7);
+  CaptureFile capture;
+  capture.geometry = square_wall(20, 0.5);
+  capture.counts = GatedImage(20, 20, 64, 1);
+  for (int p = 0; p < 400; ++p) {
+    const double background = 2 * (1 + spread * std::sin(1.7 * p)), light = p % 3;
+    for (int g = 3; g < 64; ++g)
+      capture.counts.at(p, g) =
+          std::poisson_distribution<int>(g < 3 + dark_bins ? background : background + light)(random);
+  }
+  return capture;
+}
+
+TEST(FitSettings, BackgroundsDifferWhereWhatComesBeforeLightDoes) {
+  EXPECT_FALSE(backgrounds_differ(lit_after(20, 0), {})) << "light differs, not they";
+  EXPECT_TRUE(backgrounds_differ(lit_after(20, 0.3), {}));
+  EXPECT_TRUE(backgrounds_differ(lit_after(6, 0.5), {})) << "few dark bins";
+  CaptureFile one = lit_after(20, 0);
+  for (int g = 0; g < 64; ++g) one.counts.at(33, g) *= 8;
+  EXPECT_TRUE(backgrounds_differ(one, {}));
+  std::vector<std::uint8_t> used(400, 1);
+  used[33] = 0;
+  EXPECT_FALSE(backgrounds_differ(one, used));
+  CaptureFile none = lit_after(20, 0);
+  for (int p = 0; p < 400; ++p)
+    for (int g = 0; g < 64; ++g) none.counts.at(p, g) = g < 30 ? 0 : std::max(0, g - 30 - p % 7);
+  EXPECT_FALSE(backgrounds_differ(none, {})) << "nothing but light";
 }
 
 }  // namespace
