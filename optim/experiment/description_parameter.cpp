@@ -259,8 +259,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
     };
     inner.map("outline", outline,
               "the first level leaves the shape's albedos by vertex free to become dark; the surface ends where they "
-              "are, so that gaps open "
-              "and webs tear",
+              "are, so that gaps open and webs tear; strips that become narrower than an edge are cut",
               {.unset = spec.remesh.outline == 0});
     inner.value("coarse_histograms", field::integer(spec.remesh.coarse_histograms, 0, std::numeric_limits<int>::max()),
                 "the coarse levels but the last one are fitted to so many of a capture's histograms, spread "

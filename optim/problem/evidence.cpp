@@ -52,7 +52,7 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
   const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
   std::vector<double> factors(specs.size(), 1.0);
   const Poll poll = [] {};
-  const PosteriorSamples samples = RenderedCurvature(problem, target, theta, poll).samples(kEvidenceSamples);
+  const PosteriorSamples samples = RenderedCurvature(problem, target, theta, poll).samples();
   const PenaltyScale scale = problem.penalty_scale(target);
   for (std::size_t i = 0; i < specs.size(); ++i) {
     if (!specs[i].evidence || !(specs[i].*weight_by_evidence(specs[i]) > 0)) continue;

@@ -12,9 +12,6 @@
 
 namespace isochron {
 
-/// Samples of the posterior: one knows g to a standard error of sqrt(3 g), and what the noise of the Jacobian adds. They share their passes.
-inline constexpr int kEvidenceSamples = 4;
-
 /// The weight of a parameter's smoothing that evidence is about: of variation, else of bending, else of slopes. Slopes of a surface that bends
 /// are about its motion within a level, which is no property of it.
 double ParameterSpec::*weight_by_evidence(const ParameterSpec& spec);

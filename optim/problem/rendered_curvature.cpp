@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/base/parallel.h"
-#include "core/films/sinks.h"
 #include "optim/problem/conjugate_gradients.h"
 #include "optim/problem/jacobian.h"
 #include "optim/problem/metric.h"

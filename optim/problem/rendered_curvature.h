@@ -2,10 +2,15 @@
 #pragma once
 #include <vector>
 
+#include "core/films/sinks.h"
 #include "optim/problem/eliminated_errors.h"
 #include "optim/problem/problem.h"
 
 namespace isochron {
+
+/// Of a posterior. An error is known from n of them to a factor of about 1 +- 1 / sqrt(2 n), g of evidence.h from one to a standard error of
+/// sqrt(3 g), and what the noise of the Jacobian adds. They share their passes, as many as share them at little cost.
+inline constexpr int kPosteriorSamples = kAdjointsTogether;
 
 /// Samples of a posterior, and with which gradients the readings pull at each.
 struct PosteriorSamples {
@@ -38,7 +43,7 @@ class RenderedCurvature : public CurvatureProducts {
   /// How the unknowns scatter about the optimum, `count` times: by the noise of the readings, and by what the prior leaves
   /// open. Their covariance is (H + P)^-1, which is that of the unknowns but for variance_scale(). The Jacobian's
   /// own noise adds to it. Unknowns that lie at a bound, or that nothing depends on, stay. Not for finite differences.
-  PosteriorSamples samples(int count) const;
+  PosteriorSamples samples(int count = kPosteriorSamples) const;
   /// Diagonals of H + P, estimated and on average too large by the noise of the Jacobian (see Objective::probe_curvature), and of
   /// P, that of smoothing. The former is rendered when it is first asked for.
   const std::vector<double>& diagonal() const;

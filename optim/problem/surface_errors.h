@@ -10,11 +10,7 @@ namespace isochron {
 /// open. Without, single vertices are rarely determined.
 bool has_surface_errors(const Problem& problem);
 
-/// Samples of the posterior that errors are taken from: an error is known to a factor of about 1 +- 1 / sqrt(2 x this). They share their
-/// passes over the Jacobian.
-inline constexpr int kErrorSamples = 4;
-
-/// Standard errors of all vertices of the scene along their normals, scene units, at theta: root mean square of what `samples` of the posterior
+/// Standard errors of all vertices of the scene along their normals, scene units, at theta: root mean square of what samples of the posterior
 /// (RenderedCurvature::samples) move them by. NaN for vertices that no such parameter moves, and where `scale`, see variance_scale(), is
 /// not known.
 std::vector<double> surface_errors(const Problem& problem, const PosteriorSamples& samples,

@@ -165,7 +165,7 @@ class Levels {
       surface = found_surface(former, theta, remeshed_);
       if (!first) {
         surface->mesh = unfolded(std::move(surface->mesh));
-        surface = without_small_features(*surface, edge_length);
+        surface = without_small_features(*surface, edge_length, remeshed_.remesh.outline > 0);
       }
       if (remeshed_.remesh.finds_outline(level - 1))
         surface = within_outline(*surface, former.experiment().parameters, remeshed_.remesh.outline,

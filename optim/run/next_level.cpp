@@ -137,7 +137,7 @@ LevelSurface within_outline(const LevelSurface& surface, const std::vector<Param
   return result;
 }
 
-LevelSurface without_small_features(const LevelSurface& surface, double edge_length) {
+LevelSurface without_small_features(const LevelSurface& surface, double edge_length, bool cuts_strips) {
   // A regular triangle's.
   const double least_area = std::sqrt(3.0) / 4 * edge_length * edge_length;
   const auto is_corner = [](const MeshPoint& point) { return std::ranges::max(point.weights) == 1; };
@@ -146,7 +146,7 @@ LevelSurface without_small_features(const LevelSurface& surface, double edge_len
     return same || left.mesh.faces.empty() ? old : carried_over(old, left);
   };
   LevelSurface left = carried_where_changed(surface, without_small_holes(surface.mesh, least_area));
-  left = carried_where_changed(left, without_bridges(left.mesh, edge_length));
+  if (cuts_strips) left = carried_where_changed(left, without_bridges(left.mesh, edge_length));
   return carried_where_changed(left, without_small_parts(left.mesh, least_area));
 }
 

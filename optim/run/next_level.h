@@ -43,10 +43,10 @@ LevelSurface found_surface(const Problem& problem, const std::vector<double>& th
 LevelSurface within_outline(const LevelSurface& surface, const std::vector<ParameterSpec>& parameters, double share,
                             double least_area);
 
-/// The same without what a fit has shrunk below a regular triangle of that size: connected parts of less area, unless all are, and strips between
-/// two borders that are narrower go, holes with a shorter border are closed. They would shrink with every level, and penalties relative to
-/// the distance of their vertices would grow without bound.
-LevelSurface without_small_features(const LevelSurface& surface, double edge_length);
+/// The same without what a fit has shrunk below a regular triangle of that size: connected parts of less area go, unless all have less, and holes
+/// with a shorter border are closed. They would shrink with every level, and penalties relative to the distance of their vertices would grow without
+/// bound. `cuts_strips`: narrower strips between two borders go, too, where the surface's outline is to be found.
+LevelSurface without_small_features(const LevelSurface& surface, double edge_length, bool cuts_strips);
 
 /// The same in triangles of that size. Throws InputError where it is no manifold.
 LevelSurface remeshed_surface(const LevelSurface& surface, double edge_length);

@@ -234,7 +234,7 @@ class Run {
   PosteriorSamples posterior_samples(const RenderedCurvature& curvature) {
     const bool surfaces = has_surface_errors(problem_);
     if (by_differences() || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty()))) return {};
-    PosteriorSamples samples = curvature.samples(surfaces ? kErrorSamples : kEvidenceSamples);
+    PosteriorSamples samples = curvature.samples();
     determined_ = determined_unknowns(problem_, free_unknowns(problem_, state_.theta), samples);
     return samples;
   }

@@ -244,7 +244,7 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
       determined -=
           prior[i * n + j] * std::inner_product(inverse[i].begin(), inverse[i].end(), inverse[j].begin(), 0.0);
   double found = 0;
-  const PosteriorSamples samples = curvature.samples(kErrorSamples);
+  const PosteriorSamples samples = curvature.samples();
   for (const double error : surface_errors(problem, samples, theta, scale)) found += error * error;
   EXPECT_NEAR(std::sqrt(found / expected), 1, 0.3) << found << " " << expected;
   // Of the gain, which nothing holds, all is determined. Sixteen samples know the number of the others, here 90, to about
