@@ -16,8 +16,8 @@ namespace {
 /// Of a level, per histogram: the rabbit of scenes/rabbit, 4096 histograms in eleven levels, has 398 for 300 s.
 constexpr double kLevelSamplesPerSecond = 60000;
 constexpr int kLeastSamples = 16, kMostSamples = 4096;
-/// A sample's work where light goes and comes back on two ways, over that of a confocal one: levels by adam of the blob under 8 x 8 spots took 20.7 s,
-/// confocal ones 15.2.
+/// A sample's work where light goes and comes back on two ways, over that of a confocal one: levels by adam of the blob under 8 x 8 spots took
+/// 20.7 s, confocal ones 15.2.
 constexpr double kTwoWays = 1.35;
 /// The first finds the outline and the second the albedo; seven of adam move borders; the last has all histograms, for the
 /// evidence of the level after it.
@@ -63,7 +63,7 @@ bool vary(const std::vector<double>& numbers) {
 }
 
 /// The bins before light comes, by what is counted in each: from the first that counts until one counts more than the least so far by eight
-/// standard deviations. Dark bins after the light hold its tails.
+/// standard deviations: the least of a thousand is some three below their mean. Dark bins after the light hold its tails.
 std::pair<int, int> dark_before_light(const std::vector<double>& counted) {
   constexpr double kClearly = 8;
   const auto first = std::ranges::find_if(counted, [](double sum) { return sum > 0; });

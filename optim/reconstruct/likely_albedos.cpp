@@ -17,8 +17,9 @@ constexpr int kSteps = 256;  // by the silhouettes of seven shapes (optim/README
 /// Of a step. Fewer make it jump.
 constexpr std::size_t kLeastRows = 64;
 constexpr double kLeastPhotons = 1e5;
-/// Of the albedo that all begin with, and steps after which darker voxels are left out: those of surfaces become far brighter. Of 9e5 voxels of
-/// a wide wall that are lit 4.1e5 are left at the end, in place of 6.2e5 at a tenth of that; the starts of three shapes are the same to 0.006 of their silhouettes.
+/// Of the albedo that all begin with, and steps after which darker voxels are left out: those of surfaces become far brighter. Of the 9e5 voxels
+/// of scripts/shape_study.py's `wide` 4.1e5 are left at the end, in place of 6.2e5 with a tenth of this and 32 steps. The starts of `wide` and
+/// `blob` have the same silhouettes to 0.006.
 constexpr float kLeastAlbedo = 0.1f;
 constexpr int kDropSteps = 8;
 /// Rounds in which a background follows what light leaves of a histogram.
