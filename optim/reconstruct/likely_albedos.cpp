@@ -17,10 +17,8 @@ constexpr int kSteps = 256;  // by the silhouettes of seven shapes (optim/README
 /// Of a step. Fewer make it jump.
 constexpr std::size_t kLeastRows = 64;
 constexpr double kLeastPhotons = 1e5;
-/// Of the albedo that all begin with, and steps after which darker voxels are left out: those of surfaces become far brighter. Of the 9e5 voxels
-/// of scripts/shape_study.py's `wide` 4.1e5 are left at the end, in place of 6.2e5 with a tenth of this and 32 steps. The starts of `wide` and
-/// `blob` have the same silhouettes to 0.006.
-constexpr float kLeastAlbedo = 0.1f;
+/// Of the mean albedo weighted by itself, and steps after which darker voxels are left out. Surfaces end at 0.05 of it at least.
+constexpr double kLeastAlbedo = 0.01;
 constexpr int kDropSteps = 8;
 /// Rounds in which a background follows what light leaves of a histogram.
 constexpr int kBackgroundRounds = 2;
@@ -219,10 +217,17 @@ class Maximisation {
   }
 
   void drop_dark() {
+    double sum = 0, squares = 0;
+    for (const LitVoxels& block : blocks_)
+      for (const float albedo : block.albedo) {
+        sum += albedo;
+        squares += double{albedo} * albedo;
+      }
+    const double least = sum > 0 ? kLeastAlbedo * squares / sum : 0;
     std::vector<std::pair<std::size_t, float>> left;
     for (const LitVoxels& block : blocks_)
       for (int i = 0; i < VoxelBlock::kVoxels; ++i)
-        if (block.albedo[i] > kLeastAlbedo * start_) left.emplace_back(block.index[i], block.albedo[i]);
+        if (block.albedo[i] > least) left.emplace_back(block.index[i], block.albedo[i]);
     if (left.empty()) return;
     blocks_.clear();
     count_ = 0;

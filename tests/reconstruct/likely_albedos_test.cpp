@@ -72,6 +72,20 @@ TEST(LikelyAlbedos, AreLowInAGapOfOthersWithAResponse) {
   expect_gap(two_plates(wall, late(0.02)), late(0.02));
 }
 
+/// A plate and a dim one beside sixty times as much background: what is left out as dark is dark beside what is found, not beside what all
+/// began with.
+TEST(LikelyAlbedos, DimPlatesAreFoundBesideMuchBackground) {
+  std::vector<HiddenPatch> patches = plate({-0.045, 0, 0.4}, 0.05, 0.12, 0.01);
+  for (HiddenPatch patch : plate({0.045, 0, 0.4}, 0.05, 0.12, 0.01)) {
+    patch.area *= 0.4;
+    patches.push_back(patch);
+  }
+  CaptureFile capture = expected_counts(square_wall(20, 0.5), patches, kLikelyBins, kLikelyBin, 5000);
+  for (double& value : capture.counts.data) value += 60 * 5000.0 / kLikelyBins;
+  const Found found(capture);
+  EXPECT_NEAR(albedo_about(found.likely, 0.045, 0, 0.03) / albedo_about(found.likely, -0.045, 0, 0.03), 0.4, 0.1);
+}
+
 /// The depth is the patch's, whatever the response and the ways to the wall.
 TEST(LikelyAlbedos, APatchIsWhereItIs) {
   CaptureGeometry wall = square_wall(16, 0.5);
