@@ -178,7 +178,8 @@ def main():
                         help="of the expected counts in all: their noise has to be far below that of the photons (default 2^28)")
     parser.add_argument("--seconds", type=float, default=300, help="of each reconstruction (default 300)")
     parser.add_argument("--seed", type=int, default=1, help="of all random numbers (default 1)")
-    parser.add_argument("--keep", type=pathlib.Path, help="folder for captures, which are made unless they are there, and runs; default: a temporary one")
+    parser.add_argument("--keep", type=pathlib.Path, help="folder for runs, and for captures, which are taken as they are where they are there "
+                        "(made with whatever options); default: a temporary one")
     return study(parser, "shapes.csv", COLUMNS,
                  lambda options, folder: (rows(name, known[name], options, folder) for name in options.shapes), table_of)
 

@@ -138,9 +138,10 @@ bool backgrounds_differ(const CaptureFile& capture, const std::vector<std::uint8
   for_each_count(0, counts.gates, [&](int, int bin, double count) { by_bin[bin] += count; });
   const auto [first, last] = dark_before_light(by_bin);
   for_each_count(first, last, [&](int point, int, double count) { by_point[point] += count; });
-  for (int point = points - 1; point >= 0; --point)
-    if (!is_used(point)) by_point.erase(by_point.begin() + point);
-  return vary(by_point);
+  std::vector<double> counted;
+  for (int point = 0; point < points; ++point)
+    if (is_used(point)) counted.push_back(by_point[point]);
+  return vary(counted);
 }
 
 TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const DetectorResponse& response,

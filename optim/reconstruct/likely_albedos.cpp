@@ -155,9 +155,10 @@ class Maximisation {
         arrive(arrivals, block, row);
         for (int i = 0; i < VoxelBlock::kVoxels; ++i) weights += block.albedo[i] * arrivals.weight[i];
       }
-    if (weights > 0) start_ = static_cast<float>(photons * rows / weights);
+    if (!(weights > 0)) return;
+    const auto start = static_cast<float>(photons * rows / weights);
     for (LitVoxels& block : blocks_)
-      for (float& albedo : block.albedo) albedo *= start_;
+      for (float& albedo : block.albedo) albedo *= start;
   }
 
   void make_step(const std::vector<std::size_t>& rows) {
@@ -240,7 +241,6 @@ class Maximisation {
   const BinResponse response_;
   std::vector<LitVoxels> blocks_;
   std::size_t count_ = 0;
-  float start_ = 1;
   std::vector<double> photons_, background_;  ///< of each histogram; of each, per bin
 };
 

@@ -204,7 +204,7 @@ Remeshed without_small_holes(const Mesh& mesh, double least_area) {
   return result;
 }
 
-Remeshed without_bridges(const Mesh& mesh, double least_width) {
+Remeshed without_narrow_strips(const Mesh& mesh, double least_width) {
   const std::vector<Vec3>& p = mesh.positions;
   const std::set<std::pair<int, int>> edges = directed_edges(mesh);
   constexpr int kInside = -1;

@@ -27,6 +27,6 @@ Remeshed without_small_holes(const Mesh& mesh, double least_area);
 
 /// Strips between two borders of an oriented manifold are cut where an edge across them is shorter than that: a fit draws borders together
 /// but cannot open a hole. Necks between two parts, which have one border on both sides, stay.
-Remeshed without_bridges(const Mesh& mesh, double least_width);
+Remeshed without_narrow_strips(const Mesh& mesh, double least_width);
 
 }  // namespace isochron

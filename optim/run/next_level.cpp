@@ -146,7 +146,7 @@ LevelSurface without_small_features(const LevelSurface& surface, double edge_len
     return same || left.mesh.faces.empty() ? old : carried_over(old, left);
   };
   LevelSurface left = carried_where_changed(surface, without_small_holes(surface.mesh, least_area));
-  if (cuts_strips) left = carried_where_changed(left, without_bridges(left.mesh, edge_length));
+  if (cuts_strips) left = carried_where_changed(left, without_narrow_strips(left.mesh, edge_length));
   return carried_where_changed(left, without_small_parts(left.mesh, least_area));
 }
 

@@ -141,7 +141,7 @@ TEST(Outline, SmallPartsAreNotClosed) {
 
 /// A square of 8 x 8 cells without 2 x 5 of them: one cell is left beyond this hole at one end, two at the other. The strip of one cell is cut
 /// where its edges are short enough. The other one, with inner vertices, and both sides of the hole stay.
-TEST(Outline, NarrowBridgesAreCut) {
+TEST(Outline, NarrowStripsAreCut) {
   Mesh whole;
   add_square(whole, {0, 0, 0}, 8);
   Mesh mesh{whole.positions, {}};
@@ -150,8 +150,8 @@ TEST(Outline, NarrowBridgesAreCut) {
     if (!((x == 3 || x == 4) && y >= 1 && y < 6)) mesh.faces.push_back(whole.faces[f]);
   }
   const double area = 1 - 10.0 / 64;
-  EXPECT_NEAR(area_left(without_bridges(mesh, 0.999 / 8)), area, 1e-12);
-  const Remeshed cut = without_bridges(mesh, 1.001 / 8);
+  EXPECT_NEAR(area_left(without_narrow_strips(mesh, 0.999 / 8)), area, 1e-12);
+  const Remeshed cut = without_narrow_strips(mesh, 1.001 / 8);
   EXPECT_NEAR(area_left(cut), area - 0.055, 0.01);
   double lowest = 1;  // of the strip
   for (const Vec3& p : cut.mesh.positions)
@@ -167,7 +167,7 @@ TEST(Outline, NecksStay) {
   const int right = 25;
   mesh.faces.push_back({4, right, right + 5});
   mesh.faces.push_back({4, right + 5, 9});
-  EXPECT_NEAR(area_left(without_bridges(mesh, 1)), 2 + 1.0 / 16, 1e-12);
+  EXPECT_NEAR(area_left(without_narrow_strips(mesh, 1)), 2 + 1.0 / 16, 1e-12);
 }
 
 /// A fit that pulls a hole together to a point leaves edges of no length, which remeshing takes away once it is closed.
