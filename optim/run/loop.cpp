@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 #include "optim/problem/vector_math.h"
 
@@ -46,7 +47,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
   if (!state.optimizer.empty()) optimizer.restore(state.optimizer);
   for (;;) {
     const auto iteration = static_cast<std::uint32_t>(state.iteration);
-    const Evaluation now = optimizer.evaluate(objective, state.theta, iteration);
+    Evaluation now = optimizer.evaluate(objective, state.theta, iteration);
     if (state.iteration == 0) {
       state.loss_initial = now.loss;
       state.loss_noise_initial = now.loss_noise;
@@ -68,16 +69,22 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
       if (agrees) {
         result.status = RunStatus::converged;
       } else if (diverged) {
-        result = {RunStatus::diverged, FinalChoice::best};
+        result.status = RunStatus::diverged;
+        result.choice = FinalChoice::best;
         chosen = safeguard.state().best_theta;
       } else if (verdict == Verdict::settled) {
-        result = {RunStatus::converged, FinalChoice::average};
+        result.status = RunStatus::converged;
+        result.choice = FinalChoice::average;
         chosen = safeguard.settled_theta();
       } else if (optimizer.scatters() && descent.settled()) {
         result.choice = FinalChoice::average;
         chosen = descent.settled_theta();
       }
-      if (chosen != state.theta) options.row(objective.evaluate(chosen, iteration + 1), chosen, true);
+      if (chosen != state.theta) {
+        now = objective.evaluate(chosen, iteration + 1);
+        options.row(now, chosen, true);
+      }
+      result.final = std::move(now);
       state.safeguard = safeguard.state();
       state.descent = descent.state();
       state.theta = chosen;
@@ -96,7 +103,7 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
       warn(fmt::format("{}; continuing from the best parameters with {} of the rate",
                        finite ? "the loss has risen" : "loss or gradient is not finite", safeguard.state().rate));
     } else {
-      next = optimizer.step(objective, now, state.theta, iteration, safeguard.state().rate);
+      next = optimizer.step(objective, std::move(now), state.theta, iteration, safeguard.state().rate);
       if (optimizer.stuck()) safeguard.restart_window();
       state.steps_rejected += optimizer.rejected();
       state.steps_rejected_in_row = optimizer.rejected() ? state.steps_rejected_in_row + 1 : 0;

@@ -148,7 +148,6 @@ class Run {
     if (state_.iteration == 0) geometry.write("target", parameters_.target());
     Log log(path("log.csv"), parameters_, state_.iteration);
     const Frames frames(options_.folder, problem_.experiment().output.frames, target_, notes_);
-    Evaluation final;
     const Clock::time_point call_start = Clock::now();
     Clock::time_point iteration_start = call_start;
     const int first = state_.iteration;
@@ -183,7 +182,6 @@ class Run {
         }
       }
       log.append(last_, theta, now.gradient);
-      final = now;
       if (!closing) report(first, seconds_since(call_start));
       if (options_.row) options_.row(last_, theta, now, closing);
     };
@@ -199,7 +197,7 @@ class Run {
       stage.advance();
     };
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
-    write_exr(path("final.exr"), final.image, notes_);
+    write_exr(path("final.exr"), result.final.image, notes_);
     std::optional<RenderedCurvature> curvature;
     PosteriorSamples samples;
     const Poll never = [] {};  // as it ends, a run is not interrupted
@@ -210,13 +208,13 @@ class Run {
     judge_expected_counts();
     std::vector<double> of_surfaces;
     if (curvature && !(options_.followed_unless_explained && fit_ && fit_->verdict() == FitVerdict::unexplained))
-      of_surfaces = find_errors(*curvature, samples, {variance_scale(problem_, final), optimizer->scatters()});
+      of_surfaces = find_errors(*curvature, samples, {variance_scale(problem_, result.final), optimizer->scatters()});
     geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");
     // Of levels that others follow a noisier iteration at the end says little.
     if (fit_ && (options_.errors ? left_its_data(*fit_, state_, last_) : fit_->lost()))
       result.status = RunStatus::diverged;
-    zero_gradients_ = zero_gradient_report(parameters_, final.gradient);
+    zero_gradients_ = zero_gradient_report(parameters_, result.final.gradient);
     return result;
   }
 

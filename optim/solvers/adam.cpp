@@ -22,7 +22,7 @@ class Adam : public Optimizer {
     return last ? objective.evaluate(theta, iteration) : objective.evaluate_part(theta, iteration, share_.parts());
   }
 
-  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+  std::vector<double> step(const Objective& objective, Evaluation now, const std::vector<double>& theta,
                            std::uint32_t iteration, double rate) override {
     std::vector<double> next = theta;
     share_.observe(now.gradient);

@@ -109,7 +109,7 @@ class Lbfgs : public Optimizer {
  public:
   Lbfgs(double first_step, int inner_iterations) : first_step_(first_step), inner_iterations_(inner_iterations) {}
 
-  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+  std::vector<double> step(const Objective& objective, Evaluation now, const std::vector<double>& theta,
                            std::uint32_t iteration, double rate) override {
     auto* loss = new ScaledLoss(objective, now, theta, iteration, first_step_, gradient_size(now.gradient));
     const ceres::GradientProblem problem(loss);  // owns it

@@ -16,8 +16,9 @@ namespace {
 /// The loss of one iteration as n + 1 residuals of the n unknowns of a QuadraticModel. Ceres sees J'J and J'r
 /// through the model and half the sum of squares through the loss (its last residual makes up the
 /// difference), which are all that Levenberg-Marquardt uses: the residuals of all pixels and gates never
-/// reach it. To the loss a constant is added, which changes no difference, so that estimates below 0 have roots, too. At any other point than the first the Jacobian is zero, which ends the solver after its first
-/// accepted step: the next linearisation has the random numbers of the next iteration.
+/// reach it. To the loss a constant is added, which changes no difference, so that estimates below 0 have roots, too. At any other point than
+/// the first the Jacobian is zero, which ends the solver after its first accepted step: the next linearisation has the random numbers of the
+/// next iteration.
 class CondensedLoss : public ceres::CostFunction {
  public:
   CondensedLoss(const Objective& objective, const Evaluation& now, const QuadraticModel& model,
@@ -93,7 +94,7 @@ class LevenbergMarquardt : public Optimizer {
     return objective.linearise(theta, iteration);
   }
 
-  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+  std::vector<double> step(const Objective& objective, Evaluation now, const std::vector<double>& theta,
                            std::uint32_t iteration, double rate) override {
     // Unknowns on a bound and drawn outwards stay there; else their part of the step would spoil that of the
     // others.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <stdexcept>
+#include <utility>
 
 namespace isochron {
 
@@ -80,11 +81,11 @@ class Scaled : public Optimizer {
                       std::uint32_t iteration) const override {
     return inner_->evaluate(objective, theta, iteration);
   }
-  std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+  std::vector<double> step(const Objective& objective, Evaluation now, const std::vector<double>& theta,
                            std::uint32_t iteration, double rate) override {
     const ScaledObjective scaled(objective, scales_);
     const std::vector<double> u = scaled.to_u(theta);
-    const std::vector<double> next = inner_->step(scaled, scaled.scaled(now), u, iteration, rate);
+    const std::vector<double> next = inner_->step(scaled, scaled.scaled(std::move(now)), u, iteration, rate);
     std::vector<double> result = scaled.to_theta(next);
     for (std::size_t i = 0; i < result.size(); ++i)
       if (next[i] == u[i]) result[i] = theta[i];  // what does not move keeps its bits

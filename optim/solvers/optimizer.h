@@ -25,7 +25,7 @@ class Optimizer {
   }
   /// Where one iteration leads from theta, within the bounds. `now` is evaluate(objective, theta, iteration);
   /// its loss and gradient are finite. Every step is shortened by `rate`, in (0, 1].
-  virtual std::vector<double> step(const Objective& objective, const Evaluation& now, const std::vector<double>& theta,
+  virtual std::vector<double> step(const Objective& objective, Evaluation now, const std::vector<double>& theta,
                                    std::uint32_t iteration, double rate) = 0;
   /// Whether the last step() stayed where it was because no point that it tried had a lower loss.
   virtual bool rejected() const { return false; }

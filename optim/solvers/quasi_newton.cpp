@@ -7,6 +7,7 @@
 #include <cmath>
 #include <deque>
 #include <optional>
+#include <utility>
 
 #include "optim/problem/metric.h"
 #include "optim/solvers/optimizer.h"
@@ -36,14 +37,15 @@ class QuasiNewton : public Optimizer {
  public:
   explicit QuasiNewton(int inner_iterations) : inner_iterations_(inner_iterations) {}
 
-  Vector step(const Objective& objective, const Evaluation& now, const Vector& theta, std::uint32_t iteration,
+  Vector step(const Objective& objective, Evaluation now, const Vector& theta, std::uint32_t iteration,
               double rate) override {
     update_diagonal(objective, now, theta, iteration);
     couplings_ = objective.couplings();
     metric_.reset();
     rejected_ = true;
     Vector at = theta;
-    Evaluation here = now;
+    const double noise = now.loss_noise;
+    Evaluation here = std::move(now);
     for (int i = 0; i < inner_iterations_; ++i) {
       Search search = descend(objective, iteration, at, here);
       if (search == Search::failed && !pairs_.empty()) {  // the pairs may be to blame
@@ -53,7 +55,7 @@ class QuasiNewton : public Optimizer {
       if (search != Search::moved) break;
       rejected_ = false;
     }
-    stuck_ = rejected_ && promised_ > now.loss_noise;
+    stuck_ = rejected_ && promised_ > noise;
     if (stuck_) reset();  // what was learnt elsewhere does not hold here
     for (std::size_t i = 0; i < at.size(); ++i) at[i] = theta[i] + rate * (at[i] - theta[i]);
     return at;
