@@ -8,13 +8,12 @@
 // Backgrounds. Unknown ones count with the values that are most likely beside the model's light (likely_backgrounds.h). A fit's own
 // scatter about these with the noise of its images. Each deviation is small, but there are thousands.
 // Unknowns. Each takes its leverage times m h''(m) from the deviance, summed over the readings: 1 where counts are many, less
-// where they are few. That of a background lies on the readings of its points, in proportion to 1 / m, that of all else is taken to lie where light is, in
-// proportion to light^2 / m. Unknowns at a bound take nothing.
-// Noise of the image. The mean is rendered, in two independent halves. Their difference removes the bias from T: the nonlinear part
-// h(m) becomes 2 h(m) - f h(m1) - (1 - f) h(m2), f being the first half's share of the samples, without bias to second order, and
-// N - m of one half is multiplied by L of the other. To the variance both T's slopes times the halves' difference add. Where rare
-// samples make most of a reading, halves are far apart and second order is not enough: what noise adds is then too small. So
-// p-values hold where the noise makes a small part of the spread (image_share); more samples are rendered until it does.
+// where they are few. That of a background lies on the readings of its points, in proportion to 1 / m, that of all else is taken to lie where
+// light is, in proportion to light^2 / m. Unknowns at a bound take nothing. Noise of the image. The mean is rendered, in two independent halves.
+// Their difference removes the bias from T: the nonlinear part h(m) becomes 2 h(m) - f h(m1) - (1 - f) h(m2), f being the first half's share of
+// the samples, without bias to second order, and N - m of one half is multiplied by L of the other. To the variance both T's slopes times the
+// halves' difference add. Where rare samples make most of a reading, halves are far apart and second order is not enough: what noise adds is
+// then too small. So p-values hold where the noise makes a small part of the spread (image_share); more samples are rendered until it does.
 // Probability. T is taken for a gamma variable of its first three moments (Wilson and Hilferty's cube root), which chi^2 is.
 #pragma once
 #include <optional>

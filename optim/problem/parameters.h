@@ -37,8 +37,8 @@ void mark_hidden(Scene& scene, const Experiment& experiment);
 
 class Parameters {
  public:
-  /// `gate_unit`: scene units per unit of the gates' lengths. Binds the parameters to a loaded scene, which must outlive this. Throws InputError (line and key) for a
-  /// shape or material that is not there, an empty selection, values of the wrong number or out of bounds.
+  /// `gate_unit`: scene units per unit of the gates' lengths. Binds the parameters to a loaded scene, which must outlive this. Throws InputError
+  /// (line and key) for a shape or material that is not there, an empty selection, values of the wrong number or out of bounds.
   Parameters(const Scene& scene, const std::vector<ParameterSpec>& specs, double gate_unit = 1);
 
   int size() const { return static_cast<int>(component_names_.size()); }  ///< scalar unknowns

@@ -16,6 +16,12 @@ double Readings::pixels(const GatedImage& image) const {
   return pixel.empty() ? image.pixels() : static_cast<double>(pixel.size() - std::count(pixel.begin(), pixel.end(), 0));
 }
 
+std::vector<char> Readings::left_out() const {
+  std::vector<char> others = pixel;
+  for (char& each : others) each = !each;
+  return others;
+}
+
 double Readings::count(const GatedImage& image) const {
   const auto gates =
       gate.empty() ? image.gates : static_cast<double>(gate.size() - std::count(gate.begin(), gate.end(), 0));

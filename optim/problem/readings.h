@@ -15,11 +15,13 @@ namespace isochron {
 /// Those of some pixels under some gates. Everything that is a mean over readings is one over these.
 struct Readings {
   std::vector<char> pixel, gate;  ///< whether they count, one entry each; empty: all do
-  double drawn =
-      1;  ///< share of the pixels that these are, where others are drawn for each estimate of a mean over all
+  /// Share of the pixels that these are, where others are drawn for each estimate of a mean over all.
+  double drawn = 1;
 
   bool uses_pixel(int p) const { return pixel.empty() || pixel[p]; }
   bool uses_gate(int g) const { return gate.empty() || gate[g]; }
+  /// The other pixels, see Capture::left_out: no sample starts there.
+  std::vector<char> left_out() const;
   /// How many pixels and how many readings of an image count.
   double pixels(const GatedImage& image) const;
   double count(const GatedImage& image) const;

@@ -5,8 +5,9 @@
 // like have taken over all that they can.
 //
 // Noise of the renderer moves what is fitted to images of one set of random numbers: by as much as Newton steps by gradients of
-// different random numbers scatter, whose variance is added. Noise in J: H comes from two independent halves of its samples, (J1'W J2 + J2'W J1) / 2, which has no bias
-// but noise; J'WJ of all samples is semidefinite, but too large by the noise's own variance, and errors from it are too small.
+// different random numbers scatter, whose variance is added. Noise in J: H comes from two independent halves of its samples, (J1'W J2 + J2'W J1)
+// / 2, which has no bias but noise; J'WJ of all samples is semidefinite, but too large by the noise's own variance, and errors from it are too
+// small.
 //
 // Undetermined is an unknown on which no reading depends; one that takes part in a direction that no reading sees, where only a
 // product or a sum is determined (null_directions.h); and one whose error noise hides (joint_errors.h). The first two are judged

@@ -6,6 +6,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/progress.h"
+#include "core/base/self_weighted_mean.h"
 #include "optim/reconstruct/arrivals.h"
 
 namespace isochron {
@@ -218,13 +219,10 @@ class Maximisation {
   }
 
   void drop_dark() {
-    double sum = 0, squares = 0;
+    SelfWeightedMean found;
     for (const LitVoxels& block : blocks_)
-      for (const float albedo : block.albedo) {
-        sum += albedo;
-        squares += double{albedo} * albedo;
-      }
-    const double least = sum > 0 ? kLeastAlbedo * squares / sum : 0;
+      for (const float albedo : block.albedo) found.add(albedo);
+    const double least = kLeastAlbedo * found.mean();
     std::vector<std::pair<std::size_t, float>> left;
     for (const LitVoxels& block : blocks_)
       for (int i = 0; i < VoxelBlock::kVoxels; ++i)

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/self_weighted_mean.h"
+
 namespace isochron {
 namespace {
 
@@ -88,13 +90,10 @@ struct DepthMap {
   }
   /// That light of it comes from.
   double mean_albedo(const Lines& lines) const {
-    double sum = 0, squares = 0;
-    for (std::size_t i = 0; i < depth.size(); ++i) {
-      if (!std::isfinite(depth[i])) continue;
-      sum += lines.albedo[i];
-      squares += lines.albedo[i] * lines.albedo[i];
-    }
-    return sum > 0 ? squares / sum : 0;
+    SelfWeightedMean found;
+    for (std::size_t i = 0; i < depth.size(); ++i)
+      if (std::isfinite(depth[i])) found.add(lines.albedo[i]);
+    return found.mean();
   }
   DepthMap smooth(int rounds) const {
     DepthMap result = *this;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/base/disjoint_sets.h"
+#include "core/base/self_weighted_mean.h"
 
 namespace isochron {
 namespace {
@@ -169,15 +170,10 @@ class Cut {
 std::vector<double> typical_albedos(const Mesh& mesh, const std::vector<double>& albedo) {
   const std::vector<double> area = areas_of(mesh);
   DisjointSets parts = joined(mesh, [](int, int) { return true; });
-  std::vector<double> sums(albedo.size(), 0.0), squares(albedo.size(), 0.0), typical(albedo.size());
-  for (int v = 0; v < std::ssize(albedo); ++v) {
-    sums[parts.root(v)] += area[v] * albedo[v];
-    squares[parts.root(v)] += area[v] * albedo[v] * albedo[v];
-  }
-  for (int v = 0; v < std::ssize(albedo); ++v) {
-    const int part = parts.root(v);
-    typical[v] = sums[part] > 0 ? squares[part] / sums[part] : 0;
-  }
+  std::vector<SelfWeightedMean> of_part(albedo.size());
+  std::vector<double> typical(albedo.size());
+  for (int v = 0; v < std::ssize(albedo); ++v) of_part[parts.root(v)].add(albedo[v], area[v]);
+  for (int v = 0; v < std::ssize(albedo); ++v) typical[v] = of_part[parts.root(v)].mean();
   return typical;
 }
 
