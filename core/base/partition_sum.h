@@ -98,10 +98,10 @@ void unpack(const std::string& bytes, Sum& sum, PartitionCosts& costs) {
 }
 
 /// The sum of what partitions give, whose number is a power of two. run(partition) makes a Sum, which is movable, has a default
-/// constructor, add(const Sum& of_later_partitions), and pack(Packer&) and unpack(Unpacker&) to reach other ranks. Sums are added along the binary tree whose leaves are the partitions, by the thread that completes a pair: an
-/// order that is the same for any number of threads, where few partial sums wait at a time (as many as threads, times the
-/// levels of the tree at most). Of several ranks each runs the partitions of its part; a pair that two of them made is added
-/// by the one of the first half.
+/// constructor, add(const Sum& of_later_partitions), and pack(Packer&) and unpack(Unpacker&) to reach other ranks. Sums are added along the
+/// binary tree whose leaves are the partitions, by the thread that completes a pair: an order that is the same for any number of threads, where
+/// few partial sums wait at a time (as many as threads, times the levels of the tree at most). Of several ranks each runs the partitions of its
+/// part; a pair that two of them made is added by the one of the first half.
 template <class Sum, class Run>
 Sum sum_of_partitions(SharedPartitions& shared, Run&& run) {
   // A heap: nodes 2 n and 2 n + 1 are the halves of node n, the leaves begin at `count`.

@@ -18,8 +18,8 @@ enum class ArcPick { contribution, uniform };
 /// others.
 enum class Numbers { low_discrepancy, independent };
 
-/// How the visibility term finds boundary segments. Each can be left out (YAML: `estimator.techniques`), to measure what it brings; the mean stays, except under Dirac
-/// gates, where only lengths drawn from the gates are met.
+/// How the visibility term finds boundary segments. Each can be left out (YAML: `estimator.techniques`), to measure what it brings; the mean
+/// stays, except under Dirac gates, where only lengths drawn from the gates are met.
 struct BoundaryTechniques {
   bool wedge = true;        ///< edges by length x wedge, azimuth inside the wedge; else by length, any direction
   bool aimed = true;        ///< directions from the edge towards emitters

@@ -13,8 +13,8 @@ namespace isochron {
 namespace {
 
 /// Widths of gates, relative to the path length, between which standard sampling and connections are both tried. Outside one of
-/// them is far better in every scene measured. Gates that together cover less than the lower one are hit by standard sampling so rarely that it looks too
-/// quiet in a trial.
+/// them is far better in every scene measured. Gates that together cover less than the lower one are hit by standard sampling so rarely that it
+/// looks too quiet in a trial.
 struct TrialWidths {
   double below_is_ellipsoidal, above_is_standard;
 };

@@ -6,7 +6,8 @@
 // standard error of the difference, which comes from the standard errors of single losses, so that a trend within a
 // block does not add to it. Where that has not happened after a fifth of the iterations, two blocks at least, and the
 // mean has not risen as clearly either, noise hides the descent. A run whose loss really falls by 4 standard errors is
-// taken for one with probability 0.023, by 6 with 3e-5 (none of the shipped experiments is); one whose loss stays the same is found with probability 0.95.
+// taken for one with probability 0.023, by 6 with 3e-5 (none of the shipped experiments is); one whose loss stays the same is found with
+// probability 0.95.
 //
 // Average. The parameters of the last three quarters of the iterations, 100 rows at most, are summed. Where the losses did not
 // visibly fall meanwhile (their first half to their second, by less than 3 standard errors: an optimisation without any

@@ -42,8 +42,8 @@ TEST(SampleShare, LeavesOutPartsWhileGradientsAgree) {
   EXPECT_EQ(share.parts(), 1) << "they turn";
 }
 
-/// A variance of 1/12 stays below a quarter with two parts, and not with four. 300 unknowns know that to some percent over ten gradients: of 300 seeds
-/// all choose two.
+/// A variance of 1/12 stays below a quarter with two parts, and not with four. 300 unknowns know that to some percent over ten gradients: of 300
+/// seeds all choose two.
 TEST(SampleShare, KeepsNoiseBelowAQuarter) {
   SampleShare share(8);
   Gradients noisy(300, 1 / 12.0, test_seed(7));
