@@ -39,6 +39,7 @@ from captures.measurement import METRES_PER_PS, CaptureError
 from captures.point_layouts import reader_of
 from captures.reading import open_arrays
 from isochron.captures import write_array, write_capture, write_response
+from isochron.command_line import Parser
 
 START_ALBEDO = 0.01  # small: what is hidden may be a small part of the plane that a fit begins with
 MOST_NAMED = 8  # points, in a line
@@ -145,11 +146,6 @@ def import_capture(options):
              f"{width:g} ps from {start:g} ps, {mean:.4g} counts a point")
     fit = options.bins and measured.laser is None and measured.origins is None
     return [about] + measured.said + said + (start_of_fit(live[..., np.newaxis], width * METRES_PER_PS) if fit else [])
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(2, f"{self.prog}: {message}\n")
 
 
 def at_least_one(text):

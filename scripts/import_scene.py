@@ -17,6 +17,7 @@ import tempfile
 
 import numpy as np
 import use_package
+from isochron.command_line import Parser
 from mitsuba_scenes.document import SceneError
 from mitsuba_scenes.report import Report
 from mitsuba_scenes.turning import turned
@@ -59,11 +60,6 @@ def umask():
     value = os.umask(0)
     os.umask(value)
     return value
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(2, f"{self.prog}: {message}\n")
 
 
 def definition(text):

@@ -21,6 +21,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 from isochron import exr
+from isochron.command_line import Parser
 from isochron.errors import InputError
 from isochron.pictures.curves import plot_log, plot_pixel, plot_row
 from isochron.pictures.reading import Folder, peaks, read_stack
@@ -144,17 +145,11 @@ def pixel_of(text):
     return int(match[1]), int(match[2])
 
 
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        print(f"plot.py: {message}; usage: plot.py DIR [--pixel COLUMN,ROW] [--row ROW]", file=sys.stderr)
-        sys.exit(2)
-
-
 def main(arguments):
     if arguments in (["-h"], ["--help"]):
         print(__doc__.strip())
         return 0
-    parser = Parser(add_help=False)
+    parser = Parser(prog="plot.py", usage="plot.py DIR [--pixel COLUMN,ROW] [--row ROW]", add_help=False)
     parser.add_argument("directory", type=pathlib.Path)
     parser.add_argument("--pixel", type=pixel_of)
     parser.add_argument("--row", type=int)

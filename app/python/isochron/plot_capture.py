@@ -10,28 +10,23 @@ usage: plot_capture.py RUN [-o PNG]
 Of several spots of the laser it shows the first.
 """
 
-import argparse
 import pathlib
 import sys
 
 import matplotlib
 
 matplotlib.use("Agg")
+from isochron.command_line import Parser
 from isochron.errors import InputError
 from isochron.pictures.capture_run import CaptureRun
 from isochron.pictures.capture_sheet import draw_sheet
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(2, f"plot_capture.py: {message}; usage: plot_capture.py RUN [-o PNG]\n")
 
 
 def main(arguments):
     if arguments in (["-h"], ["--help"]):
         print(__doc__.strip())
         return 0
-    parser = Parser(add_help=False)
+    parser = Parser(prog="plot_capture.py", usage="plot_capture.py RUN [-o PNG]", add_help=False)
     parser.add_argument("run", type=pathlib.Path)
     parser.add_argument("-o", dest="output", type=pathlib.Path)
     options = parser.parse_args(arguments)

@@ -50,22 +50,27 @@ class BackProjection:
         return [b.reshape(-1, *b.shape[2:]) for b in blocks]
 
     def _project(self, run, counts, points, laser, extra):
-        shape = len(self.depths), len(self.up), len(self.across)
-        volume = np.zeros(shape, np.float32)
+        volume = np.zeros((len(self.depths), len(self.up), len(self.across)), np.float32)
+        # Nothing came from voxels out of the bins' reach: the first and last entry are 0.
+        histograms = np.pad(counts.astype(np.float32), ((0, 0), (1, 1)))
+        # Arrays are made once, which takes half the time.
+        way, found, bins = np.empty_like(volume), np.empty_like(volume), np.empty(volume.shape, np.intp)
 
-        def distances(point):
+        def distances(point, out):
             """From a point to all voxels."""
             within = (self.up[:, np.newaxis] - point[1]) ** 2 + (self.across - point[0]) ** 2
             beyond = (self.depths - point[2]) ** 2
-            return np.sqrt((beyond[:, np.newaxis, np.newaxis] + within).astype(np.float32))
+            np.add(beyond[:, np.newaxis, np.newaxis].astype(np.float32), within.astype(np.float32), out=out)
+            return np.sqrt(out, out=out)
 
-        spot = None if run.confocal else distances(laser[0])
-        for histogram, point, late in zip(counts, points, extra):
-            way = distances(point)
-            way = 2 * way if spot is None else way + spot
-            bins = ((way + np.float32(late + run.delay - run.start)) / np.float32(run.delta)).astype(np.int32)
-            # Nothing came from voxels out of the bins' reach: the first and last entry are 0.
-            volume += np.concatenate([[0], histogram, [0]]).astype(np.float32)[np.clip(bins + 1, 0, len(histogram) + 1)]
+        spot = None if run.confocal else distances(laser[0], np.empty_like(volume))
+        for histogram, point, late in zip(histograms, points, extra):
+            distances(point, way)
+            way += way if spot is None else spot
+            way += np.float32(late + run.delay - run.start + run.delta)
+            way /= np.float32(run.delta)
+            np.copyto(bins, way, casting="unsafe")
+            volume += np.take(histogram, bins, mode="clip", out=found)
         return volume
 
     @property

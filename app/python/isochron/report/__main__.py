@@ -6,19 +6,14 @@ usage: python3 -m isochron.report DIR... [-o FILE]
   -o FILE  default: DIR/report.html; of several runs comparison.html in the current folder
 """
 
-import argparse
 import os
 import pathlib
 import sys
 
+from isochron.command_line import Parser
 from isochron.report.comparison import comparison_page
 from isochron.report.page import run_page
 from isochron.report.run import NoRun, Run
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        self.exit(2, f"report: {message}; usage: python3 -m isochron.report DIR... [-o FILE]\n")
 
 
 def write(path, text):
@@ -34,7 +29,7 @@ def main(arguments):
     if arguments in (["-h"], ["--help"]):
         print(__doc__.strip())
         return 0
-    parser = Parser(add_help=False)
+    parser = Parser(prog="report", usage="python3 -m isochron.report DIR... [-o FILE]", add_help=False)
     parser.add_argument("folders", nargs="+")
     parser.add_argument("-o", "--output", type=pathlib.Path)
     options = parser.parse_args(arguments)
