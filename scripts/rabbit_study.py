@@ -136,8 +136,6 @@ def table_of_verdicts(rows):
 
 def table_of(rows, name):
     """For experiments/README.md: a line for each value of a sweep; the light-cone transform is in the figure alone."""
-    if name == "verdicts":
-        return table_of_verdicts(rows)
     column = {"seconds": "limit"}.get(name, name)
     fits, others = ([row for row in rows if row["method"] == method] for method in METHODS[:2])
     table = []
@@ -162,7 +160,8 @@ def main():
     parser.add_argument("--table", choices=SWEEPS, help="print the table of a sweep that was measured before, as a page has it")
     options = parser.parse_args()
     if options.table:
-        print(table_of(read_rows(options.output / f"rabbit_{options.table}.csv"), options.table))
+        rows = read_rows(options.output / f"rabbit_{options.table}.csv")
+        print(table_of_verdicts(rows) if options.table == "verdicts" else table_of(rows, options.table))
         return 0
     names = [name for name in SWEEPS if getattr(options, name)]
     if not names:

@@ -156,7 +156,7 @@ class StudyTest(unittest.TestCase):
             table = rabbit_study.table_of(plot_rabbit_study.read_rows(folder / "rabbit_seconds.csv"), "seconds").splitlines()
             self.assertEqual(table[2], "| 30 | 0 of 1 |  |  |  |  | 2 | 7 | 0.7 |")
             self.assertEqual(table[3], "| 60 | 2 of 3 | 1 | 4 to 6 | 0.9 | 95 to 97.5 % | 2 | 7 | 0.7 |")
-            table = rabbit_study.table_of(fits, "verdicts").splitlines()
+            table = rabbit_study.table_of_verdicts(fits).splitlines()
             self.assertEqual(table[2:], ["| 2000 | 3 of 5 | 95 % | 1 | 4 to 6 | 0.9 |"])
 
 
