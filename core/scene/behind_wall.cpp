@@ -11,14 +11,14 @@
 namespace isochron {
 
 std::string behind_wall(const Scene& scene) {
-  constexpr double kOnWall = 1e-9;  // of the largest coordinate
+  constexpr double kOnWall = 1e-6;  // of the largest coordinate: floats know 1e-7
   double largest = 0;
   for (const Vec3& p : scene.positions) largest = std::max({largest, std::abs(p.x), std::abs(p.y), std::abs(p.z)});
   std::vector<std::pair<Vec3, double>> planes;  // normal, height
   for (const WallPoint& s : scene.capture->sensor) {
     const double height = dot(s.n, s.p);
     const auto same = [&](const auto& plane) {
-      return plane.first == s.n && std::abs(plane.second - height) <= kOnWall * largest;
+      return length(plane.first - s.n) <= kOnWall && std::abs(plane.second - height) <= kOnWall * largest;
     };
     if (std::none_of(planes.begin(), planes.end(), same)) planes.emplace_back(s.n, height);
   }

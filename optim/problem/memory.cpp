@@ -190,4 +190,10 @@ void require_memory(const Problem& problem, const std::vector<MemoryUse>& parts,
                   amount(std::max(0.0, available))));
 }
 
+void require_memory(const MemoryUse& part, const std::string& advice, double available) {
+  if (part.bytes > available)
+    throw InputError(fmt::format("{} {} of memory; {} are available: {}", part.what, amount(part.bytes),
+                                 amount(std::max(0.0, available)), advice));
+}
+
 }  // namespace isochron

@@ -28,5 +28,7 @@ std::vector<MemoryUse> run_memory(const Problem& problem);
 
 /// Throws InputError, one line that names the parts and what to lower, when they add up to more than `available` bytes.
 void require_memory(const Problem& problem, const std::vector<MemoryUse>& parts, double available = available_memory());
+/// The same of one part that is about to be made; `advice`: what to lower.
+void require_memory(const MemoryUse& part, const std::string& advice, double available = available_memory());
 
 }  // namespace isochron

@@ -128,6 +128,9 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     const ParameterSpec& spec = experiment_.parameters[i];
     const Parameters::Block& block = parameters_->blocks()[i];
     if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
+    if (spec.evidence && experiment_.gradient.method == GradientMethod::finite_difference)
+      spec.fail("smoothing", "evidence needs products with the Jacobian, which finite differences have not",
+                "gradient: {method: analytic}");
     const bool smooth_prior = spec.bends() || spec.tangential > 0 || spec.evidence;
     if ((spec.prior_width > 0 || smooth_prior) && experiment_.loss.kind != LossKind::poisson)
       spec.fail(smooth_prior ? "smoothing" : "prior_width", "the loss is no likelihood", "loss: {kind: poisson}");

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/base/error.h"
+#include "optim/problem/memory.h"
 #include "optim/reconstruct/significance.h"
 #include "optim/reconstruct/voxel_search.h"
 
@@ -29,6 +30,8 @@ double distance_of_light(const Histograms& histograms, double sigma, const Detec
   return std::max(*middle, 0.0);
 }
 
+constexpr const char* kLess = "leave points or bins out";
+
 /// What decides on the filter and on the size of voxels.
 struct Setting {
   double narrowest;  ///< sigma that the response and the bins allow
@@ -51,6 +54,9 @@ Setting setting(const Histograms& histograms, const DetectorResponse& response) 
   Setting result{narrowest, narrowest, half / std::hypot(half, distance), histograms.spots.empty() ? 2.0 : 1.0};
   const double apart = result.ways * spacing * result.sine, needed = 0.25 * apart * apart - deviation * deviation;
   if (needed > narrowest * narrowest) result.sigma = std::sqrt(needed);
+  if (2 * FilteredHistograms::margin(result.sigma, histograms.bin) >= histograms.bins)
+    throw InputError("the capture's points are too far apart for its " + std::to_string(histograms.bins) +
+                     " bins: light of a place comes to neighbours at times that differ by more");
   return result;
 }
 
@@ -79,7 +85,9 @@ void fill_in(const SearchResult& found, const Vec3& step, BackProjection& result
     high[axis] += kMargin;
     for (int n = low[axis]; n <= high[axis]; ++n) axes[axis]->push_back((n + 0.5) * step[axis]);
   }
-  result.albedo.assign(result.across.size() * result.up.size() * result.depth.size(), 0);
+  const std::size_t voxels = result.across.size() * result.up.size() * result.depth.size();
+  require_memory({"the box of all that stands out in the back-projection needs", 2.0 * sizeof(float) * voxels}, kLess);
+  result.albedo.assign(voxels, 0);
   result.significance = result.albedo;
   for (const SummedBlock& block : found.blocks) {
     for (int i = 0; i < VoxelBlock::kVoxels; ++i) {
@@ -105,6 +113,7 @@ BackProjection back_project(const CaptureFile& capture, const DetectorResponse& 
   const Histograms all = histograms(capture, result.frame, used);
   const Setting set = setting(all, response);
   result.filter = time_filter(set.sigma, response, all.bin);
+  require_memory({"filtered histograms need", double{sizeof(FilteredHistograms::Entry)} * all.counts.size()}, kLess);
   result.depth_resolution = 0.5 * result.filter.width;
   result.lateral_resolution = result.filter.width / (set.ways * set.sine);
   result.finest_resolution = time_filter(set.narrowest, response, all.bin).width / (2 * set.sine);

@@ -70,7 +70,9 @@ Histograms histograms(const CaptureFile& capture, const WallFrame& frame, const 
   Histograms result;
   result.bin = capture.delta_t;
   result.bins = capture.counts.gates;
-  for (const Vec3& spot : geometry.laser) result.spots.push_back(frame.to_wall(spot));
+  // Light goes both ways alike: one point that looks while the laser scans is a spot, and the spots are points.
+  const bool swapped = points == 1 && geometry.spots() > 1;
+  for (const Vec3& spot : swapped ? geometry.sensor : geometry.laser) result.spots.push_back(frame.to_wall(spot));
   for (int spot = 0; spot < geometry.spots(); ++spot) {
     for (int point = 0; point < points; ++point) {
       const double* counts = &capture.counts.data[capture.counts.index(spot * points + point, 0)];
@@ -80,7 +82,10 @@ Histograms histograms(const CaptureFile& capture, const WallFrame& frame, const 
           geometry.accounts_first_and_last
               ? length(geometry.laser_origin - lit) + length(geometry.sensor[point] - geometry.sensor_origin)
               : 0;
-      result.rows.push_back({frame.to_wall(geometry.sensor[point]), geometry.confocal ? -1 : spot,
+      result.rows.push_back({frame.to_wall(swapped ? lit : geometry.sensor[point]),
+                             geometry.confocal ? -1
+                             : swapped         ? 0
+                                               : spot,
                              capture.t_start + 0.5 * capture.delta_t - before});
       result.counts.insert(result.counts.end(), counts, counts + result.bins);
     }

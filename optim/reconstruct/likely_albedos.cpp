@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/base/progress.h"
 #include "core/base/self_weighted_mean.h"
+#include "optim/problem/memory.h"
 #include "optim/reconstruct/arrivals.h"
 
 namespace isochron {
@@ -254,7 +255,11 @@ LikelyAlbedos likely_albedos(const BackProjection& volume, const Histograms& his
   result.across = finer(volume.across);
   result.up = finer(volume.up);
   result.depth = finer(volume.depth);
-  result.albedo.assign(result.across.size() * result.up.size() * result.depth.size(), 0);
+  const std::size_t voxels = result.across.size() * result.up.size() * result.depth.size();
+  // And their blurred copy (start_surface.cpp).
+  require_memory({"the box of all that stands out in the back-projection needs", 2.0 * sizeof(float) * voxels},
+                 "leave points or bins out");
+  result.albedo.assign(voxels, 0);
   const std::vector<char> near = near_surfaces(volume);
   std::vector<std::size_t> lit;
   for (std::size_t d = 0; d < result.depth.size(); ++d)

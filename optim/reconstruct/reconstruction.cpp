@@ -217,8 +217,10 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
   result.photons_needed = photons_needed(capture, volume);
   result.has_signal = !start.faces.empty();
   if (result.has_signal) {
-    settings =
-        fit_settings(start, likely.resolution, {capture.counts.pixels(), capture.geometry.confocal, spec.seconds});
+    const auto points = static_cast<int>(capture.geometry.sensor.size());
+    const auto left = used.empty() ? points : static_cast<int>(std::ranges::count(used, 1));
+    settings = fit_settings(start, likely.resolution,
+                            {capture.counts.pixels() / points * left, capture.geometry.confocal, spec.seconds});
     settings.bin = capture.delta_t;
     settings.background_per_point = backgrounds_differ(capture, used);
     settings.window = time_window(start, capture.geometry, response, volume.depth_resolution);

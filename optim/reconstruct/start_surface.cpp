@@ -224,18 +224,26 @@ std::vector<DepthMap> joined(std::vector<DepthMap> parts, const Lines& lines, in
   return grown;
 }
 
-/// Which cells, of kCellLines x kCellLines lines, have triangles: those with all corners and no jump between them, no two of which touch at a
-/// corner alone.
-std::set<std::pair<int, int>> cells(const DepthMap& map, double jump) {
+/// Cells of kCellLines x kCellLines lines, of the grid that begins at these lines: those with all corners and no jump between them.
+std::set<std::pair<int, int>> whole_cells(const DepthMap& map, double jump, int first_a, int first_u) {
   std::set<std::pair<int, int>> result;
-  for (int u = 0; u + kCellLines < map.height; u += kCellLines)
-    for (int a = 0; a + kCellLines < map.width; a += kCellLines) {
+  for (int u = first_u; u + kCellLines < map.height; u += kCellLines)
+    for (int a = first_a; a + kCellLines < map.width; a += kCellLines) {
       const auto [low, high] = std::minmax(
           {map.at(a, u), map.at(a + kCellLines, u), map.at(a, u + kCellLines), map.at(a + kCellLines, u + kCellLines)});
       const bool whole = map.has(a, u) && map.has(a + kCellLines, u) && map.has(a, u + kCellLines) &&
                          map.has(a + kCellLines, u + kCellLines);
       if (whole && high - low <= jump) result.emplace(a, u);
     }
+  return result;
+}
+
+/// Which cells have triangles: no two of them touch at a corner alone.
+std::set<std::pair<int, int>> cells(const DepthMap& map, double jump) {
+  // A part that is no larger than a cell may lie between those of a grid.
+  std::set<std::pair<int, int>> result;
+  for (int begin = 0; result.empty() && begin < kCellLines * kCellLines; ++begin)
+    result = whole_cells(map, jump, begin % kCellLines, begin / kCellLines);
   for (bool touching = true; touching;) {
     touching = false;
     for (const auto& [a, u] : result) {

@@ -1,5 +1,5 @@
 // Runs in levels (ParameterSpec::remesh): each is an ordinary run on a mesh that stands, begun with what the one before found,
-// its surface in triangles of half the size (next_level.h).
+// its surface in new triangles, those of coarse levels as long as before, others half as long (next_level.h).
 //
 //   DIR/experiment.yaml, inputs/, target.exr    of all levels; the target is rendered from the mesh as loaded
 //   DIR/geometry/target_SHAPE                   that mesh at the target values, where they are known

@@ -281,6 +281,9 @@ TEST_F(LevelsTest, RefusesWhatCannotBeCarriedOver) {
       "'hill' is remeshed by 'z'");
   says(of("remesh: {levels: 2}", "  - {name: gain, type: gain, initial: 1, target: 1, remesh: {levels: 2}}\n"),
        "belongs to vertices");
+  says(refusal(experiment("flat", "smoothing: {slopes: 1, evidence: true}, remesh: {levels: 2}, target: 0",
+                          "{samples: 4}\nloss: {kind: poisson}\ngradient: {method: finite_difference, step: 0.01}")),
+       "evidence needs products with the Jacobian");
   folder_.write("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n");
   says(of("remesh: {levels: 2}"), "the mesh of 'hill' is no manifold");
 }

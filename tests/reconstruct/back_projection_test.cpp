@@ -7,6 +7,7 @@
 
 #include "core/base/error.h"
 #include "core/base/parallel.h"
+#include "optim/problem/memory.h"
 #include "optim/reconstruct/significance.h"
 #include "tests/reconstruct/simulated.h"
 
@@ -70,6 +71,17 @@ TEST(BackProjection, FindsItFromOneSpotAndFromMany) {
   add_spots(wall, {{0.1, 0.1, 0}});
   expect_found(of_patch(wall));
   add_spots(wall, {{0.1, 0.1, 0}, {-0.2, 0.1, 0}, {0, -0.3, 0}});
+  expect_found(of_patch(wall));
+}
+
+/// One point that looks while the laser scans sees what as many points see of one spot.
+TEST(BackProjection, FindsItFromOnePointAndAScanningLaser) {
+  CaptureGeometry wall = square_wall(20, 0.8);
+  const std::vector<Vec3> scanned = wall.sensor;
+  wall.columns = wall.rows = 1;
+  wall.sensor = {{0.1, 0.1, 0}};
+  wall.sensor_normal = {{0, 0, 1}};
+  add_spots(wall, scanned);
   expect_found(of_patch(wall));
 }
 
@@ -145,9 +157,22 @@ TEST(BackProjection, RefusesWhatCannotBeUsed) {
   EXPECT_THROW(back_project(capture, {}, std::vector<std::uint8_t>(16, 0)), InputError);
   EXPECT_THROW(back_project(capture, {}, {}, {.false_alarms = 0}), InputError);
   EXPECT_THROW(back_project(of_patch(square_wall(4, 0.5), {}, 6)), InputError);
+  EXPECT_THROW(back_project(of_patch(square_wall(3, 4))), InputError)
+      << "neighbours' times differ by more than there are bins";
   CaptureFile early = capture;
   early.t_start = -10;
   EXPECT_THROW(back_project(early), InputError);
+}
+
+/// What does not fit is refused in one line before it is made.
+TEST(BackProjection, MemoryIsAskedForBeforehand) {
+  EXPECT_NO_THROW(require_memory({"a box needs", 3e9}, "leave points out", 3e9));
+  try {
+    require_memory({"a box needs", 3e9}, "leave points out", 2e9);
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(), "a box needs 3 GB of memory; 2 GB are available: leave points out");
+  }
 }
 
 TEST(Significance, QuantilesOfTheNormalDistribution) {

@@ -182,13 +182,15 @@ TEST(StartSurface, PartsWithHardlyAnyLightAreLeftOut) {
   EXPECT_NEAR(deepest(0.4), 20.5, 0.5);
 }
 
-/// Each rounding would halve it.
+/// Each rounding would halve it. It is there wherever it lies in the grid of cells.
 TEST(StartSurface, APartOfOneCellKeepsAQuarterOfItsArea) {
-  HiddenLines lines([](int a, int u) { return a == 23 && u == 23 ? 10.5 : kNone; });
-  lines.volume.resolution = 1;
-  const Mesh mesh = lines.start();
-  ASSERT_EQ(mesh.faces.size(), 2u);
-  EXPECT_NEAR(area(mesh), 1, 1e-6);
+  for (const auto& [across, up] : {std::pair{23, 23}, {23, 24}, {24, 23}, {24, 24}}) {
+    HiddenLines lines([=](int a, int u) { return a == across && u == up ? 10.5 : kNone; });
+    lines.volume.resolution = 1;
+    const Mesh mesh = lines.start();
+    ASSERT_EQ(mesh.faces.size(), 2u) << across << " " << up;
+    EXPECT_NEAR(area(mesh), 1, 1e-6);
+  }
 }
 
 /// A line whose blurred albedo reaches a twentieth of the disc's in its middle alone. So near the wall it has more light than the disc.

@@ -49,6 +49,20 @@ TEST(TimeFilter, ResponsesDelay) {
   EXPECT_NEAR(filter.width, 2 * 0.62595 * 0.025, 2e-4);
 }
 
+/// A peak of 0.015 and 80 m of dark counts, a millionth of it each: with all pieces summed at all times it would take minutes.
+TEST(TimeFilter, DarkCountsFarFromAPeakChangeNothing) {
+  std::vector<double> offsets, values;
+  for (int i = 0; i <= 65536; ++i) {
+    offsets.push_back(0.0012 * i);
+    values.push_back(1e-6 + std::exp(-0.5 * std::pow((offsets.back() - 20) / 0.015, 2)));
+  }
+  const DetectorResponse response(LinearDensity(offsets, values, "response"));
+  EXPECT_NEAR(response_deviation(response, 1e-6), 0.015, 1e-4);
+  const TimeFilter filter = time_filter(0.02, response, 1e-5);
+  EXPECT_NEAR(filter.delay, 20, 3e-4);
+  EXPECT_NEAR(filter.width, 2 * 0.62595 * 0.025, 2e-4);
+}
+
 TEST(FilteredHistograms, SumsAreTheFiltersAtTheDistanceInTime) {
   constexpr double kStep = 0.005, kSigma = 0.03;
   constexpr int kAt = 120;
