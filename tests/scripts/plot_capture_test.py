@@ -190,6 +190,21 @@ class PlotCaptureTest(unittest.TestCase):
         np.testing.assert_allclose(run.fit, light)
         self.assert_drawn()
 
+    def test_one_point_and_a_scanning_laser(self):
+        """The spots are what is shown, and the point is the spot."""
+        looks, light = np.array([-0.2, 0.1, 0]), light_of(self.points, self.place, (-0.2, 0.1, 0))
+        counts = generator(6).poisson(light)
+        write_capture(self.folder / "final.h5", light.reshape(BINS, -1, 1, 1, 1), PS * METRES_PER_PS, START * METRES_PER_PS,
+                      looks.reshape(1, 1, 3), (0, 0, 1), self.points.reshape(-1, 1, 3), "isochron")
+        self.write_target(counts.reshape(BINS, 1, -1))
+        run = CaptureRun(self.folder)
+        self.assertEqual((run.spots, run.confocal), (1, False))
+        np.testing.assert_array_equal(run.counts, counts.reshape(BINS, -1, 1))
+        np.testing.assert_allclose(run.points, self.points.reshape(-1, 1, 3))
+        np.testing.assert_allclose(run.laser[3, 0], looks)
+        np.testing.assert_allclose(run.wall.high - run.wall.low, [0.6, 0.6])
+        self.assert_drawn()
+
     def test_few_points_in_a_line(self):
         self.points = grid(3, 1)
         self.write()

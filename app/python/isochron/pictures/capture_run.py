@@ -1,5 +1,6 @@
 """A run that fitted a capture: counts, expected counts, the wall and the recovered surfaces, as arrays in metres."""
 
+import dataclasses
 import pathlib
 import re
 
@@ -20,6 +21,14 @@ METRES = {"ps": METRES_PER_PS, "ns": 1000 * METRES_PER_PS}  # of a unit of time;
 def names_of(shape):
     """Of a parameter's key `shape`: one name, several or none."""
     return [str(name) for name in shape] if isinstance(shape, list) else [] if shape is None else [str(shape)]
+
+
+def mirrored(capture):
+    """Light goes both ways alike: of one point that looks while the laser scans, with the spots as points of one row and it as the spot."""
+    spots = capture.laser.reshape(-1, 1, 3)
+    return dataclasses.replace(capture, counts=capture.counts.reshape(len(capture.counts), -1, 1), points=spots,
+                               normals=np.broadcast_to(capture.normals.reshape(1, 1, 3), spots.shape), laser=capture.points.reshape(1, 3),
+                               origins=capture.origins and capture.origins[::-1])
 
 
 class Surface:
@@ -65,6 +74,9 @@ class CaptureRun:
 
     def _read_fit(self, path):
         capture = read_capture(path)
+        self.mirrored = capture.points.size == 3 and capture.laser is not None and capture.laser.size > 3
+        if self.mirrored:
+            capture = mirrored(capture)
         light, points = capture.counts, capture.points
         behind = points.ndim - 1
         self.spots = int(np.prod(light.shape[1:-behind]))
@@ -94,6 +106,8 @@ class CaptureRun:
         except (exr.ExrError, OSError) as error:
             raise PlotError(f"{path}: {error}") from error
         names = {int(n[4:-2]): n for n in images if re.fullmatch(r"gate\d+\.Y", n)}
+        if self.mirrored:
+            images = {name: image.T for name, image in images.items()}
         image = images[names[0]] if 0 in names else np.empty((0, 0))
         if sorted(names) != list(range(bins)) or image.shape != (rows * self.spots, columns):
             raise PlotError(f"{path}: not {bins} gates of {columns} x {rows * self.spots} readings, as final.h5 has")
@@ -104,7 +118,7 @@ class CaptureRun:
         target = self.experiment.get("target") or {}
         self.used_points = np.ones(self.points.shape[:2], bool)
         self.used_bins = np.ones(len(self.fit), bool)
-        if target.get("mask"):
+        if target.get("mask") and not self.mirrored:
             path = self.directory / target["mask"]
             try:
                 self.used_points = np.load(path) != 0
