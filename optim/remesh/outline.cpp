@@ -215,6 +215,12 @@ Remeshed without_narrow_strips(const Mesh& mesh, double least_width) {
     const bool joins = border[a] != kInside && border[b] != kInside && border[a] != border[b];
     if (joins && length(p[a] - p[b]) < least_width) above[a] = above[b] = -1;
   }
+  // A thin ring is no web: nothing would be left of it.
+  DisjointSets parts = joined(mesh, [](int, int) { return true; });
+  std::vector<char> remains(p.size(), 0);
+  for (const auto& [a, b, c] : mesh.faces) remains[parts.root(a)] |= above[a] > 0 && above[b] > 0 && above[c] > 0;
+  for (int v = 0; v < std::ssize(p); ++v)
+    if (!remains[parts.root(v)]) above[v] = 1;
   return Cut(mesh, above).left();
 }
 

@@ -26,7 +26,7 @@ Remeshed without_small_parts(const Mesh& mesh, double least_area);
 Remeshed without_small_holes(const Mesh& mesh, double least_area);
 
 /// Strips between two borders of an oriented manifold are cut where an edge across them is shorter than that: a fit draws borders together
-/// but cannot open a hole. Necks between two parts, which have one border on both sides, stay.
+/// but cannot open a hole. Necks between two parts, which have one border on both sides, stay; so do rings that are nothing but such a strip.
 Remeshed without_narrow_strips(const Mesh& mesh, double least_width);
 
 }  // namespace isochron

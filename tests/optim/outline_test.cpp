@@ -170,6 +170,15 @@ TEST(Outline, NecksStay) {
   EXPECT_NEAR(area_left(without_narrow_strips(mesh, 1)), 2 + 1.0 / 16, 1e-12);
 }
 
+/// A square whose middle cell is missing, beside a whole one: all of its vertices lie on its two borders.
+TEST(Outline, ThinRingsStay) {
+  Mesh mesh;
+  add_square(mesh, {0, 0, 0}, 3);
+  mesh.faces.erase(mesh.faces.begin() + 8, mesh.faces.begin() + 10);
+  add_square(mesh, {2, 0, 0}, 4);
+  EXPECT_NEAR(area_left(without_narrow_strips(mesh, 0.5)), 2 - 1.0 / 9, 1e-12);
+}
+
 /// A fit that pulls a hole together to a point leaves edges of no length, which remeshing takes away once it is closed.
 TEST(Outline, RemeshingMendsAClosedHole) {
   Mesh mesh;
