@@ -17,7 +17,8 @@ namespace isochron {
 namespace {
 
 constexpr int kEstimates = 24;
-/// Shares of a width's time. A quarter of the target's leaves the same errors, those of the branches at a width of 1e-5: its noise does not limit them.
+/// Shares of a width's time. A quarter of the target's leaves the same errors, those of the branches at a width of 1e-5: its noise does not
+/// limit them.
 constexpr double kShareOfReference = 0.25, kTargetShare = 0.2;
 constexpr double kMostOfBias = 0.1, kMostOfVariance = 0.5;
 /// Finite differences of more unknowns would take nearly all the time.
