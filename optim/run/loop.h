@@ -41,7 +41,7 @@ struct LoopOptions {
 struct LoopResult {
   RunStatus status = RunStatus::iterations_reached;
   FinalChoice choice = FinalChoice::last;
-  Evaluation final;  ///< at the final parameters
+  Evaluation final = {};  ///< at the final parameters
 };
 
 /// Goes on from `state`, whose theta lies within the bounds, and keeps it up to date; at the end its theta
