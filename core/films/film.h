@@ -11,8 +11,8 @@ namespace isochron {
 /// Pixels that a partition of a pass takes at a turn.
 inline constexpr int kPixelsPerBlock = 8;
 
-/// The place of a pixel among those of the partitions that have the same blocks of pixels; `parts`, a power of two, are how
-/// many there are to take turns.
+/// The place of a pixel among those of the partitions that have the same blocks of pixels; 2^log_parts sets of blocks take
+/// turns.
 inline int place_in_part(int pixel, int log_parts) {
   return (pixel / kPixelsPerBlock >> log_parts) * kPixelsPerBlock + pixel % kPixelsPerBlock;
 }
