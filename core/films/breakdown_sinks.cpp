@@ -4,19 +4,19 @@
 
 namespace isochron {
 
-void PathOrigin::note_path(const Path& path) {
+void SortingSink::note_path(const Path& path) {
   bounces_ = path.size() - 2;
   shapes_.clear();
   for (int i = 1; i < path.size(); ++i) add_shape(path.vertex[i].triangle);
 }
 
-void PathOrigin::note_boundary(int bounces, int triangle) {
+void SortingSink::note_boundary(int bounces, int triangle, double) {
   bounces_ = bounces;
   shapes_.clear();
   add_shape(triangle);
 }
 
-void PathOrigin::add_shape(int triangle) {
+void SortingSink::add_shape(int triangle) {
   if (is_light(triangle)) return;
   const int shape = scene_.shape_index(triangle);
   if (std::find(shapes_.begin(), shapes_.end(), shape) == shapes_.end()) shapes_.push_back(shape);
@@ -25,14 +25,14 @@ void PathOrigin::add_shape(int triangle) {
 void ImageBreakdownSink::add(int pixel, const Rgb& value, double length, GateUse) {
   GatedImage& image = breakdown_.image;
   gates_.for_each_value(length, [&](int g, double w) {
-    double* out = &image.data[image.index(pixel, origin_.bounces() * gates_.size() + g)];
+    double* out = &image.data[image.index(pixel, bounces_ * gates_.size() + g)];
     double sum = 0;
     for (int c = 0; c < image.channels; ++c) {
       out[c] += w * value[c];
       sum += w * value[c];
     }
-    for (int shape : origin_.shapes()) breakdown_.by_shape[shape] += sum;
-    breakdown_.by_technique[origin_.technique()] += sum;
+    for (int shape : shapes_) breakdown_.by_shape[shape] += sum;
+    breakdown_.by_technique[technique_] += sum;
   });
 }
 
@@ -47,13 +47,13 @@ void GradientBreakdownSink::add_to_gate(int pixel, int gate, const Rgb& value, d
   for (int c = 0; c < channels_; ++c, adjoint += count)
     for (int column : rates_.touched()) {
       const double derivative = value[c] * (w * rates_[column].log_f[c] + slope * rates_[column].length);
-      double* sums = &breakdown_.by_bounces[breakdown_.index(origin_.bounces(), column)];
+      double* sums = &breakdown_.by_bounces[breakdown_.index(bounces_, column)];
       for (int j = 0; j < count; ++j) sums[j] += adjoint[j] * derivative;
       const double first = adjoint[0] * derivative;
       breakdown_.by_gate[static_cast<std::size_t>(gate) * breakdown_.columns + column] += first;
-      for (int shape : origin_.shapes())
+      for (int shape : shapes_)
         breakdown_.by_shape[static_cast<std::size_t>(shape) * breakdown_.columns + column] += first;
-      breakdown_.by_technique[origin_.technique() * breakdown_.columns + column] += first;
+      breakdown_.by_technique[technique_ * breakdown_.columns + column] += first;
     }
 }
 

@@ -10,49 +10,45 @@
 
 namespace isochron {
 
-/// Technique, bounces and shapes of the path that contributions are attributed to.
-class PathOrigin {
+/// Keeps technique, bounces and shapes of the path that contributions are attributed to.
+class SortingSink : public Sink {
  public:
-  explicit PathOrigin(const PreparedScene& scene) : scene_(scene) {}
-  void note_path(const Path& path);
-  void note_boundary(int bounces, int triangle);
-  void note_technique(Technique technique) { technique_ = technique; }
-  int bounces() const { return bounces_; }
-  std::size_t technique() const { return static_cast<std::size_t>(technique_); }
-  /// Each once.
-  const std::vector<int>& shapes() const { return shapes_; }
+  explicit SortingSink(const PreparedScene& scene) : scene_(scene) {}
+
+  void note_technique(Technique technique) override { technique_ = static_cast<std::size_t>(technique); }
+  void note_path(const Path& path) override;
+  void note_boundary(int bounces, int triangle, double) override;
+
+ protected:
+  std::size_t technique_ = static_cast<std::size_t>(Technique::standard);
+  int bounces_ = 0;
+  std::vector<int> shapes_;  ///< each once
 
  private:
   void add_shape(int triangle);
 
   const PreparedScene& scene_;
-  Technique technique_ = Technique::standard;
-  int bounces_ = 0;
-  std::vector<int> shapes_;
 };
 
-class ImageBreakdownSink final : public Sink {
+class ImageBreakdownSink final : public SortingSink {
  public:
   ImageBreakdownSink(const PreparedScene& scene, const GateSet& gates, ImageBreakdown& breakdown)
-      : origin_(scene), gates_(gates), breakdown_(breakdown) {}
+      : SortingSink(scene), gates_(gates), breakdown_(breakdown) {}
 
   bool differential() const override { return false; }
-  void note_technique(Technique technique) override { origin_.note_technique(technique); }
-  void note_path(const Path& path) override { origin_.note_path(path); }
   void add(int pixel, const Rgb& value, double length, GateUse use) override;
 
  private:
-  PathOrigin origin_;
   const GateSet& gates_;
   ImageBreakdown& breakdown_;
 };
 
-class GradientBreakdownSink final : public Sink {
+class GradientBreakdownSink final : public SortingSink {
  public:
   /// `adjoints`: [pixel][gate][channel][adjoint].
   GradientBreakdownSink(const PreparedScene& scene, const GateSet& gates, const TangentBasis& basis, int channels,
                         std::span<const double> adjoints, GradientBreakdown& breakdown)
-      : origin_(scene),
+      : SortingSink(scene),
         gates_(gates),
         rates_(scene.layout, basis),
         channels_(channels),
@@ -60,9 +56,6 @@ class GradientBreakdownSink final : public Sink {
         breakdown_(breakdown) {}
 
   bool differential() const override { return true; }
-  void note_technique(Technique technique) override { origin_.note_technique(technique); }
-  void note_path(const Path& path) override { origin_.note_path(path); }
-  void note_boundary(int bounces, int triangle, double) override { origin_.note_boundary(bounces, triangle); }
   void bind(const LocalDifferential& differential) override { rates_.bind(differential); }
   void add(int pixel, const Rgb& value, double length, GateUse use) override;
   void add_length_rate(int pixel, int gate, const Rgb& value) override { add_to_gate(pixel, gate, value, 0, 1); }
@@ -70,7 +63,6 @@ class GradientBreakdownSink final : public Sink {
  private:
   void add_to_gate(int pixel, int gate, const Rgb& value, double w, double slope);
 
-  PathOrigin origin_;
   const GateSet& gates_;
   ColumnRates rates_;
   const int channels_;

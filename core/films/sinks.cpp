@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <iterator>
 #include <numeric>
+#include <utility>
 
 namespace isochron {
 namespace {
@@ -36,31 +37,16 @@ void PrimalSink::add(int pixel, const Rgb& value, double length, GateUse) {
 void ColumnRates::bind(const LocalDifferential& differential) {
   for (int column : touched_) rates_[column] = {};
   touched_.clear();
-  for (const VertexGradient& v : differential.vertices)
-    for (int axis = 0; axis < 3; ++axis)
-      for_each_column(layout_.vertex(v.vertex, axis), [&](Rates& rates, double velocity) {
-        for (int c = 0; c < 3; ++c)
-          if (v.channel < 0 || v.channel == c) rates.log_f[c] += v.log_f[axis] * velocity;
-        rates.length += v.length[axis] * velocity;
-      });
-  for (const ScalarGradient& s : differential.scalars)
-    for_each_column(s.dof, [&](Rates& rates, double velocity) {
+  differential.for_each(layout_, [&](int dof, int channel, double log_f, double length) {
+    for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i) {
+      const auto [column, velocity] = basis_.entries[i];
+      Rates& rates = rates_[column];
+      if (!std::exchange(rates.touched, true)) touched_.push_back(column);
       for (int c = 0; c < 3; ++c)
-        if (s.channel < 0 || s.channel == c) rates.log_f[c] += s.log_f * velocity;
-      rates.length += s.length * velocity;
-    });
-}
-
-template <class F>
-void ColumnRates::for_each_column(int dof, F&& f) {
-  for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i) {
-    const auto [column, coefficient] = basis_.entries[i];
-    if (!rates_[column].touched) {
-      rates_[column].touched = true;
-      touched_.push_back(column);
+        if (channel < 0 || channel == c) rates.log_f[c] += log_f * velocity;
+      rates.length += length * velocity;
     }
-    f(rates_[column], coefficient);
-  }
+  });
 }
 
 void TangentSink::add(int pixel, const Rgb& value, double length, GateUse use) {
@@ -151,15 +137,12 @@ void AdjointSink::scatter(std::size_t first, const Pull (&pulls)[N]) {
     return;
   double sums[N];
   for (int i = 0; i < N; ++i) sums[i] = pulls[i].weight.r + pulls[i].weight.g + pulls[i].weight.b;
-  const auto add = [&](int dof, int channel, double log_f, double length) {
+  differential_->for_each(layout_, [&](int dof, int channel, double log_f, double length) {
     if (!basis_.differentiates(dof)) return;
     double* out = gradient_.at(static_cast<std::size_t>(dof) * adjoints_.size() + first, N);
     for (int i = 0; i < N; ++i)
       out[i] += (channel < 0 ? sums[i] : pulls[i].weight[channel]) * log_f + pulls[i].slope * length;
-  };
-  for (const VertexGradient& v : differential_->vertices)
-    for (int axis = 0; axis < 3; ++axis) add(layout_.vertex(v.vertex, axis), v.channel, v.log_f[axis], v.length[axis]);
-  for (const ScalarGradient& s : differential_->scalars) add(s.dof, s.channel, s.log_f, s.length);
+  });
 }
 
 }  // namespace isochron

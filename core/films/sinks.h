@@ -80,9 +80,6 @@ class ColumnRates {
   const Rates& operator[](int column) const { return rates_[column]; }
 
  private:
-  template <class F>
-  void for_each_column(int dof, F&& f);
-
   const DofLayout layout_;
   const TangentBasis& basis_;
   std::vector<Rates> rates_;

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "core/base/discrete_distribution.h"
-#include "core/base/vec.h"
 #include "core/paths/options.h"
 
 namespace isochron {

@@ -7,15 +7,8 @@
 namespace isochron {
 
 const char* name(Term term) {
-  switch (term) {
-    case Term::interior:
-      return "interior";
-    case Term::visibility:
-      return "visibility";
-    case Term::path_length:
-      return "path_length";
-  }
-  return "";
+  constexpr const char* kNames[] = {"interior", "visibility", "path_length"};
+  return kNames[static_cast<std::size_t>(term)];
 }
 
 namespace {

@@ -14,7 +14,7 @@ enum class Sampling { automatic, standard, ellipsoidal };
 enum class ArcPick { contribution, uniform };
 
 /// The first numbers of each sample: together the samples of a technique cover evenly what they are taken from, in each
-/// pixel or, where they may land on any, over the whole image (see SamplePoints); or every number is independent of all
+/// pixel or, where they may land on any, over the whole image (see PointSet); or every number is independent of all
 /// others.
 enum class Numbers { low_discrepancy, independent };
 

@@ -27,8 +27,6 @@ class FixedStack {
   const T& operator[](std::size_t i) const { return items_[i]; }
   T& operator[](std::size_t i) { return items_[i]; }
   const T* data() const { return items_.data(); }
-  const T* begin() const { return data(); }
-  const T* end() const { return data() + size_; }
   std::size_t size() const { return size_; }
 
  private:

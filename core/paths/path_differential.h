@@ -36,6 +36,13 @@ struct LocalDifferential {
     vertices.clear();
     scalars.clear();
   }
+  /// f(degree of freedom, channel, change of ln F, change of the length) for every entry, axis by axis.
+  template <class F>
+  void for_each(const DofLayout& layout, F&& f) const {
+    for (const VertexGradient& v : vertices)
+      for (int axis = 0; axis < 3; ++axis) f(layout.vertex(v.vertex, axis), v.channel, v.log_f[axis], v.length[axis]);
+    for (const ScalarGradient& s : scalars) f(s.dof, s.channel, s.log_f, s.length);
+  }
   bool empty() const { return vertices.empty() && scalars.empty(); }
 };
 

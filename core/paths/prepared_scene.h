@@ -108,8 +108,12 @@ class PreparedScene {
   /// it counts as x2, and so on.
   int flow_rank(int k) const { return captures() ? k + 1 : k; }
 
-  /// The texture at x, which multiplies the BSDF; 1 where there is none.
-  double texture(const SurfacePoint& x) const { return shapes_[shape_index(x.triangle)].textured ? texture_at(x) : 1; }
+  /// The texture at x, which multiplies the BSDF, of a shape that has one.
+  double texture(const SurfacePoint& x) const {
+    const auto b = barycentrics(x);
+    const auto& v = records_[x.triangle].vertex;
+    return b[0] * scene.texture[v[0]] + b[1] * scene.texture[v[1]] + b[2] * scene.texture[v[2]];
+  }
   bool textured(int triangle) const { return shapes_[shape_index(triangle)].textured; }
   /// Its gradient along the surface.
   Vec3 texture_gradient(const SurfacePoint& x) const;
@@ -322,11 +326,6 @@ class PreparedScene {
   void update_lights();
   void update_emitters();
   void update_emitter_borders(const Shape& shape);
-  double texture_at(const SurfacePoint& x) const {
-    const auto b = barycentrics(x);
-    const auto& v = records_[x.triangle].vertex;
-    return b[0] * scene.texture[v[0]] + b[1] * scene.texture[v[1]] + b[2] * scene.texture[v[2]];
-  }
 
   LargeArray<TriangleRecord> records_;
   std::vector<int> changed_, shape_changed_;

@@ -67,8 +67,9 @@ VertexFlows::VertexFlows(const Scene& scene) {
   DisjointSets sets(scene.positions.size());
   for (const Triangle& t : scene.triangles)
     for (const int v : t.vertex) sets.join(v, t.vertex[0]);
-  body_of_vertex_ = sets.numbered(bodies_);
-  shape_of_body_.resize(static_cast<std::size_t>(bodies_));
+  int bodies = 0;
+  body_of_vertex_ = sets.numbered(bodies);
+  shape_of_body_.resize(static_cast<std::size_t>(bodies));
   for (std::size_t s = 0; s < scene.shapes.size(); ++s)
     for (int v = scene.shapes[s].first_vertex; v < scene.shapes[s].first_vertex + scene.shapes[s].vertex_count; ++v)
       shape_of_body_[body_of_vertex_[v]] = static_cast<int>(s);
@@ -116,7 +117,7 @@ bool VertexFlows::has_still_triangle_in_reach(const PreparedScene& prepared, std
 void VertexFlows::update_bodies(const PreparedScene& prepared) {
   const Scene& scene = prepared.scene;
   shape_bounds_.resize(scene.shapes.size());
-  body_bounds_.resize(static_cast<std::size_t>(bodies_));
+  body_bounds_.resize(shape_of_body_.size());
   body_moves_.resize(body_bounds_.size());
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
     if (prepared.shape_changed(static_cast<int>(s)) <= bodies_revision_) continue;

@@ -107,7 +107,6 @@ class VertexFlows {
   bool follows_bodies_ = false, keep_length_ = false;
   std::vector<int> body_of_vertex_;  ///< connected meshes, which do not change when vertices move
   std::vector<int> shape_of_body_;
-  int bodies_ = 0;
   std::vector<Bounds> shape_bounds_, body_bounds_;
   std::vector<char> body_moves_;
   int bodies_revision_ = 0;          ///< of the scene that these are of

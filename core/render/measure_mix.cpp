@@ -186,8 +186,7 @@ SamplingMix measure_mix(const Scene& scene, const GateSet& gates, const Estimato
   work = 0;
   if (options.sampling != Sampling::automatic || gates.shape().is_dirac() || scene.capture)
     return sampling_mix(options, gates, scene);
-  const bool any_length = gates.shape().is_unbounded();
-  const double width = any_length ? 1 : gates.relative_width(), coverage = any_length ? 1 : gates.relative_coverage();
+  const double width = gates.relative_width(), coverage = gates.relative_coverage();  // infinite for unbounded gates
   EstimatorOptions plain = options;
   plain.mix.reset();
   const SamplingMix by_width = sampling_mix(plain, gates, scene);

@@ -9,12 +9,10 @@
 #include <vector>
 
 #include "core/base/error.h"
-#include "core/base/partition_sum.h"
 #include "core/base/progress.h"
 #include "core/techniques/ellipsoidal.h"
 #include "core/techniques/light_subpaths.h"
 #include "core/techniques/primary_boundary.h"
-#include "core/techniques/sample_points.h"
 #include "core/techniques/secondary_boundary.h"
 #include "core/techniques/standard_paths.h"
 
@@ -24,21 +22,6 @@ namespace {
 /// The learning pass has random numbers of its own; with fewer searches by each technique it would teach noise.
 constexpr Stream kLearningStream{0x6c6561726e696e67u, 0, 0};
 constexpr long long kFewestLearningRounds = 64;
-
-/// Counts what a worker does during its life as work of a technique.
-class CountedWork {
- public:
-  CountedWork(Worker& worker, Technique technique)
-      : worker_(worker), own_(worker.work_of[static_cast<std::size_t>(technique)]), before_(worker.counts) {}
-  CountedWork(const CountedWork&) = delete;
-  CountedWork& operator=(const CountedWork&) = delete;
-  ~CountedWork() { own_ += worker_.counts - before_; }
-
- private:
-  const Worker& worker_;
-  WorkCounts& own_;
-  const WorkCounts before_;
-};
 
 /// Of p from the points of a triangle, the least and the largest.
 std::pair<double, double> distances(const Vec3& p, const std::array<Vec3, 3>& corners) {
@@ -162,9 +145,12 @@ void Passes::run_term(Term term, const Pass& pass, Partition partition, const Ga
 void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pass& pass, Partition partition) const {
   const int pixels = scene.camera.pixels();
   const double scale = scene.scene.detector.gain / pass.range.count();
-  const SamplePoints points(pass.stream, pass.range, options.numbers, partition.samples(pixels));
+  const SamplePart part = partition.samples(pixels);
+  const auto points = [&](const TechniqueUse& use, int place) {
+    return PointSet(pass.stream, use.technique, place, pass.range, options.numbers);
+  };
   std::vector<PointSet> of_image;
-  for (const TechniqueUse& use : uses) of_image.push_back(points.of_image(use.technique));
+  for (const TechniqueUse& use : uses) of_image.push_back(points(use, GatePick::kImage));
   for_each_pixel(partition, pixels, [&](int pixel) {
     if (scene.leaves_out(pixel)) return;
     for (std::size_t i = 0; i < uses.size(); ++i) {
@@ -173,18 +159,20 @@ void Passes::visit(std::span<const TechniqueUse> uses, Worker& worker, const Pas
       if (!(rate > 0)) continue;
       const double own_scale = use.in_pixel ? scale / rate : scale / pixels / rate;
       worker.sink.note_technique(use.technique);
-      const CountedWork counted(worker, use.technique);
+      const WorkCounts before = worker.counts;
+      const double count = rate * pass.range.count();
       const auto sample = [&](Rng& rng) { use.sample(pixel, own_scale, rng); };
       if (use.in_pixel)
-        points.in_pixel(use.technique, pixel, rate, sample);
+        points(use, pixel).visit(count, 0, part, sample);
       else
-        points.in_image(of_image[i], pixel, rate, sample);
+        of_image[i].visit(count, pixel, part, sample);
+      worker.work_of[static_cast<std::size_t>(use.technique)] += worker.counts - before;
     }
   });
 }
 
 void Passes::run_standard(Worker& worker, double light, const Pass& pass, Partition partition) const {
-  worker.balance.rates.light = light_rate(light);
+  worker.balance.light_rate = light_rate(light);
   StandardPaths standard(worker);
   LightSubpaths light_subpaths(worker);
   const TechniqueUse uses[] = {
@@ -195,13 +183,14 @@ void Passes::run_standard(Worker& worker, double light, const Pass& pass, Partit
   };
   visit(uses, worker, pass, partition);
   worker.sink.note_technique(Technique::standard);
-  const CountedWork counted(worker, Technique::standard);
+  const WorkCounts before = worker.counts;
   standard.finish();
+  worker.work_of[static_cast<std::size_t>(Technique::standard)] += worker.counts - before;
 }
 
 void Passes::run_connections(Worker& worker, const GatePass& lengths, double light, const Pass& pass,
                              Partition partition) const {
-  worker.balance.rates.light_connections = light > 0 && options.max_bounces > 1;
+  worker.balance.light_connections = light > 0 && options.max_bounces > 1;
   GatePass single_lengths = lengths, pairs = lengths;
   single_lengths.pairs = false;
   pairs.value = false;
@@ -269,7 +258,7 @@ void Passes::learn() const {
   const PassTimes::Timed timed(times(), PassKind::edges);
   using Guide = BoundaryGuide;
   if (ready->edges)
-    ready->edges->update(scene, options.boundary.wedge);
+    ready->edges->update(scene);
   else
     ready->edges.emplace(scene, options.boundary.wedge, cache_ ? &cache_->at_first() : nullptr);
   const Guide::Each<bool> possible = possible_searches();
@@ -296,9 +285,9 @@ void Passes::learn() const {
       Rng rng(kLearningStream, static_cast<std::uint64_t>(round), 0);
       for (const TechniqueUse& use : uses) {
         if (!(use.rate > 0)) continue;
-        const double before = worker.work();
+        const double before = worker.counts.in_rays();
         use.sample(pixel, use.in_pixel ? 1 : 1.0 / pixels, rng);
-        cost[Guide::table(use.technique)] += worker.work() - before;
+        cost[Guide::table(use.technique)] += worker.counts.in_rays() - before;
       }
     }
     records[partition] = std::move(sink.records);

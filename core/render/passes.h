@@ -115,6 +115,22 @@ class Passes {
     return sum_of_partitions<Sum>(shared, run);
   }
 
+  /// The same for so many images: run(films, partition) adds to a film for each. [image][pixel].
+  template <class Run>
+  ListedSum sum_of_films(PassKind kind, SampleRange range, int images, Run&& run) const {
+    const int channels = scene.scene.grey ? 1 : 3;
+    const std::size_t size = static_cast<std::size_t>(scene.pixels()) * gates.size() * channels;
+    const int partitions = partitions_for(range, size * images);
+    return sum_of<ListedSum>(kind, partitions, [&](int partition) {
+      ListedSum own(size * images);
+      std::vector<Film> films;
+      for (int image = 0; image < images; ++image) films.emplace_back(gates.size(), channels, own, image * size);
+      run(films, Partition{partition, partitions});
+      own.finish();
+      return own;
+    });
+  }
+
   /// Runs f(pixel) for the pixels of one partition, in a fixed order.
   template <class F>
   static void for_each_pixel(Partition partition, int pixels, F&& f) {

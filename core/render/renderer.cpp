@@ -38,30 +38,16 @@ bool Renderer::pixels_are_independent(Term term) const {
 
 GatedImage Renderer::render(const Stream& stream, SampleRange range) const {
   GatedImage image = impl_->blank();
-  render_light(image, stream, range);
+  {
+    const PassTimes::Timed timed(impl_->times(), PassKind::primal);
+    if (!impl_->scene.emitters.empty())  // no lamp, or one that the parameters have flattened
+      impl_->add_films(PassKind::primal, range, {&image, 1}, pixels_are_independent(),
+                       [&](const std::vector<Film>& films, Partition partition) {
+                         impl_->run_images({stream, range}, films, partition);
+                       });
+  }
   impl_->add_background(image);
   return image;
-}
-
-void Renderer::render_light(GatedImage& image, const Stream& stream, SampleRange range) const {
-  const PassTimes::Timed timed(impl_->times(), PassKind::primal);
-  if (impl_->scene.emitters.empty()) return;  // no lamp, or one that the parameters have flattened
-  const auto run = [&](const Film& film, Partition partition) {
-    PrimalSink sink(impl_->gates, film);
-    impl_->run_images({stream, range}, partition, sink);
-  };
-  if (pixels_are_independent() && impl_->has_many_pixels()) {
-    impl_->run_in_pixels(PassKind::primal, {&image, 1}, [&](Partition partition) { run(image, partition); });
-    return;
-  }
-  const int partitions = impl_->partitions_for(range, image.data.size());
-  const auto sum = impl_->sum_of<ListedSum>(PassKind::primal, partitions, [&](int partition) {
-    ListedSum own(image.data.size());
-    run({image.gates, image.channels, own, 0}, {partition, partitions});
-    own.finish();
-    return own;
-  });
-  sum.for_each(0, image.data.size(), [&](std::size_t i, double value) { image.data[i] += value; });
 }
 
 std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, SampleRange range) const {
@@ -72,27 +58,10 @@ std::vector<GatedImage> Renderer::derive(Term term, const Stream& stream, Sample
   if (!impl_->has(term) || columns == 0) return images;
   impl_->prepare(term);
   const PassTimes::Timed timed(impl_->times(), pass_kind(term));
-  const auto run = [&](const std::vector<Film>& films, Partition partition) {
-    TangentSink sink(impl_->gates, impl_->scene.layout, *impl_->basis, films);
-    impl_->run_term(term, {stream, range}, partition, impl_->every_gate, sink);
-  };
-  if (pixels_are_independent(term) && impl_->has_many_pixels()) {
-    const std::vector<Film> films(images.begin(), images.end());
-    impl_->run_in_pixels(pass_kind(term), images, [&](Partition partition) { run(films, partition); });
-    return images;
-  }
-  const std::size_t size = images[0].data.size(), values = size * columns;
-  const int partitions = impl_->partitions_for(range, values);
-  const auto sum = impl_->sum_of<ListedSum>(pass_kind(term), partitions, [&](int partition) {
-    ListedSum own(values);
-    std::vector<Film> films;
-    for (int column = 0; column < columns; ++column)
-      films.emplace_back(images[0].gates, images[0].channels, own, column * size);
-    run(films, {partition, partitions});
-    own.finish();
-    return own;
-  });
-  sum.for_each(0, values, [&](std::size_t i, double value) { images[i / size].data[i % size] += value; });
+  impl_->add_films(pass_kind(term), range, images, pixels_are_independent(term),
+                   [&](const std::vector<Film>& films, Partition partition) {
+                     impl_->run_term(term, {stream, range}, films, partition);
+                   });
   return images;
 }
 
@@ -106,8 +75,7 @@ ReplicatedImage Renderer::render_replicates(const Stream& stream, const std::vec
                                          .stay_in_pixels = pixels_are_independent() && impl_->has_many_pixels()});
   std::vector<ReplicatedImage> images = passes.render(
       [&](const Pass& pass, const std::vector<Film>& films, Partition partition) {
-        PrimalSink sink(impl_->gates, films[0]);
-        impl_->run_images(pass, partition, sink);
+        impl_->run_images(pass, films, partition);
       },
       [&](int, int pixel) { return impl_->scene.leaves_out(pixel) ? 0 : impl_->background_of(pixel).first; });
   return std::move(images[0]);
@@ -127,29 +95,21 @@ std::vector<ReplicatedImage> Renderer::derive_replicates(Term term, const Stream
                                          .ranges = ranges,
                                          .lit = lit,
                                          .stay_in_pixels = pixels_are_independent(term) && impl_->has_many_pixels()});
-  return passes.render(
-      [&](const Pass& pass, const std::vector<Film>& films, Partition partition) {
-        TangentSink sink(impl_->gates, impl_->scene.layout, basis, films);
-        impl_->run_term(term, pass, partition, impl_->every_gate, sink);
-      },
-      [&](int column, int pixel) {
-        double sum = 0;
-        if (term != Term::interior || impl_->scene.leaves_out(pixel)) return sum;
-        const int dof = impl_->background_of(pixel).second;
-        for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
-          if (basis.entries[e].column == column) sum += basis.entries[e].coefficient;
-        return sum;
-      });
+  return passes.render([&](const Pass& pass, const std::vector<Film>& films,
+                           Partition partition) { impl_->run_term(term, pass, films, partition); },
+                       [&](int column, int pixel) {
+                         double sum = 0;
+                         if (term != Term::interior || impl_->scene.leaves_out(pixel)) return sum;
+                         const int dof = impl_->background_of(pixel).second;
+                         for (int e = basis.row_begin[dof]; e < basis.row_begin[dof + 1]; ++e)
+                           if (basis.entries[e].column == column) sum += basis.entries[e].coefficient;
+                         return sum;
+                       });
 }
 
 void Renderer::add_gradient(Term term, const GatedImage& adjoint, const Stream& stream, SampleRange range,
                             std::vector<double>& dof_gradient, std::vector<std::vector<double>>* parts) const {
   add_gradients(term, {&adjoint, 1}, stream, range, {&dof_gradient, 1}, parts);
-}
-
-void Renderer::add_gradients(Term term, std::span<const GatedImage> adjoints, const Stream& stream, SampleRange range,
-                             std::vector<std::vector<double>>& dof_gradients) const {
-  add_gradients(term, adjoints, stream, range, dof_gradients, nullptr);
 }
 
 void Renderer::add_gradients(Term term, std::span<const GatedImage> adjoints, const Stream& stream, SampleRange range,

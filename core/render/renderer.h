@@ -49,9 +49,10 @@ class Renderer {
                     std::vector<double>& dof_gradient, std::vector<std::vector<double>>* parts = nullptr) const;
 
   /// As `add_gradient` for every adjoint (at least one, images of one shape), with the same paths. Their gates and pixels are picked for all
-  /// together. Paths are most of the cost.
+  /// together. Paths are most of the cost. `parts` are of the first.
   void add_gradients(Term term, std::span<const GatedImage> adjoints, const Stream& stream, SampleRange range,
-                     std::vector<std::vector<double>>& dof_gradients) const;
+                     std::span<std::vector<double>> dof_gradients,
+                     std::vector<std::vector<double>>* parts = nullptr) const;
 
   /// Whether the term can be other than zero: it depends on what moves and, for path_length, gates have jumps.
   bool has(Term term) const;
@@ -77,12 +78,6 @@ class Renderer {
   double work_of(Technique technique) const;
 
  private:
-  /// All but the background.
-  void render_light(GatedImage& image, const Stream& stream, SampleRange range) const;
-  /// `parts` of the first adjoint.
-  void add_gradients(Term term, std::span<const GatedImage> adjoints, const Stream& stream, SampleRange range,
-                     std::span<std::vector<double>> dof_gradients, std::vector<std::vector<double>>* parts) const;
-
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };

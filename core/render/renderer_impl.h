@@ -5,7 +5,6 @@
 #include <utility>
 #include <vector>
 
-#include "core/base/partition_sum.h"
 #include "core/render/passes.h"
 #include "core/render/renderer.h"
 
@@ -51,6 +50,30 @@ struct Renderer::Impl : Passes {
         });
     shared.keep_costs();
   }
+
+  /// Adds to the images what run(films, partition) adds to a film for each; `in_pixels`: to pixels of the partition only.
+  template <class Run>
+  void add_films(PassKind kind, SampleRange range, std::span<GatedImage> images, bool in_pixels, Run&& run) const {
+    if (in_pixels && has_many_pixels()) {
+      const std::vector<Film> films(images.begin(), images.end());
+      run_in_pixels(kind, images, [&](Partition partition) { run(films, partition); });
+      return;
+    }
+    const std::size_t size = images[0].data.size();
+    sum_of_films(kind, range, static_cast<int>(images.size()), run)
+        .for_each(0, size * images.size(),
+                  [&](std::size_t i, double value) { images[i / size].data[i % size] += value; });
+  }
+
+  void run_images(const Pass& pass, const std::vector<Film>& films, Partition partition) const {
+    PrimalSink sink(gates, films[0]);
+    Passes::run_images(pass, partition, sink);
+  }
+  void run_term(Term term, const Pass& pass, const std::vector<Film>& films, Partition partition) const {
+    TangentSink sink(gates, scene.layout, *basis, films);
+    Passes::run_term(term, pass, partition, every_gate, sink);
+  }
+  using Passes::run_images, Passes::run_term;
 
   /// Of a gradient. Partitions take turns at blocks of pixels.
   static int part_of(int pixel) { return pixel / kPixelsPerBlock % kGradientParts; }

@@ -47,7 +47,10 @@ class ReplicatedPasses {
     ProgressStage stage("rendering", by_sums ? replicates() + 1 : 1);
     std::vector<ListedSum> sums;
     for (int r = 0; by_sums && r < replicates(); ++r) {
-      sums.push_back(sum_of(what_.ranges[r], run));
+      const Pass pass{what_.stream, what_.ranges[r]};
+      sums.push_back(passes_.sum_of_films(
+          what_.kind, pass.range, what_.columns,
+          [&](const std::vector<Film>& films, Partition partition) { run(pass, films, partition); }));
       stage.advance();
     }
     std::vector<ReplicatedImage> images(what_.columns);
@@ -110,20 +113,6 @@ class ReplicatedPasses {
     }
     own.finish();
     return own;
-  }
-  /// Of one replicate, where samples add to any pixel: [column][pixel].
-  template <class Run>
-  ListedSum sum_of(SampleRange range, Run&& run) const {
-    const std::size_t size = pixels_ * values_;
-    const int partitions = passes_.partitions_for(range, size * what_.columns);
-    return passes_.sum_of<ListedSum>(what_.kind, partitions, [&](int partition) {
-      ListedSum own(size * what_.columns);
-      std::vector<Film> films;
-      for (int column = 0; column < what_.columns; ++column) films.emplace_back(gates_, channels_, own, column * size);
-      run(Pass{what_.stream, range}, films, Partition{partition, partitions});
-      own.finish();
-      return own;
-    });
   }
   /// Completes the pixels of other ranks.
   void share(const RankParts& parts, std::vector<ReplicatedImage>& images) const;

@@ -7,12 +7,12 @@
 namespace isochron {
 
 double Balance::standard(const Path& path, int pixel) const {
-  return rates.light > 0 ? 1 / (1 + rates.light * light_ratio(path, pixel).all) : 1;
+  return light_rate > 0 ? 1 / (1 + light_rate * light_ratio(path, pixel).all) : 1;
 }
 
 double Balance::light(const Path& path, int pixel, int camera_vertices) const {
   const LightRatio ratio = light_ratio(path, pixel, camera_vertices);
-  return rates.light * ratio.of_joint / (1 + rates.light * ratio.all);
+  return light_rate * ratio.of_joint / (1 + light_rate * ratio.all);
 }
 
 LightRatio Balance::light_ratio(const Path& path, int pixel, int joint) const {
@@ -39,7 +39,7 @@ template <class LengthPdf>
 double Balance::part_of_arc(const Path& path, int on_arc, double pdf_on_arc, bool gathered,
                             LengthPdf&& length_pdf) const {
   const int last = path.size() - 1;
-  const bool by_light = rates.light_connections && !gathered;
+  const bool by_light = light_connections && !gathered;
   if (last == 1 || (gathered && last == 2)) return on_arc == last ? 1 : 0;  // x0 makes no other connections
   const SurfacePoint &q = path.vertex[last - 1], &y = path.vertex[last];
   if (is_light(y.triangle) && !by_light) return on_arc == last - 1 ? 1 : 0;  // no circle goes through a point
@@ -74,7 +74,7 @@ double Balance::connection(const Path& path, int pixel, const TargetLength& targ
                            double pdf_on_arc) const {
   // Only where the camera's own connections, which serve the whole image, compete with another's do samples and
   // densities of the length differ between the two techniques.
-  const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !rates.light_connections);
+  const bool same_length_pdf = pick_.uniform() || (path.size() != 3 && !light_connections);
   return part_of_arc(path, on_arc, pdf_on_arc, false, [&](int from) {
     if (same_length_pdf) return 1.0;
     const int served = from == 0 ? GatePick::kImage : pixel;

@@ -19,17 +19,6 @@
 
 namespace isochron {
 
-/// How often each technique is used.
-struct TechniqueRates {
-  double light = 0;                ///< samples with light subpaths per standard one
-  bool light_connections = false;  ///< whether connections have light subpaths
-};
-
-/// Samples with light subpaths per standard one, where they are this part, below one, of both.
-inline double light_rate(double part) {
-  return part / (1 - part);
-}
-
 /// Densities of a path under samples with light subpaths over that under standard sampling, as if there were as many of
 /// both.
 struct LightRatio {
@@ -37,11 +26,17 @@ struct LightRatio {
   double of_joint = 0;  ///< of the one asked for
 };
 
+/// Samples with light subpaths per standard one, where they are this part, below one, of both.
+inline double light_rate(double part) {
+  return part / (1 - part);
+}
+
 class Balance {
  public:
   Balance(const PreparedScene& scene, const GatePick& pick) : scene_(scene), pick_(pick) {}
 
-  TechniqueRates rates;
+  double light_rate = 0;           ///< samples with light subpaths per standard one
+  bool light_connections = false;  ///< whether connections have light subpaths
 
   // The part that a technique takes of the complete path x0 .. x(K) of a pixel. Parts of standard sampling and of all joints of light
   // subpaths add up to one, and those of all arcs.

@@ -79,16 +79,17 @@ double primary_weight(const PreparedScene& scene, const BoundaryEdge& edge, doub
 
 }  // namespace
 
-BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Scene* at_first) : at_first_(at_first) {
-  update(scene, wedge);
+BoundaryEdges::BoundaryEdges(const PreparedScene& scene, bool wedge, const Scene* at_first)
+    : at_first_(at_first), wedge_(wedge) {
+  update(scene);
 }
 BoundaryEdges::~BoundaryEdges() = default;
 
-void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
+void BoundaryEdges::update(const PreparedScene& scene) {
   const std::size_t shapes = scene.scene.shapes.size();
   const int count = static_cast<int>(scene.scene.edges.size());
   // Which edges the camera samples depends on whether points may follow others.
-  const bool all = revision_ == 0 || wedge != wedge_ || camera_possible_ != scene.flows.camera_possible();
+  const bool all = revision_ == 0 || camera_possible_ != scene.flows.camera_possible();
   const auto resize = [this](std::size_t edges) {
     edges_.resize(edges);
     moves_.resize(edges);
@@ -100,23 +101,22 @@ void BoundaryEdges::update(const PreparedScene& scene, bool wedge) {
   }
   bool changed = false;
   for (std::size_t s = 0; s < shapes; ++s) {
-    if (!update_shape(scene, static_cast<int>(s), all, wedge)) continue;
+    if (!update_shape(scene, static_cast<int>(s), all)) continue;
     changed = true;
     set_group(s, scene.scene.shapes[s].first_edge, scene.scene.shapes[s].edge_count);
   }
   if (changed) {
     resize(static_cast<std::size_t>(count));  // without the intersections of before
-    if (scene.differentiable.geometry) add_mesh_intersections(scene, wedge);
+    if (scene.differentiable.geometry) add_mesh_intersections(scene);
     set_group(shapes, count, static_cast<int>(edges_.size()) - count);
     for (Weighted* each : {&primary_, &secondary_}) each->choice.finish();
   }
   // Last: an interrupted update is made again.
   revision_ = scene.revision();
-  wedge_ = wedge;
   camera_possible_ = scene.flows.camera_possible();
 }
 
-bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all, bool wedge) {
+bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all) {
   if (!all && scene.shape_changed(shape) <= revision_) return false;
   const int first = scene.scene.shapes[shape].first_edge, last = first + scene.scene.shapes[shape].edge_count;
   constexpr int kChunk = 4096, kAhead = 8;
@@ -133,7 +133,7 @@ bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all
     for (std::size_t k = 0; k < edges.size(); ++k) {
       if (k + kAhead < edges.size())
         for (const int t : scene.scene.edges[edges[k + kAhead]].face) scene.prefetch(std::max(t, 0));
-      update_edge(scene, static_cast<std::size_t>(edges[k]), wedge);
+      update_edge(scene, static_cast<std::size_t>(edges[k]));
     }
   });
   return true;
@@ -149,7 +149,7 @@ void BoundaryEdges::set_group(std::size_t group, int first, int count) {
   });
 }
 
-void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool wedge) {
+void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i) {
   primary_.weights[i] = secondary_.weights[i] = 0;
   Edge e = scene.scene.edges[i];
   const Vec3 &origin = scene.scene.positions[e.vertex[0]], &end = scene.scene.positions[e.vertex[1]];
@@ -179,7 +179,7 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
   }
   b.origin = origin;
   b.end = end;
-  b.azimuths = !sharp ? 0 : wedge ? angle : kPi;
+  b.azimuths = !sharp ? 0 : wedge_ ? angle : kPi;
   b.moves = sharp && (scene.differentiable.vertex[e.vertex[0]] || scene.differentiable.vertex[e.vertex[1]]);
   if (!sharp) return;
   moves_[i] = b.moves;
@@ -188,7 +188,7 @@ void BoundaryEdges::update_edge(const PreparedScene& scene, std::size_t i, bool 
   if (may_graze) secondary_.weights[i] = edge_length * b.azimuths;
 }
 
-void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedge) {
+void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene) {
   if (!intersections_) {
     const Scene& first = at_first_ ? *at_first_ : scene.scene;
     intersections_ = std::make_unique<MeshIntersections>(first, ray_offset(first));
@@ -205,7 +205,7 @@ void BoundaryEdges::add_mesh_intersections(const PreparedScene& scene, bool wedg
     }
     // The angle between the planes takes the place of the wedge.
     const double angle = std::atan2(length(cross(b.inward[0], b.inward[1])), std::abs(dot(b.inward[0], b.inward[1])));
-    b.azimuths = wedge ? angle : kPi;
+    b.azimuths = wedge_ ? angle : kPi;
     if (angle < kCoplanarAngle || !(b.moves || scene.flows.camera_possible())) continue;
     edges_.push_back(b);
     moves_.push_back(b.moves);

@@ -41,7 +41,7 @@ class BoundaryEdges {
   BoundaryEdges& operator=(const BoundaryEdges&) = delete;
   /// Rebuilds the edges of shapes that PreparedScene::update has changed since the last call; `scene` is the same object. The
   /// result does not depend on earlier updates.
-  void update(const PreparedScene& scene, bool wedge);
+  void update(const PreparedScene& scene);
 
   /// Which edge, and where on it. The edge itself is prefetched.
   struct Pick {
@@ -84,10 +84,10 @@ class BoundaryEdges {
     EdgeChoice choice;
   };
   /// The weights of an edge of the scene, which becomes edges_[i].
-  void update_edge(const PreparedScene& scene, std::size_t i, bool wedge);
-  void add_mesh_intersections(const PreparedScene& scene, bool wedge);
+  void update_edge(const PreparedScene& scene, std::size_t i);
+  void add_mesh_intersections(const PreparedScene& scene);
   /// Rebuilds the changed edges of a shape; false if there are none.
-  bool update_shape(const PreparedScene& scene, int shape, bool all, bool wedge);
+  bool update_shape(const PreparedScene& scene, int shape, bool all);
   void set_group(std::size_t group, int first, int count);
   Pick pick(const EdgeChoice& choice, double u) const;
 
@@ -97,7 +97,8 @@ class BoundaryEdges {
   const Scene* at_first_;
   std::unique_ptr<MeshIntersections> intersections_;  ///< made when first asked for
   int revision_ = 0;                                  ///< of the scene
-  bool wedge_ = true, camera_possible_ = false;
+  const bool wedge_;
+  bool camera_possible_ = false;
 };
 
 }  // namespace isochron

@@ -19,7 +19,7 @@ constexpr int kRecordsPerBin = 4, kFewRecords = 32;
 /// uniform.
 constexpr double kHalfTrustSampleSize = 8;
 /// How many times as often as without guiding a technique may be used.
-constexpr double kMostRate = 8, kLeastRate = 1.0 / 8;
+constexpr double kMostRate = 8;
 
 /// The density that minimises the variance is, in each bin, the root of the mean square of the contributions: given
 /// equally many unguided samples, of their sum.
@@ -179,7 +179,7 @@ BoundaryGuide::BoundaryGuide(const Each<bool>& possible, const std::vector<Guide
   }
   const Each<double> best = moments.best_rates();
   for (int t = 0; t < kSearches; ++t)
-    rate_[t] *= std::pow(std::clamp(best[t], kLeastRate, kMostRate), moments.trust(t));
+    rate_[t] *= std::pow(std::clamp(best[t], 1 / kMostRate, kMostRate), moments.trust(t));
 }
 
 void GuideSink::note_guide(int table, double x) {
@@ -191,15 +191,10 @@ void GuideSink::note_guide(int table, double x) {
 
 void GuideSink::bind(const LocalDifferential& differential) {
   rate_ = 0;
-  for (const VertexGradient& v : differential.vertices)
-    for (int axis = 0; axis < 3; ++axis) {
-      const int dof = layout_.vertex(v.vertex, axis);
-      for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
-        rate_ += column_sign(basis_.entries[i].column) * v.log_f[axis] * basis_.entries[i].coefficient;
-    }
-  for (const ScalarGradient& s : differential.scalars)
-    for (int i = basis_.row_begin[s.dof]; i < basis_.row_begin[s.dof + 1]; ++i)
-      rate_ += column_sign(basis_.entries[i].column) * s.log_f * basis_.entries[i].coefficient;
+  differential.for_each(layout_, [&](int dof, int, double log_f, double) {
+    for (int i = basis_.row_begin[dof]; i < basis_.row_begin[dof + 1]; ++i)
+      rate_ += column_sign(basis_.entries[i].column) * log_f * basis_.entries[i].coefficient;
+  });
 }
 
 void GuideSink::add(int pixel, const Rgb& value, double length, GateUse) {

@@ -9,9 +9,10 @@
 // the length that is left).
 // All need the segments next to the point on the arc outside of dielectrics: only there is the locus an ellipsoid of the optical length.
 // A path that ends outside is found by emitter arcs, also if it went through dielectrics before.
-// Every crossing arc is sampled once; only which of them get their visibility tested is a random choice, so the density
-// of a technique is one over the arc's span. (The choice by contribution evaluates all arcs and tests as many of them as
-// cost about as much again; the uniform one evaluates and tests only one arc.)
+// Every crossing arc is sampled once, but in meshes of many blocks, where candidates are a random choice and weigh as much more;
+// beyond that only which arcs get their visibility tested is one, so the density of a technique is one over the arc's span.
+// (The choice by contribution evaluates all arcs and tests as many of them as cost about as much again; the uniform one
+// evaluates and tests only one arc.)
 #pragma once
 #include <span>
 #include <vector>
@@ -85,7 +86,7 @@ class EllipsoidalConnections {
   EllipsoidBvh::Focus scattering_focus(const SurfacePoint& x, const Vec3& w) const {
     return {x.p, scene_.two_sided(x.triangle) && dot(x.n, w) < 0 ? -x.n : x.n, 0, 1, true};
   }
-  bool connects_light() const { return !receiver_ && worker_.balance.rates.light_connections; }
+  bool connects_light() const { return !receiver_ && worker_.balance.light_connections; }
 
   /// An arc to test.
   struct Choice {

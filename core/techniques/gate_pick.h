@@ -22,9 +22,7 @@ class GatePick {
   /// `lengths`: whether lengths are drawn. Without, only rate() may be called, and no table of the size of an image is made.
   /// Several adjoints, images of one shape, count with the sum of their magnitudes. `mean_rate`: of rate(), the share of the pixels that
   /// have samples.
-  GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths = true, double mean_rate = 1);
-  GatePick(const GateSet& gates, const GatedImage& adjoint, bool lengths = true)
-      : GatePick(gates, std::span(&adjoint, 1), lengths) {}
+  GatePick(const GateSet& gates, std::span<const GatedImage> adjoints, bool lengths, double mean_rate);
   /// Of the tables that draw lengths, in bytes.
   static double table_bytes(int pixels, int gates) { return sizeof(double) * (pixels + 1.0) * (gates + 1.0); }
 

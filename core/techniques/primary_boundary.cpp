@@ -1,6 +1,7 @@
 #include "core/techniques/primary_boundary.h"
 
 #include <cmath>
+#include <cstdint>
 #include <optional>
 
 namespace isochron {
@@ -32,11 +33,7 @@ std::optional<SurfacePoint> seen_beside(Worker& worker, const BoundaryEdge& edge
     if (scene.stacked.may_cover(front, scene.normal(front), d)) front = scene.top_face(front, p, d);
     return SurfacePoint{p, scene.normal(front), front};
   }
-  ++worker.counts.rays;
-  const Vec3 beside = normalize(y + side * offset - scene.camera.position);
-  const int t = scene.first_hit(scene.camera.position, beside);
-  if (t < 0 || dot(scene.normal(t), beside) == 0) return std::nullopt;
-  return scene.point_on_triangle(t, scene.camera.position, beside);
+  return worker.trace_camera(normalize(y + side * offset - scene.camera.position));
 }
 
 }  // namespace
@@ -113,11 +110,12 @@ void PrimaryBoundary::sample_pixel_border(double scale, Rng& rng) {
   const int table = BoundaryGuide::table(Technique::pixel_border);
   const double x = guide_.warp(table).sample(rng.fine_uniform());
   // Pixels in rows, with one column and one row more than the image has, for the borders at its end.
-  const int borders = 2 * (camera.width + 1) * (camera.height + 1);
-  const double place = x * borders;
-  const int border = std::min(static_cast<int>(place), borders - 1), axis = border % 2;
-  const int column = border / 2 % (camera.width + 1), row = border / 2 / (camera.width + 1);
-  const double along = place - border;
+  const std::int64_t borders = std::int64_t{2} * (camera.width + 1) * (camera.height + 1);
+  const double place = x * static_cast<double>(borders);
+  const std::int64_t border = std::min(static_cast<std::int64_t>(place), borders - 1);
+  const int axis = static_cast<int>(border % 2), column = static_cast<int>(border / 2 % (camera.width + 1)),
+            row = static_cast<int>(border / 2 / (camera.width + 1));
+  const double along = place - static_cast<double>(border);
   const Vec3 d = camera.direction(column + (axis == 1 ? along : 0), row + (axis == 0 ? along : 0));
   const bool in_columns = column < camera.width, in_rows = row < camera.height;
   if (!(axis == 0 ? in_rows : in_columns) || !scene_.flows.camera_possible_along(d)) return;
@@ -126,7 +124,7 @@ void PrimaryBoundary::sample_pixel_border(double scale, Rng& rng) {
   const int pixel = row * camera.width + column;
   const bool has_after = in_columns && in_rows, has_before = (axis == 0 ? column : row) > 0;
   const int before = pixel - (axis == 0 ? 1 : camera.width);
-  const double factor = scale * borders / guide_.warp(table).density(x);
+  const double factor = scale * static_cast<double>(borders) / guide_.warp(table).density(x);
   follow(*x1, GatePick::kImage, x1->triangle, camera.image_gradient(x1->p - eye_.p, axis), rng,
          [&](const Rgb& value, double length) {
            if (has_after) worker_.sink.add(pixel, value * factor, length, GateUse::value_only);

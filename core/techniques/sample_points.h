@@ -20,16 +20,18 @@ struct SamplePart {
 /// One set of points, to be visited in parts.
 class PointSet {
  public:
-  PointSet(const Stream& stream, Technique technique, std::uint32_t place, SampleRange range, Numbers numbers)
+  /// `place`: a pixel, or GatePick::kImage.
+  PointSet(const Stream& stream, Technique technique, int place, SampleRange range, Numbers numbers)
       : stream_(stream),
-        index_(static_cast<std::uint64_t>(technique) << 32 | place),
+        index_(static_cast<std::uint64_t>(technique) << 32 | static_cast<std::uint32_t>(place)),
         set_(static_cast<std::uint32_t>(range.begin)),
         together_(numbers == Numbers::low_discrepancy) {}
 
-  /// sample(rng) for points [from, to) of one shared sequence, of these only those of `part`. Fractional bounds are rounded by
-  /// one random offset common to all calls, so that there are to - from samples on average.
+  /// sample(rng) for those of `part` of the `count_of_turn` points of a turn. Fractional bounds between turns are rounded by one random
+  /// offset common to all calls, so that a turn has so many on average.
   template <class F>
-  void visit(double from, double to, SamplePart part, F&& sample) const {
+  void visit(double count_of_turn, int turn, SamplePart part, F&& sample) const {
+    const double from = count_of_turn * turn, to = count_of_turn * (turn + 1);
     const bool whole = from == std::floor(from) && to == std::floor(to);
     const double shift = whole ? 0 : of_run(0).shift();
     const auto begin = static_cast<std::int64_t>(from + shift), count = static_cast<std::int64_t>(to + shift) - begin;
@@ -62,36 +64,6 @@ class PointSet {
   std::uint64_t index_;
   std::uint32_t set_;
   bool together_;
-};
-
-class SamplePoints {
- public:
-  SamplePoints(const Stream& stream, SampleRange range, Numbers numbers, SamplePart part = {})
-      : stream_(stream), range_(range), numbers_(numbers), part_(part) {}
-
-  /// sample(rng) for each of the samples that a technique takes from `pixel`: `rate` times those of the range, on average.
-  template <class F>
-  void in_pixel(Technique technique, int pixel, double rate, F&& sample) const {
-    if (rate > 0)
-      PointSet(stream_, technique, static_cast<std::uint32_t>(pixel), range_, numbers_)
-          .visit(0, rate * range_.count(), part_, sample);
-  }
-  /// The points of a technique that serves the whole image.
-  PointSet of_image(Technique technique) const { return {stream_, technique, kImage, range_, numbers_}; }
-  /// Those of them that come with `pixel`, which need not land there.
-  template <class F>
-  void in_image(const PointSet& points, int pixel, double rate, F&& sample) const {
-    const double per_pixel = rate * range_.count();
-    points.visit(per_pixel * pixel, per_pixel * (pixel + 1), part_, sample);
-  }
-
- private:
-  static constexpr std::uint32_t kImage = ~std::uint32_t{0};  ///< in the place of a pixel
-
-  const Stream stream_;
-  const SampleRange range_;
-  const Numbers numbers_;
-  const SamplePart part_;
 };
 
 }  // namespace isochron

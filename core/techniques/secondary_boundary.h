@@ -12,7 +12,6 @@
 // From the edge, the D side walks on and connects to the camera at every vertex. Segments that end at a light without an
 // extent, or begin at the sensor point of a capture, are found in one way each: from an edge point, which determines them.
 #pragma once
-#include <span>
 #include <vector>
 
 #include "core/techniques/boundary_edges.h"

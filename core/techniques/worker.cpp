@@ -60,7 +60,8 @@ void Worker::emit(const Path& p, int pixel, const Rgb& value, double length, Gat
     differentiate(p, pixel, false, differential);
     if (differential.empty()) return;
     sink.bind(differential);
-    if (keeps_length(p)) use = GateUse::value_only;
+    // Where its flow keeps the length, gates count by their values alone.
+    if (p.size() > 2 && scene.flows.keep_length()) use = GateUse::value_only;
   }
   sink.add(pixel, value, length, use);
 }

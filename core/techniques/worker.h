@@ -34,9 +34,6 @@ struct Worker {
 
   std::array<WorkCounts, kTechniques> work_of{};  ///< that of the samples of Passes::visit
 
-  /// So far, in rays.
-  double work() const { return counts.in_rays(); }
-
   // Queries of the scene, whose rays are counted.
   bool visible(const SurfacePoint& x, const SurfacePoint& y) {
     ++counts.rays;
@@ -80,10 +77,6 @@ struct Worker {
   bool contributes(const Path& p) const {
     return !differential_sink || path_has_gradient(scene, p, p.size() - 1, p.back().triangle);
   }
-
-  /// Whether the flow of the complete path p keeps its length (VertexFlows::keep_length), so that gates count by their values
-  /// alone.
-  bool keeps_length(const Path& p) const { return differential_sink && p.size() > 2 && scene.flows.keep_length(); }
 
   /// Hands the complete path p to the sink.
   void emit(const Path& p, int pixel, const Rgb& value, double length, GateUse use);

@@ -86,7 +86,7 @@ TEST(BoundaryWeights, AddUpToOne) {
   GatedImage adjoint(8, 8, 3, 1);
   Rng uneven(Stream{test_seed(12), 0, 0}, 0, 0);
   for (double& x : adjoint.data) x = 0.1 + uneven.uniform();
-  const GatePick pick(gates, adjoint);
+  const GatePick pick(gates, {&adjoint, 1}, true, 1);
   const EstimatorOptions options{.max_bounces = 3};
   NoSink sink;
   Worker worker(prepared, gates, options, pick, sink);

@@ -160,7 +160,7 @@ TEST(GatePick, ProbabilitiesAndDensity) {
   GatedImage adjoint = uneven_adjoint(4, 4, 3);
   for (int pixel = 0; pixel < 4; ++pixel) adjoint.at(pixel, pixel % 3) = 0.1;  // each has a gate to pick
   for (int g = 0; g < 3; ++g) adjoint.at(5, g) = 0;
-  for (const GatePick& pick : {GatePick(gates), GatePick(gates, adjoint)}) {
+  for (const GatePick& pick : {GatePick(gates), GatePick(gates, {&adjoint, 1}, true, 1)}) {
     for (int pixel = GatePick::kImage; pixel < 4; ++pixel) {
       double total = 0;
       int counts[3] = {0, 0, 0};
@@ -184,7 +184,7 @@ TEST(GatePick, ProbabilitiesAndDensity) {
     }
   }
   double u = 0.4;
-  EXPECT_EQ(GatePick(gates, adjoint).sample(5, u), -1);
+  EXPECT_EQ(GatePick(gates, {&adjoint, 1}, true, 1).sample(5, u), -1);
 }
 
 TEST(MeasureMix, KnowsTheExtremesAndIsDeterministic) {

@@ -59,7 +59,7 @@ TEST(GatePick, LeavesMixedGradientsUnbiased) {
 TEST(GatePick, RatesNeedNoTable) {
   const GateSet gates(GateShape::gaussian(0.3), {5.0, 5.3, 5.6});
   const GatedImage adjoint = overlapping_adjoint(8, 8, 3);
-  const GatePick with(gates, adjoint), without(gates, adjoint, false);
+  const GatePick with(gates, {&adjoint, 1}, true, 1), without(gates, {&adjoint, 1}, false, 1);
   for (int pixel = 0; pixel < adjoint.pixels(); ++pixel) EXPECT_EQ(with.rate(pixel), without.rate(pixel)) << pixel;
 }
 

@@ -159,7 +159,7 @@ TEST(SharedEdge, NeighboursAreThoseOfNow) {
   const Mesh swung = walls({0, 0, 0}, {1.0, 0.2, 2.5}, {false, false, false}, 1);
   scene.positions = swung.positions;
   prepared.update(scene, &basis, {});
-  edges.update(prepared, true);
+  edges.update(prepared);
   EXPECT_EQ(silhouette(), (std::set{1, 2}));
 }
 

@@ -49,7 +49,7 @@ struct Finder {
   explicit Finder(const Material& block)
       : scene(glossy_validation_scene(8, 0.4, block)),
         prepared(scene, nullptr),
-        pick(gates, positive_adjoint(scene, 3)),
+        pick(gates, std::vector{positive_adjoint(scene, 3)}, true, 1),
         worker(prepared, gates, options, pick, sink) {}
 
   void find_by_standard_sampling(int paths) {
@@ -91,7 +91,7 @@ double part_of_connections(const Finder& f, const PathSink::Found& found, Target
   target.tau[0] = found.path.length.back();
   double sum = 0;
   const int last = found.path.size() - 1;
-  const int first = f.worker.balance.rates.light_connections ? 1 : std::max(1, last - 1);
+  const int first = f.worker.balance.light_connections ? 1 : std::max(1, last - 1);
   for (int on_arc = first; on_arc <= last; ++on_arc)
     if (const double pdf = pdf_on_arc(f.prepared, found.path, on_arc); pdf > 0)
       sum += f.worker.balance.connection(found.path, found.pixel, target, 0, on_arc, pdf);
@@ -122,7 +122,7 @@ TEST_P(Weights, AddUpToOne) {
   for (const PathSink::Found& found : f.sink.found) {
     // Of standard sampling and light subpaths, by every joint.
     for (const double light : {0.0, 0.25, 3.0}) {
-      f.worker.balance.rates.light = light;
+      f.worker.balance.light_rate = light;
       double of_light = 0;
       for (int joint = 0; joint <= found.path.size() - 3; ++joint)
         of_light += f.worker.balance.light(found.path, found.pixel, joint);
@@ -131,11 +131,11 @@ TEST_P(Weights, AddUpToOne) {
     }
     if (!f.prepared.outside(found.path.vertex[found.path.size() - 2], found.path.back())) continue;
     for (const bool light : {false, true}) {
-      f.worker.balance.rates.light_connections = light;
+      f.worker.balance.light_connections = light;
       for (const TargetLength& target : {TargetLength{}, pair_target(0), pair_target(1), pair_target(2)})
         EXPECT_NEAR(part_of_connections(f, found, target), 1, 1e-9);
     }
-    f.worker.balance.rates.light_connections = false;
+    f.worker.balance.light_connections = false;
     ++found_by_arcs;
   }
   EXPECT_GT(shared_by_light, 500);
@@ -258,7 +258,7 @@ TEST_P(Weights, OfLightSubpathsAreOverTheSumOfAllDensities) {
   constexpr double kLight = 1.5;
   Finder f = finder();
   f.options.max_bounces = 3;
-  f.worker.balance.rates.light = kLight;
+  f.worker.balance.light_rate = kLight;
   f.find_by_standard_sampling(2000);
   const std::size_t by_standard = f.sink.found.size();
   std::vector<int> from(by_standard, -1);
