@@ -30,8 +30,6 @@ double distance_of_light(const Histograms& histograms, double sigma, const Detec
   return std::max(*middle, 0.0);
 }
 
-constexpr const char* kLess = "leave points or bins out";
-
 /// What decides on the filter and on the size of voxels.
 struct Setting {
   double narrowest;  ///< sigma that the response and the bins allow
@@ -86,7 +84,8 @@ void fill_in(const SearchResult& found, const Vec3& step, BackProjection& result
     for (int n = low[axis]; n <= high[axis]; ++n) axes[axis]->push_back((n + 0.5) * step[axis]);
   }
   const std::size_t voxels = result.across.size() * result.up.size() * result.depth.size();
-  require_memory({"the box of all that stands out in the back-projection needs", 2.0 * sizeof(float) * voxels}, kLess);
+  require_memory({"the box of all that stands out in the back-projection needs", 2.0 * sizeof(float) * voxels},
+                 kLessOfCapture);
   result.albedo.assign(voxels, 0);
   result.significance = result.albedo;
   for (const SummedBlock& block : found.blocks) {
@@ -113,7 +112,8 @@ BackProjection back_project(const CaptureFile& capture, const DetectorResponse& 
   const Histograms all = histograms(capture, result.frame, used);
   const Setting set = setting(all, response);
   result.filter = time_filter(set.sigma, response, all.bin);
-  require_memory({"filtered histograms need", double{sizeof(FilteredHistograms::Entry)} * all.counts.size()}, kLess);
+  require_memory({"filtered histograms need", double{sizeof(FilteredHistograms::Entry)} * all.counts.size()},
+                 kLessOfCapture);
   result.depth_resolution = 0.5 * result.filter.width;
   result.lateral_resolution = result.filter.width / (set.ways * set.sine);
   result.finest_resolution = time_filter(set.narrowest, response, all.bin).width / (2 * set.sine);

@@ -8,6 +8,9 @@
 
 namespace isochron {
 
+/// Advice where a capture takes more memory than there is.
+inline constexpr const char* kLessOfCapture = "leave points or bins out";
+
 struct BackProjectionOptions {
   /// Probability that background light alone makes any voxel of the whole volume significant; in (0, 1).
   double false_alarms = 0.01;

@@ -258,7 +258,7 @@ LikelyAlbedos likely_albedos(const BackProjection& volume, const Histograms& his
   const std::size_t voxels = result.across.size() * result.up.size() * result.depth.size();
   // And their blurred copy (start_surface.cpp).
   require_memory({"the box of all that stands out in the back-projection needs", 2.0 * sizeof(float) * voxels},
-                 "leave points or bins out");
+                 kLessOfCapture);
   result.albedo.assign(voxels, 0);
   const std::vector<char> near = near_surfaces(volume);
   std::vector<std::size_t> lit;
