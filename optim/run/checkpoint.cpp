@@ -39,6 +39,7 @@ struct Damaged : std::runtime_error {
 
 std::vector<std::pair<const char*, std::vector<double>*>> lists_of(SafeguardState& state) {
   return {{"recent", &state.recent},
+          {"recent_noise", &state.recent_noise},
           {"best_theta", &state.best_theta},
           {"block", &state.block},
           {"block_before", &state.block_before},
@@ -98,6 +99,7 @@ Checkpoint parse(const std::string& file, const std::string& text, const Paramet
   c.safeguard.rejected = safeguard["rejected"].as<int>();
   c.safeguard.rejected_in_row = safeguard["rejected_in_row"].as<int>();
   c.safeguard.best_level = safeguard["best_level"].as<double>();
+  c.safeguard.best_noise = safeguard["best_noise"].as<double>();
   for (const auto& [key, values] : lists_of(c.safeguard)) *values = safeguard[key].as<std::vector<double>>();
   const YAML::Node descent = root["descent"];
   c.descent.judged = descent["judged"].as<bool>();
@@ -133,8 +135,9 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
   text += c.optimizer.empty() ? "optimizer: {}\n" : "optimizer:\n";
   for (const auto& [key, values] : c.optimizer) fmt::format_to(out, "  {}: {}\n", key, list(values));
   SafeguardState safeguard = c.safeguard;
-  fmt::format_to(out, "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n",
-                 scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row, scalar(safeguard.best_level));
+  fmt::format_to(out, "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n  best_noise: {}\n",
+                 scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row, scalar(safeguard.best_level),
+                 scalar(safeguard.best_noise));
   for (const auto& [key, values] : lists_of(safeguard)) fmt::format_to(out, "  {}: {}\n", key, list(*values));
   DescentState descent = c.descent;
   fmt::format_to(out, "descent:\n  judged: {}\n  summed: {}\n", descent.judged, descent.summed);

@@ -14,7 +14,7 @@ namespace isochron {
 
 /// Of the file's keys and what they mean: to be raised with any change of them. The program's version, which the file
 /// also has, is for the reader of it.
-inline constexpr int kCheckpointSchema = 5;
+inline constexpr int kCheckpointSchema = 6;
 
 struct Checkpoint {
   int iteration = 0;   ///< iterations done; the next row of the log has this number

@@ -33,17 +33,20 @@ void add(std::vector<double>& sum, const std::vector<double>& values, Function o
 
 }  // namespace
 
-Verdict Safeguard::observe(double loss, bool finite, const std::vector<double>& theta,
+Verdict Safeguard::observe(double loss, double noise, bool finite, const std::vector<double>& theta,
                            const std::vector<double>& gradient) {
   if (state_.best_theta.empty()) state_.best_theta = theta;
   if (!finite) return reject();
   std::vector<double>& recent = state_.recent;
   recent.push_back(loss);
   if (recent.size() > kRecent) recent.erase(recent.begin());
+  state_.recent_noise.push_back(std::isfinite(noise) ? noise : 0);
+  if (state_.recent_noise.size() > kLevel) state_.recent_noise.erase(state_.recent_noise.begin());
   const double level =
       median({recent.end() - static_cast<std::ptrdiff_t>(std::min(kLevel, recent.size())), recent.end()});
   if (level < state_.best_level) {
     state_.best_level = level;
+    state_.best_noise = median(state_.recent_noise);
     state_.best_theta = theta;
     state_.rejected_in_row = 0;
   }
@@ -56,7 +59,7 @@ bool Safeguard::rises() const {
   if (recent.size() < kFewestForRise) return false;
   std::vector<double> differences;
   for (std::size_t i = 1; i < recent.size(); ++i) differences.push_back(std::abs(recent[i] - recent[i - 1]));
-  const double limit = state_.best_level + kRise * median(differences) / kMedianDifference;
+  const double limit = state_.best_level + kRise * std::max(median(differences) / kMedianDifference, state_.best_noise);
   return std::all_of(recent.end() - kRisen, recent.end(), [&](double loss) { return loss > limit; });
 }
 
@@ -110,6 +113,7 @@ Verdict Safeguard::reject() {
   ++state_.rejected;
   state_.rate /= 2;
   state_.recent.clear();
+  state_.recent_noise.clear();
   restart_window();
   return ++state_.rejected_in_row >= kMostRejectedInRow ? Verdict::give_up : Verdict::reject;
 }

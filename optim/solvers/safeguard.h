@@ -3,8 +3,9 @@
 //
 // Rise. The *level* is the median of the last 5 losses, the *noise* the median of the absolute differences
 // between successive ones of the last 21, divided by 0.954 (for a normal distribution: its standard
-// deviation). The loss has risen when each of the last 3 losses exceeds the lowest level so far by more than
-// 6 times the noise; 8 losses must have been seen since the last rejection. One wild loss, or two, is no
+// deviation). Noise changes with the number of samples (sample_share.h): that of the lowest level so far is the median of its losses'
+// own standard errors. The loss has risen when each of the last 3 losses exceeds the lowest level by more than
+// 6 times the larger of the two; 8 losses must have been seen since the last rejection. One wild loss, or two, is no
 // rise. False alarms in simulated losses without any trend: 1 in 10 000 rows of normal noise, 1 in 2500 of
 // noise without a variance (Pareto, 1.5).
 //
@@ -30,8 +31,9 @@ namespace isochron {
 struct SafeguardState {
   double rate = 1;  ///< factor on every step: 1/2 to the power of `rejected`
   int rejected = 0, rejected_in_row = 0;
-  std::vector<double> recent;  ///< the last losses since the last rejection, the newest last
-  double best_level = std::numeric_limits<double>::infinity();
+  std::vector<double> recent;        ///< the last losses since the last rejection, the newest last
+  std::vector<double> recent_noise;  ///< standard errors of those that make the level
+  double best_level = std::numeric_limits<double>::infinity(), best_noise = 0;
   std::vector<double> best_theta;                      ///< where best_level was reached
   std::vector<double> block, block_before;             ///< losses
   std::vector<double> theta_sum;                       ///< over the rows of `block`
@@ -50,9 +52,9 @@ class Safeguard {
   /// `window`: rows of a block, 0: never settled.
   explicit Safeguard(int window, SafeguardState state = {}) : window_(window), state_(std::move(state)) {}
 
-  /// Takes the row of theta into account. `finite`: whether loss and gradient are. `gradient`: 0 where it leads beyond a
-  /// bound; empty: not to be judged.
-  Verdict observe(double loss, bool finite, const std::vector<double>& theta, const std::vector<double>& gradient = {});
+  /// Takes the row of theta into account. `noise`: standard error of `loss`, 0 where it is not known. `finite`: whether loss and
+  /// gradient are. `gradient`: 0 where it leads beyond a bound; empty: not to be judged.
+  Verdict observe(double loss, double noise, bool finite, const std::vector<double>& theta, const std::vector<double>& gradient = {});
 
   /// The rows so far say nothing of whether the loss has settled.
   void restart_window();
