@@ -9,7 +9,8 @@ namespace isochron {
 namespace {
 
 constexpr std::size_t kRecent = 21, kFewestForRise = 8, kLevel = 5, kRisen = 3;
-constexpr double kRise = 6;  // times the noise
+/// Times the noise, that of the lowest level, which is the least of medians of five, and that which the last losses state.
+constexpr double kRise = 6, kRiseOfLevel = 3, kRiseOfStated = 4;
 constexpr int kMostRejectedInRow = 5;
 /// Of fewer rows the variance is known too badly: squared means in its units have no variance of their own below 6.
 constexpr int kRowsOfGradient = 20;
@@ -59,7 +60,9 @@ bool Safeguard::rises() const {
   if (recent.size() < kFewestForRise) return false;
   std::vector<double> differences;
   for (std::size_t i = 1; i < recent.size(); ++i) differences.push_back(std::abs(recent[i] - recent[i - 1]));
-  const double limit = state_.best_level + kRise * std::max(median(differences) / kMedianDifference, state_.best_noise);
+  const double limit =
+      state_.best_level + std::max({kRise * median(differences) / kMedianDifference, kRiseOfLevel * state_.best_noise,
+                                    kRiseOfStated * median(state_.recent_noise)});
   return std::all_of(recent.end() - kRisen, recent.end(), [&](double loss) { return loss > limit; });
 }
 

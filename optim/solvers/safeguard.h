@@ -3,10 +3,10 @@
 //
 // Rise. The *level* is the median of the last 5 losses, the *noise* the median of the absolute differences
 // between successive ones of the last 21, divided by 0.954 (for a normal distribution: its standard
-// deviation). Noise changes with the number of samples (sample_share.h): that of the lowest level so far is the median of its losses'
-// own standard errors. The loss has risen when each of the last 3 losses exceeds the lowest level by more than
-// 6 times the larger of the two; 8 losses must have been seen since the last rejection. One wild loss, or two, is no
-// rise. False alarms in simulated losses without any trend: 1 in 10 000 rows of normal noise, 1 in 2500 of
+// deviation). The loss has risen when each of the last 3 losses exceeds the lowest level so far by more than 6 times the noise. As noise
+// changes with the number of samples (sample_share.h), that must also be more than 3 times the standard error that the losses of the lowest
+// level state themselves (their median), and 4 times that of the last 5. 8 losses must have been seen since the last rejection. One wild
+// loss, or two, is no rise. False alarms in simulated losses without any trend: 1 in 10 000 rows of normal noise, 1 in 2500 of
 // noise without a variance (Pareto, 1.5).
 //
 // Rejection, after a rise or a loss or gradient that is not finite: back to the parameters of the lowest

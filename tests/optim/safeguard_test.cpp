@@ -80,9 +80,9 @@ TEST(Safeguard, RarelyTakesNoiseForARise) {
 }
 
 TEST(Safeguard, ALowLevelOfNoisyLossesIsNoBar) {
-  // Noise of ten, then of one, about the same level, as where sample_share.h changes its mind: the lowest level is about 10 below what
-  // the quiet losses can reach. Expected false alarms: 0.25 runs of 200, so more than 3 with probability 1e-4; without the noise of that
-  // level 187.
+  // Noise of ten and of one by turns about the same level, as where sample_share.h changes its mind: the lowest level is about 10 below
+  // what the quiet losses can reach. Expected false alarms: 0.5 runs of 200, so more than 4 with probability 2e-4; without the stated
+  // noise 187.
   int rejected = 0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     Safeguard guard(0);
@@ -93,7 +93,7 @@ TEST(Safeguard, ALowLevelOfNoisyLossesIsNoBar) {
     }
     rejected += guard.state().rejected > 0;
   }
-  EXPECT_LE(rejected, 3);
+  EXPECT_LE(rejected, 4);
 }
 
 TEST(Safeguard, SeesARiseWithinThreeRows) {
