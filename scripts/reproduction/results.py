@@ -50,7 +50,7 @@ def _notes(runs):
         notes.append(
             f"`corridor_fd`: the images of a difference are independent. {failed} of {len(runs['corridor_fd'])} seeds end above 25 %, at "
             f"{cost:.2g} times the time per iteration of `corridor`. Two unknowns are fair to finite differences; every further one "
-            "would add two images to an iteration, where the cost of our gradient does not grow with their number. The step decides: see "
+            "would add two images to an iteration, where the cost of our gradient does not grow with their number. Other steps: "
             "`experiments/corridor_fd.yaml`.")
     if runs["cube_standard"]:
         failed = sum(r.error_percent > 25 for r in runs["cube_standard"])
