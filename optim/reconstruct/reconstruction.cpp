@@ -124,32 +124,32 @@ DetectorResponse response_of(GateSpec gates, const CaptureFile& capture) {
 constexpr double kNeverSilent = 100;
 
 /// One number per sensor point, zero for dead ones; empty: none is. Values of these are no counts under some spot, not finite or below zero, or
-/// they count nothing where others do. Throws InputError where most points have values below zero.
+/// they count nothing where others do. Throws InputError where most of the points with finite values have some below zero.
 std::vector<std::uint8_t> usable_points(const CaptureFile& capture, const std::string& file) {
   const std::size_t points = capture.geometry.sensor.size();
-  std::vector<std::uint8_t> used(points, 1), negative(points, 0);
+  std::vector<std::uint8_t> finite(points, 1), used(points, 1);
   std::vector<double> counted(points, 0.0);
   for (int pixel = 0; pixel < capture.counts.pixels(); ++pixel)
     for (int g = 0; g < capture.counts.gates; ++g) {
       const double value = capture.counts.at(pixel, g);
       const std::size_t point = pixel % points;
-      if (!(value >= 0 && std::isfinite(value))) used[point] = 0;
-      if (value < 0) negative[point] = 1;
+      if (!std::isfinite(value)) finite[point] = used[point] = 0;
+      if (value < 0) used[point] = 0;
       counted[point] += value;
     }
-  const auto number = [](const std::vector<std::uint8_t>& of) { return std::ranges::count(of, 1); };
-  if (2 * number(negative) > static_cast<std::ptrdiff_t>(points))
+  const auto left = [](const std::vector<std::uint8_t>& of) { return std::ranges::count(of, 1); };
+  if (2 * left(used) < left(finite))
     throw InputError(fmt::format(
         "{}: {} of {} points have values below zero, which are no counts (allowed: photons as they were counted, dark "
         "counts among them)",
-        file, number(negative), points));
+        file, left(finite) - left(used), points));
   std::vector<double> sums;
   for (std::size_t p = 0; p < points; ++p)
     if (used[p]) sums.push_back(counted[p]);
   if (!sums.empty() && median(sums) >= kNeverSilent)
     for (std::size_t p = 0; p < points; ++p)
       if (counted[p] == 0) used[p] = 0;
-  if (number(used) == std::ssize(used)) used.clear();
+  if (left(used) == std::ssize(used)) used.clear();
   return used;
 }
 

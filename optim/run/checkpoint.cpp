@@ -135,7 +135,8 @@ void save_checkpoint(const std::string& folder, const Checkpoint& c, const Param
   text += c.optimizer.empty() ? "optimizer: {}\n" : "optimizer:\n";
   for (const auto& [key, values] : c.optimizer) fmt::format_to(out, "  {}: {}\n", key, list(values));
   SafeguardState safeguard = c.safeguard;
-  fmt::format_to(out, "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n  best_noise: {}\n",
+  fmt::format_to(out,
+                 "safeguard:\n  rate: {}\n  rejected: {}\n  rejected_in_row: {}\n  best_level: {}\n  best_noise: {}\n",
                  scalar(safeguard.rate), safeguard.rejected, safeguard.rejected_in_row, scalar(safeguard.best_level),
                  scalar(safeguard.best_noise));
   for (const auto& [key, values] : lists_of(safeguard)) fmt::format_to(out, "  {}: {}\n", key, list(*values));

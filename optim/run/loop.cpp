@@ -59,8 +59,9 @@ LoopResult run_loop(const Objective& objective, Optimizer& optimizer, int stop_w
     const bool finite = std::isfinite(now.loss) && all_finite(now.gradient);
     const bool agrees = agree(now, options.converged_rmse);
     Safeguard safeguard(stop_window, state.safeguard);
-    const Verdict verdict = safeguard.observe(
-        now.loss, now.loss_noise, finite, state.theta, within_bounds(now.gradient, state.theta, objective.lower(), objective.upper()));
+    const Verdict verdict =
+        safeguard.observe(now.loss, now.loss_noise, finite, state.theta,
+                          within_bounds(now.gradient, state.theta, objective.lower(), objective.upper()));
     const bool last = state.iteration >= options.iterations;
     const bool diverged = verdict == Verdict::give_up || (last && (!finite || exploded(now, state)));
     if (agrees || diverged || verdict == Verdict::settled || last) {

@@ -9,7 +9,7 @@ namespace isochron {
 namespace {
 
 constexpr std::size_t kRecent = 21, kFewestForRise = 8, kLevel = 5, kRisen = 3;
-/// Times the noise, that of the lowest level, which is the least of medians of five, and that which the last losses state.
+/// Times the noise as differences show it, the error that losses of the lowest level state, and that of the last losses.
 constexpr double kRise = 6, kRiseOfLevel = 3, kRiseOfStated = 4;
 constexpr int kMostRejectedInRow = 5;
 /// Of fewer rows the variance is known too badly: squared means in its units have no variance of their own below 6.

@@ -54,7 +54,8 @@ class Safeguard {
 
   /// Takes the row of theta into account. `noise`: standard error of `loss`, 0 where it is not known. `finite`: whether loss and
   /// gradient are. `gradient`: 0 where it leads beyond a bound; empty: not to be judged.
-  Verdict observe(double loss, double noise, bool finite, const std::vector<double>& theta, const std::vector<double>& gradient = {});
+  Verdict observe(double loss, double noise, bool finite, const std::vector<double>& theta,
+                  const std::vector<double>& gradient = {});
 
   /// The rows so far say nothing of whether the loss has settled.
   void restart_window();
