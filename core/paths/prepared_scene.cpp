@@ -225,8 +225,7 @@ void PreparedScene::update_emitter_borders(const Shape& shape) {
   for (int e = shape.first_edge; e < shape.first_edge + shape.edge_count; ++e) {
     const Edge& edge = scene.edges[e];
     const auto [t0, t1] = edge.face;
-    const bool goes_on = t1 >= 0 && !edge.sector && emits(t0) && emits(t1) && dot(normal(t0), normal(t1)) > 0 &&
-                         length_squared(cross(normal(t0), normal(t1))) <= kCoplanarAngle * kCoplanarAngle;
+    const bool goes_on = t1 >= 0 && !edge.sector && emits(t0) && emits(t1) && face_alike(normal(t0), normal(t1));
     if (goes_on) continue;
     for (const int t : edge.face)
       for (int i = 0; t >= 0 && i < 3; ++i) {

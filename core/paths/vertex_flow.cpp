@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "core/base/disjoint_sets.h"
-#include "core/base/parallel.h"
 #include "core/paths/path_differential.h"
 
 namespace isochron {
@@ -14,17 +13,6 @@ Bounds bounds_of(const Scene& scene, const Triangle& triangle) {
   Bounds bounds;
   for (const int v : triangle.vertex) bounds.add(scene.positions[v]);
   return bounds;
-}
-
-/// Whether the two faces of the edge lie in one plane, on either side of the edge.
-bool is_flat(const PreparedScene& scene, const Edge& edge) {
-  if (edge.face[1] < 0) return false;
-  const Vec3 &a = scene.normal(edge.face[0]), &b = scene.normal(edge.face[1]);
-  if (!(dot(a, b) > 0) || !(length_squared(cross(a, b)) <= kCoplanarAngle * kCoplanarAngle)) return false;
-  const auto along = [&](int i) {
-    return runs_along(scene.scene.triangles[edge.face[i]].vertex, edge.vertex[0], edge.vertex[1]);
-  };
-  return along(0) != along(1);  // else they lie on each other
 }
 
 /// Whether none of the moving triangles can see another one: they are a single closed convex surface or flat
@@ -154,88 +142,7 @@ void VertexFlows::find_near_bodies(const PreparedScene& prepared, double bodies)
   // Of a pair within `largest` of each other one is in near_.
   std::vector<char> near(count);
   for (std::size_t i = 0; i < count; ++i) near[i] = body_bounds_[i].overlaps(near_.grown(largest));
-  find_patches(prepared, std::move(near));
-}
-
-void VertexFlows::find_patches(const PreparedScene& prepared, std::vector<char> near_bodies) {
-  const Scene& scene = prepared.scene;
-  bool differs = near_bodies != near_bodies_, moved = false;
-  near_bodies_ = std::move(near_bodies);
-  flat_.resize(scene.edges.size());
-  for (int s = 0; s < static_cast<int>(scene.shapes.size()); ++s) {
-    if (prepared.shape_changed(s) <= flat_revision_) continue;
-    moved = true;
-    differs |= update_flat_edges(prepared, s);
-  }
-  flat_revision_ = prepared.revision();
-  if (differs) make_patches(scene);
-  if (!differs && !moved) return;
-  for (Patch& patch : patches_) {
-    if (patch.triangles < 2) continue;
-    patch.area = 0;
-    for (int i = patch.first_triangle; i < patch.first_triangle + patch.triangles; ++i)
-      patch.area += prepared.area(triangles_[i]);
-  }
-}
-
-bool VertexFlows::update_flat_edges(const PreparedScene& prepared, int shape) {
-  const Scene& scene = prepared.scene;
-  const int first = scene.shapes[shape].first_edge, count = scene.shapes[shape].edge_count;
-  constexpr int kChunk = 4096, kAhead = 8;
-  std::vector<char> differs(static_cast<std::size_t>((count + kChunk - 1) / kChunk), 0);
-  parallel(static_cast<int>(differs.size()), [&](int chunk) {
-    const int begin = first + chunk * kChunk, end = std::min(begin + kChunk, first + count);
-    for (int e = begin; e < end; ++e) {
-      const Edge& edge = scene.edges[e];
-      if (e + kAhead < end)
-        for (const int t : scene.edges[e + kAhead].face) prepared.prefetch(std::max(t, 0));
-      const char flat = is_flat(prepared, edge);
-      differs[chunk] |= std::exchange(flat_[e], flat) != flat && near_bodies_[body_of_vertex_[edge.vertex[0]]];
-    }
-  });
-  return std::find(differs.begin(), differs.end(), 1) != differs.end();
-}
-
-void VertexFlows::make_patches(const Scene& scene) {
-  DisjointSets sets(scene.triangles.size());
-  const auto near = [&](std::size_t vertex) { return near_bodies_[body_of_vertex_[vertex]] != 0; };
-  for (std::size_t e = 0; e < flat_.size(); ++e)
-    if (flat_[e] && near(scene.edges[e].vertex[0])) sets.join(scene.edges[e].face[0], scene.edges[e].face[1]);
-  int count;
-  patch_ = sets.numbered(count);
-  patches_.assign(static_cast<std::size_t>(count), {});
-  for (std::size_t t = 0; t < patch_.size(); ++t) {
-    if (!near(scene.triangles[t].vertex[0])) patch_[t] = -1;
-    if (patch_[t] < 0) continue;
-    patches_[patch_[t]].body = body_of_vertex_[scene.triangles[t].vertex[0]];
-    ++patches_[patch_[t]].triangles;
-  }
-  int first_triangle = 0;
-  for (Patch& patch : patches_) {
-    patch.first_triangle = first_triangle;
-    first_triangle += std::exchange(patch.triangles, 0);
-  }
-  triangles_.resize(static_cast<std::size_t>(first_triangle));
-  for (std::size_t t = 0; t < patch_.size(); ++t) {
-    if (patch_[t] < 0) continue;
-    Patch& patch = patches_[patch_[t]];
-    triangles_[patch.first_triangle + patch.triangles++] = static_cast<int>(t);
-  }
-  const auto for_each_crease = [&](auto&& f) {
-    for (std::size_t e = 0; e < scene.edges.size(); ++e) {
-      const auto& face = scene.edges[e].face;
-      if (patch_[face[0]] < 0 || (face[1] >= 0 && patch_[face[0]] == patch_[face[1]])) continue;
-      for (int i = 0; i < 2 && face[i] >= 0; ++i) f(patches_[patch_[face[i]]], static_cast<int>(e));
-    }
-  };
-  for_each_crease([](Patch& patch, int) { ++patch.creases; });
-  int first = 0;
-  for (Patch& patch : patches_) {
-    patch.first_crease = first;
-    first += std::exchange(patch.creases, 0);
-  }
-  creases_.resize(static_cast<std::size_t>(first));
-  for_each_crease([&](Patch& patch, int edge) { creases_[patch.first_crease + patch.creases++] = edge; });
+  patches_.update(prepared, body_of_vertex_, std::move(near));
 }
 
 VertexFlows::Pair::Weight VertexFlows::weight(const PreparedScene& prepared, const Vec3& x, int patch, const Vec3& y,
@@ -244,9 +151,8 @@ VertexFlows::Pair::Weight VertexFlows::weight(const PreparedScene& prepared, con
   const double squared = length_squared(d);
   double s2 = largest * largest;
   Vec3 to_nearest;  // from the nearest crease to x, where that is what limits s
-  const Patch& p = patches_[patch];
-  for (int i = p.first_crease; i < p.first_crease + p.creases; ++i) {
-    const auto& end = prepared.scene.edges[creases_[i]].vertex;
+  for (const int crease : patches_.creases(patch)) {
+    const auto& end = prepared.scene.edges[crease].vertex;
     const Vec3 &origin = prepared.scene.positions[end[0]], a = x - origin,
                along = prepared.scene.positions[end[1]] - origin;
     const double squared_length = length_squared(along);
@@ -274,9 +180,9 @@ VertexFlows::Pair VertexFlows::pair(const PreparedScene& scene, const SurfacePoi
   if (keep_length_ && (scene.emits(x.triangle) || scene.emits(y.triangle))) return result;
   Vec3 gradient_near;  // of the weight of y with respect to x, and the other way round
   if (follows_bodies_) {
-    const int patch_x = patch_[x.triangle], patch_y = patch_[y.triangle];
+    const int patch_x = patches_.of(x.triangle), patch_y = patches_.of(y.triangle);
     const bool near = patch_x >= 0 && patch_y >= 0;
-    const int body_x = near ? patches_[patch_x].body : -1, body_y = near ? patches_[patch_y].body : -1;
+    const int body_x = near ? patches_.body(patch_x) : -1, body_y = near ? patches_.body(patch_y) : -1;
     if (body_x != body_y) {
       const double largest = std::min(body_radius_[body_x], body_radius_[body_y]);
       if (length_squared(x.p - y.p) < largest * largest && (near_.holds(x.p) || near_.holds(y.p))) {
@@ -290,10 +196,7 @@ VertexFlows::Pair VertexFlows::pair(const PreparedScene& scene, const SurfacePoi
             w.missing += w.value * first.value;
             w.value *= first.missing;
           };
-          const auto area = [&](const Patch& patch, int triangle) {
-            return patch.triangles < 2 ? scene.area(triangle) : patch.area;
-          };
-          if (area(patches_[patch_x], x.triangle) >= area(patches_[patch_y], y.triangle))
+          if (patches_.area(scene, x.triangle) >= patches_.area(scene, y.triangle))
             second(result.far, result.near, gradient_far);
           else
             second(result.near, result.far, gradient_near);

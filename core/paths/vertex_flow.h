@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/base/bounds.h"
+#include "core/paths/flat_patches.h"
 #include "core/scene/scene.h"
 #include "core/scene/sensors/pinhole.h"
 
@@ -81,21 +82,11 @@ class VertexFlows {
   const Bounds& near() const { return near_; }
 
  private:
-  struct Patch {
-    int body = -1;
-    int first_triangle = 0, triangles = 0;  ///< in `triangles_`
-    int first_crease = 0, creases = 0;      ///< in `creases_`
-    double area = 0;                        ///< of more than one triangle
-  };
   /// Sets `follows_bodies_` and what depends on it.
   void find_near_bodies(const PreparedScene& scene, double bodies);
   void update_bodies(const PreparedScene& scene);
   /// Whether the shape has a static triangle inside `camera_near_`.
   bool has_still_triangle_in_reach(const PreparedScene& scene, std::size_t shape) const;
-  void find_patches(const PreparedScene& scene, std::vector<char> near_bodies);
-  /// Whether an edge of a body near others is no longer what it was.
-  bool update_flat_edges(const PreparedScene& scene, int shape);
-  void make_patches(const Scene& scene);
   Pair::Weight weight(const PreparedScene& scene, const Vec3& x, int patch, const Vec3& y, double largest,
                       Vec3& gradient_other) const;
 
@@ -111,12 +102,7 @@ class VertexFlows {
   std::vector<char> body_moves_;
   int bodies_revision_ = 0;          ///< of the scene that these are of
   std::vector<double> body_radius_;  ///< times `follow`
-  std::vector<char> near_bodies_;    ///< of each body, whether it may follow or be followed
-  std::vector<char> flat_;           ///< of each edge: its faces are one plane
-  int flat_revision_ = 0;            ///< of the scene that this is of
-  std::vector<int> patch_;  ///< of each triangle that is: coplanar triangles of one mesh that share edges; else -1
-  std::vector<Patch> patches_;
-  std::vector<int> triangles_, creases_;  ///< patch by patch; creases are edges
+  FlatPatches patches_;              ///< where `follows_bodies_`
 };
 
 /// Adds g . (velocity of x1 along its pixel ray) to `out`; nothing where the camera sees x1 exactly edge-on.

@@ -25,6 +25,11 @@ struct Triangle {
 /// Faces whose normals differ by less than this angle are one plane: a file in single precision cannot tell.
 inline constexpr double kCoplanarAngle = 1e-6;
 
+/// Whether faces of these unit normals are parallel, and face the same way.
+inline bool face_alike(const Vec3& n, const Vec3& m) {
+  return dot(n, m) > 0 && length_squared(cross(n, m)) <= kCoplanarAngle * kCoplanarAngle;
+}
+
 /// Mesh edge between welded vertices. `face[1]` is -1 on an open border. Where more than two faces meet there are as many
 /// entries, one after the other, each for the sector between two faces that are next to each other: from face[0]
 /// counter-clockwise about the direction from vertex[0] to vertex[1] to face[1], as the file has them.

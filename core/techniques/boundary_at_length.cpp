@@ -17,8 +17,7 @@ namespace {
 
 /// Whether both triangles lie in one plane and face the same way.
 bool coplanar(const PreparedScene& scene, int a, int b) {
-  const Vec3 &n = scene.normal(a), &m = scene.normal(b);
-  if (!(dot(n, m) > 0) || !(length_squared(cross(n, m)) <= kCoplanarAngle * kCoplanarAngle)) return false;
+  if (!face_alike(scene.normal(a), scene.normal(b))) return false;
   const auto corners = scene.corners(b);
   const double size =
       length(corners[1] - corners[0]) + length(corners[2] - corners[0]) + length(corners[0] - scene.corners(a)[0]);

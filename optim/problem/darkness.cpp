@@ -36,16 +36,30 @@ std::optional<std::pair<double, double>> narrowed(const Problem& problem, const 
   return std::pair{low + first * width, low + (last + 1) * width};
 }
 
-/// An image of readings at theta less their background: what light has brought, zero where there was none.
+/// What light has brought to a reading, zero where there was none.
+double light_of(double value, double background) {
+  return std::abs(value - background) <= kRounding * background ? 0 : value - background;
+}
+
+/// Of an image of readings at theta: whether light has brought anything.
+bool has_light(const Problem& problem, const std::vector<double>& theta, const GatedImage& image) {
+  const Scene scene = problem.parameters().apply(theta);
+  for (int p = 0; p < image.pixels(); ++p) {
+    const double background = scene.detector.background[scene.detector.background_of(scene.capture, p)];
+    for (int g = 0; g < image.gates; ++g)
+      for (int c = 0; c < image.channels; ++c)
+        if (light_of(image.at(p, g, c), background) != 0) return true;
+  }
+  return false;
+}
+
+/// An image of readings at theta less their background.
 GatedImage light_of(const Problem& problem, const std::vector<double>& theta, GatedImage image) {
   const Scene scene = problem.parameters().apply(theta);
   for (int p = 0; p < image.pixels(); ++p) {
     const double background = scene.detector.background[scene.detector.background_of(scene.capture, p)];
     for (int g = 0; g < image.gates; ++g)
-      for (int c = 0; c < image.channels; ++c) {
-        double& value = image.at(p, g, c);
-        value = std::abs(value - background) <= kRounding * background ? 0 : value - background;
-      }
+      for (int c = 0; c < image.channels; ++c) image.at(p, g, c) = light_of(image.at(p, g, c), background);
   }
   return image;
 }
@@ -110,13 +124,17 @@ std::vector<double> point_of_target(const Problem& problem, const std::vector<do
 
 namespace {
 
+/// The first bins of a histogram are often dark.
+bool bins(const Problem& problem) {
+  return problem.experiment().gates.kind == "bins";
+}
+
 /// Of gates that are `dark`.
 std::string warning_about(const Problem& problem, const std::vector<double>& theta, const std::vector<int>& dark,
                           const std::string& what) {
   const int gates = problem.gates().size();
   if (dark.empty()) return {};
-  // The first bins of a histogram are often dark.
-  if (static_cast<int>(dark.size()) < gates && problem.experiment().gates.kind == "bins") return {};
+  if (static_cast<int>(dark.size()) < gates && bins(problem)) return {};
   std::string text = "no light reaches the gates of " + what;
   if (static_cast<int>(dark.size()) < gates)
     text = fmt::format("no light reaches {} {} of {} of {}", dark.size() == 1 ? "gate" : "gates", ranges(dark), gates,
@@ -174,10 +192,11 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
                              const GatedImage& target) {
   const std::vector<double> of_target = point_of_target(problem, theta);
+  const bool lit = has_light(problem, theta, image), lit_target = has_light(problem, of_target, target);
+  if (lit && lit_target && bins(problem)) return {};
   const GatedImage light = light_of(problem, theta, image), wanted = light_of(problem, of_target, target);
-  const bool black_image = mean_square(light) == 0, black_target = mean_square(wanted) == 0;
-  if (black_target && !black_image) return warning_about(problem, of_target, black_gates({wanted}), "the target");
-  if (black_image && !black_target) return warning_about(problem, theta, black_gates({light}), "the image");
+  if (!lit_target && lit) return warning_about(problem, of_target, black_gates({wanted}), "the target");
+  if (!lit && lit_target) return warning_about(problem, theta, black_gates({light}), "the image");
   return warning_about(problem, theta, black_gates({light, wanted}), "the image and the target");
 }
 

@@ -47,12 +47,10 @@ double ParameterSpec::*weight_by_evidence(const ParameterSpec& spec) {
   return spec.bending > 0 ? &ParameterSpec::bending : &ParameterSpec::slopes;
 }
 
-std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
-                                     const std::vector<double>& theta) {
+std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
+                                     const PosteriorSamples& samples) {
   const std::vector<ParameterSpec>& specs = problem.experiment().parameters;
   std::vector<double> factors(specs.size(), 1.0);
-  const Poll poll = [] {};
-  const PosteriorSamples samples = RenderedCurvature(problem, target, theta, poll).samples();
   const PenaltyScale scale = problem.penalty_scale(target);
   for (std::size_t i = 0; i < specs.size(); ++i) {
     if (!specs[i].evidence || !(specs[i].*weight_by_evidence(specs[i]) > 0)) continue;
@@ -63,6 +61,12 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
     factors[i] = determined / std::max(2 * penalty_by_evidence(problem, i, theta, scale), 1.0);
   }
   return factors;
+}
+
+std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
+                                     const std::vector<double>& theta) {
+  const Poll poll = [] {};
+  return evidence_factors(problem, target, theta, RenderedCurvature(problem, target, theta, poll).samples());
 }
 
 double determined_unknowns(const Problem& problem, const std::vector<char>& free, const PosteriorSamples& samples) {

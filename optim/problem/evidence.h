@@ -17,7 +17,11 @@ namespace isochron {
 double ParameterSpec::*weight_by_evidence(const ParameterSpec& spec);
 
 /// By what that weight of each parameter is to be multiplied, in the order of the blocks; 1 where the parameter has none or asks for no
-/// `evidence`. At theta, where a fit to counts has come to rest. The same for any number of threads and ranks.
+/// `evidence`. At theta, where a fit to counts has come to rest. The same for any number of threads and ranks. `samples`: of the posterior
+/// at theta, one at least.
+std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
+                                     const PosteriorSamples& samples);
+/// The same with samples of its own.
 std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
                                      const std::vector<double>& theta);
 

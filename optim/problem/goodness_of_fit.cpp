@@ -119,28 +119,54 @@ class Judge {
   /// Weighted sums of 1 (a background's change), light and F', for each unknown background.
   struct Sums {
     double ones = 0, one_light = 0, one_slope = 0, information = 0;
+
+    void operator+=(const Sums& other) {
+      ones += other.ones;
+      one_light += other.one_light;
+      one_slope += other.one_slope;
+      information += other.information;
+    }
+  };
+  /// Those of the light, and of the background of a pixel, -1: none.
+  struct PixelSums {
+    double lights = 0, slope = 0, information = 0;
+    int background = -1;
+    Sums own;
   };
 
+  PixelSums sums_of(int pixel) const {
+    PixelSums sums;
+    for_each(pixel, [&](const Reading& r) {
+      if (!(r.mean > 0)) return;
+      const DevianceMoments at = law_.moments(r.mean);
+      const double weight = law_.weight(r.mean) * law_.weight(r.mean) * r.mean;
+      const double slope = at.covariance * law_.weight(r.mean);
+      sums.lights += weight * r.light * r.light;
+      sums.slope += slope * r.light;
+      sums.information += weight * r.light * r.light * at.information;
+      if (r.background < 0 || !model_.background_free[r.background]) return;
+      sums.background = r.background;
+      sums.own += {weight, weight * r.light, slope, weight * at.information};
+    });
+    return sums;
+  }
+
+  /// The same for any number of threads.
   void project() {
+    std::vector<PixelSums> parts(counts_.pixels());
+    parallel_ranges(parts.size(), kPixelsTogether, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t pixel = begin; pixel < end; ++pixel) parts[pixel] = sums_of(static_cast<int>(pixel));
+    });
     std::vector<Sums> sums;
     double lights = 0, light_slope = 0, light_information = 0;
-    for (int pixel = 0; pixel < counts_.pixels(); ++pixel)
-      for_each(pixel, [&](const Reading& r) {
-        if (!(r.mean > 0)) return;
-        const DevianceMoments at = law_.moments(r.mean);
-        const double weight = law_.weight(r.mean) * law_.weight(r.mean) * r.mean;
-        const double slope = at.covariance * law_.weight(r.mean);
-        lights += weight * r.light * r.light;
-        light_slope += slope * r.light;
-        light_information += weight * r.light * r.light * at.information;
-        if (r.background < 0 || !model_.background_free[r.background]) return;
-        if (std::ssize(sums) <= r.background) sums.resize(r.background + 1);
-        Sums& own = sums[r.background];
-        own.ones += weight;
-        own.one_light += weight * r.light;
-        own.one_slope += slope;
-        own.information += weight * at.information;
-      });
+    for (const PixelSums& part : parts) {
+      lights += part.lights;
+      light_slope += part.slope;
+      light_information += part.information;
+      if (part.background < 0) continue;
+      if (std::ssize(sums) <= part.background) sums.resize(part.background + 1);
+      sums[part.background] += part.own;
+    }
     const double all_lights = lights;
     for (const Sums& own : sums)
       if (own.ones > 0) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/base/parallel.h"
 #include "optim/problem/readings.h"
 
 namespace isochron {
@@ -13,22 +14,41 @@ struct LitCount {
   double light[2], count;
 };
 
-/// Fisher's scoring: each step solves for both halves with the weights of the step before.
+/// Weights and weighted sums of both halves.
+struct HalfSums {
+  double weights[2] = {}, sums[2] = {};
+};
+
+/// That a thread takes at a time.
+constexpr std::size_t kTogether = 1 << 14;
+
+/// Fisher's scoring: each step solves for both halves with the weights of the step before. The same for any number of threads.
 void find_likely(const std::vector<LitCount>& readings, double scale, double (&background)[2]) {
   constexpr int kMostSteps = 100;
   constexpr double kNearlyThere = 1e-9;
+  std::vector<HalfSums> parts((readings.size() + kTogether - 1) / kTogether);
   for (int i = 0; i < kMostSteps; ++i) {
-    double weights[2] = {}, sums[2] = {};
-    for (const LitCount& r : readings)
-      for (const int half : {0, 1}) {
-        const int other = 1 - half;
-        const double w = 1 / std::max(r.light[other] + background[other], scale);
-        weights[half] += w;
-        sums[half] += w * (r.count - r.light[half]);
-      }
+    parallel_ranges(parts.size(), 1, [&](std::size_t part, std::size_t) {
+      HalfSums own;
+      const std::size_t end = std::min(readings.size(), (part + 1) * kTogether);
+      for (std::size_t k = part * kTogether; k < end; ++k)
+        for (const int half : {0, 1}) {
+          const LitCount& r = readings[k];
+          const int other = 1 - half;
+          const double w = 1 / std::max(r.light[other] + background[other], scale);
+          own.weights[half] += w;
+          own.sums[half] += w * (r.count - r.light[half]);
+        }
+      parts[part] = own;
+    });
     double change = 0;
     for (const int half : {0, 1}) {
-      const double next = weights[half] > 0 ? std::max(0.0, sums[half] / weights[half]) : background[half];
+      double weights = 0, sum = 0;
+      for (const HalfSums& part : parts) {
+        weights += part.weights[half];
+        sum += part.sums[half];
+      }
+      const double next = weights > 0 ? std::max(0.0, sum / weights) : background[half];
       change = std::max(change, std::abs(next - background[half]) - kNearlyThere * next);
       background[half] = next;
     }

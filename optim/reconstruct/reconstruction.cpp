@@ -80,7 +80,7 @@ target:
 samples: {{primal: {primal}, interior: {interior}, visibility: 0, path_length: 0}}
 loss: {{kind: poisson}}
 optimizer: {{method: quasi_newton, iterations: 2, inner_iterations: 10}}   # of each level
-output: {{histogram_samples: {primal}}}
+output: {{histogram_samples: {primal}, frames: 0}}
 )",
       fmt::arg("name", name_of(spec.capture)), fmt::arg("seed", spec.seed),
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "core/base/constants.h"
 #include "core/base/error.h"
@@ -25,6 +26,7 @@
 #include "optim/remesh/remesh.h"
 #include "optim/run/geometry_files.h"
 #include "optim/run/level_log.h"
+#include "optim/run/level_settings.h"
 #include "optim/run/summary.h"
 
 namespace isochron {
@@ -62,15 +64,6 @@ void write_surface(const std::string& file, const Mesh& mesh) {
 /// Least area of a part or a hole that an outline may cut, in squared edge lengths: smaller ones hold one or two vertices, which is noise.
 constexpr double kLeastPart = 2;
 
-/// Factor of the albedos that the levels by adam begin with. Borders are drawn back more easily than they are extended, and light that is missing
-/// extends them; as albedos rise again they come back. By trials with the rabbit (optim/README.md, Dim albedos).
-constexpr double kDimmed = 0.88;
-
-/// Diffusion of the gradient of albedos by vertex where adam moves borders, far above one over the least eigenvalues of the graph Laplacian of
-/// some hundred vertices: albedos of connected vertices move together. Vertex by vertex adam follows noise and hardly changes their mean, which
-/// decides how far borders go (optim/README.md, Dim albedos).
-constexpr double kTogether = 1000;
-
 /// By how much evidence changes a weight from level to level, at most. Its rule holds where a fit has come to rest. After two iterations a surface
 /// is still rough, which evidence would take for its nature (optim/README.md, Smoothing).
 constexpr double kMostChange = 10;
@@ -78,23 +71,6 @@ constexpr double kMostChange = 10;
 /// A number, or null where it is none.
 double number_or_nan(const YamlValue& value) {
   return value.is_number() ? value.number() : std::nan("");
-}
-
-/// The last of these levels halves its steps six times over the last four tenths, so that their noise averages out. Those before it end where
-/// that would begin, as others follow. Where edges are half as long, so are steps. Each iteration has half of the histograms, and others than
-/// the one before, with twice the samples of the gradient (optim/README.md, Histograms).
-void step_by_adam(const RemeshSpec& remesh, int level, Experiment& experiment) {
-  OptimizerSpec& adam = experiment.optimizer;
-  adam = {};
-  adam.method = OptimizerMethod::adam;
-  adam.learning_rate = std::ldexp(remesh.adam_rate, -remesh.halvings(level));
-  adam.stop_window = 0;
-  const int steady = std::max(1, static_cast<int>(6LL * remesh.adam_iterations / 10));
-  const bool last = level == remesh.last_by_adam();
-  adam.iterations = last ? remesh.adam_iterations : steady;
-  if (last) adam.decay = {.start = steady, .half_life = remesh.adam_iterations / 15.0};
-  experiment.samples.interior *= 2;
-  experiment.target.histograms = (experiment.target.histograms + 1) / 2;
 }
 
 class Levels {
@@ -155,7 +131,7 @@ class Levels {
     std::optional<LevelSurface> surface;
     if (level == 1 && remeshed_.remesh.edge_length == 0) {
       for (ParameterSpec& spec : next.parameters) spec.remesh = {};
-      set_weights(level, false, next.parameters);
+      set_weights(experiment_, level, false, next.parameters);
     } else {
       const bool first = level == 1;
       const std::string before = first ? "" : folder(level - 1);
@@ -173,53 +149,23 @@ class Levels {
       surface = remeshed_surface(*surface, edge_length);
       next.parameters = next_parameters(former, theta, remeshed_, *surface);
       const bool follows = level > remeshed_.remesh.coarse_levels;
-      set_weights(level, follows, next.parameters);
+      set_weights(experiment_, level, follows, next.parameters);
       // As long as a surface has far to go, what it does not explain yet would pass for roughness.
       if (follows) follow_evidence(former, theta, before, next.parameters);
-      if (remeshed_.remesh.steps_by_adam(level) && level == remeshed_.remesh.first_by_adam()) dim(next.parameters);
+      if (remeshed_.remesh.steps_by_adam(level) && level == remeshed_.remesh.first_by_adam())
+        dim(remeshed_.shape, next.parameters);
       next.scene = folder(level) + "/scene/scene.yaml";
     }
     on_first_rank([&] { write_level(level, next, surface); });
   }
 
-  /// Weights of a level: those asked for, but where evidence is to be a factor to the ones that it is found with, and what outlines and adam need.
-  void set_weights(int level, bool evidence_follows, std::vector<ParameterSpec>& next) const {
-    const RemeshSpec& remesh = remeshed_.remesh;
-    for (std::size_t i = 0; i < next.size(); ++i) {
-      ParameterSpec& spec = next[i];
-      const bool weighs_slopes = spec.evidence && !spec.bends();
-      if (!(evidence_follows && weighs_slopes)) spec.slopes = experiment_.parameters[i].slopes;
-      // Early levels have far to go, and coarse triangles bend unevenly.
-      if (!evidence_follows) spec.variation = remesh.comes_early(level) ? 0 : experiment_.parameters[i].variation;
-      spec.tangential = experiment_.parameters[i].tangential;
-      if (spec.type == ParameterType::texture && spec.shape == remeshed_.shape) {
-        if (remesh.finds_outline(level)) spec.slopes = remesh.outline_slopes;
-        spec.diffusion = remesh.steps_by_adam(level) ? kTogether : experiment_.parameters[i].diffusion;
-      }
-      if (remesh.steps_by_adam(level) && spec.name == remeshed_.name) free_borders(spec);
-    }
-  }
-
-  /// The shape's albedos by vertex, unless a bound says how low they may be.
-  void dim(std::vector<ParameterSpec>& next) const {
-    for (ParameterSpec& spec : next) {
-      if (spec.type != ParameterType::texture || spec.shape != remeshed_.shape || !spec.lower.empty()) continue;
-      for (double& albedo : spec.initial) albedo *= kDimmed;
-    }
-  }
-
-  /// Slopes of offsets hold a level near its start: steps of adam are short anyway, and borders must not be held back. Inner vertices
-  /// keep to their normals: of motion within a surface of one albedo the gradient is all noise, which adam would follow until triangles fold.
-  void free_borders(ParameterSpec& spec) const {
-    spec.slopes = remeshed_.remesh.adam_slopes;
-    if (experiment_.loss.kind == LossKind::poisson) spec.tangential = std::max(kHeldTangents, spec.tangential);
-  }
-
   void follow_evidence(const Problem& former, const std::vector<double>& theta, const std::string& folder,
-                       std::vector<ParameterSpec>& next) const {
+                       std::vector<ParameterSpec>& next) {
     if (std::none_of(next.begin(), next.end(), [](const ParameterSpec& spec) { return spec.evidence; })) return;
     const ProgressStage stage("weighing the smoothing", 1);
-    const std::vector<double> factors = evidence_factors(former, former.read_target(folder + "/target.exr"), theta);
+    const std::vector<double> factors =
+        evidence_.empty() ? evidence_factors(former, former.read_target(folder + "/target.exr"), theta)
+                          : std::exchange(evidence_, {});
     for (std::size_t i = 0; i < next.size(); ++i)
       next[i].*weight_by_evidence(next[i]) *= std::clamp(factors[i], 1 / kMostChange, kMostChange);
   }
@@ -243,6 +189,8 @@ class Levels {
     options.errors = level >= remeshed_.remesh.levels;
     options.followed_unless_explained = level < remeshed_.remesh.most_levels();
     options.earlier = {remeshed_.shape, options.errors ? earlier_surfaces(level) : std::vector<std::string>{}};
+    evidence_.clear();
+    options.evidence = [this](std::vector<double> factors) { evidence_ = std::move(factors); };
     options.report = [this](const std::string& text) { report_ = text; };
     // Losses of a level by adam scatter by design. The levels that follow show what came of it.
     if (remeshed_.remesh.steps_by_adam(level)) options.warning = {};
@@ -358,6 +306,8 @@ class Levels {
   const std::function<RunStatus(const RunOptions&)>& run_level_;
   const std::string folder_;  ///< absolute
   std::vector<Level> levels_;
+  std::vector<double>
+      evidence_;  ///< factors at the end of the level that ran last; empty: not known, as after a resume
   RunStatus status_ = RunStatus::iterations_reached;
   std::string report_;
 };

@@ -207,7 +207,10 @@ class Run {
     }
     judge_expected_counts();
     std::vector<double> of_surfaces;
-    if (curvature && !(options_.followed_unless_explained && fit_ && fit_->verdict() == FitVerdict::unexplained))
+    const bool followed = options_.followed_unless_explained && fit_ && fit_->verdict() == FitVerdict::unexplained;
+    if (followed && options_.evidence && samples.count() > 0)
+      options_.evidence(evidence_factors(problem_, target_, state_.theta, samples));
+    if (curvature && !followed)
       of_surfaces = find_errors(*curvature, samples, {variance_scale(problem_, result.final), optimizer->scatters()});
     geometry.write("final", state_.theta, of_surfaces);
     geometry.remove("current");

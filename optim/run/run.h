@@ -48,6 +48,8 @@ struct RunOptions {
   bool errors = true;
   bool followed_unless_explained =
       false;  ///< another level follows, which states the errors, where the counts are not explained
+  /// Of a run that another level follows: gets the factors of evidence (see evidence.h), where samples of the posterior were made.
+  std::function<void(std::vector<double>)> evidence;
   /// Their distances from what is found add to the errors of its vertices.
   EarlierSurfaces earlier;
   std::function<void(const std::string&)> warning;  ///< one line
