@@ -34,6 +34,7 @@ std::shared_ptr<tbb::task_arena> arena() {
 
 template <class F>
 void run(int count, const F& f) {
+  if (count == 1) return f(0);
   const std::shared_ptr<tbb::task_arena> shared = arena();
   shared->execute([&] {
     tbb::parallel_for(

@@ -14,12 +14,10 @@ std::shared_ptr<ReadyScene> SceneCache::take(const Scene& scene, const TangentBa
     constexpr int kKinds = 2;
     auto found =
         std::find_if(idle_.begin(), idle_.end(), [&](const auto& each) { return each->scene.same_columns(basis); });
-    if (found == idle_.end() && made_ >= kKinds) found = idle_.begin();
+    if (found == idle_.end() && idle_.size() >= kKinds) found = idle_.begin();
     if (found != idle_.end()) {
       ready = std::move(*found);
       idle_.erase(found);
-    } else {
-      ++made_;
     }
   }
   // A hierarchy that is refitted depends on the scene that it was made for.

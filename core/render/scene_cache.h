@@ -44,7 +44,6 @@ class SceneCache {
   const CasterUpdate update_;
   std::mutex mutex_;
   std::vector<std::unique_ptr<ReadyScene>> idle_;
-  int made_ = 0;
   std::atomic<long long> rays_{0};
   PassTimes times_;
   std::map<std::pair<PassKind, int>, PartitionCosts> partition_costs_;

@@ -132,7 +132,7 @@ Field per(ParameterSpec& spec) {
   return field::checked(field::choice(spec.per), choose);
 }
 
-constexpr int kMostLevels = 12;  // each may have four times the triangles of the one before
+constexpr int kMostLevels = 24;  // each may have four times the triangles of the one before
 
 void check_name(const YamlValue& value) {
   for (const char* reserved : {"render", "target", "initial", "final"})
@@ -267,7 +267,7 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 {.unset = spec.remesh.coarse_histograms == 0});
     const auto adam = [&spec](Keys& keys_of_adam) {
       keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
-                         "of the last such level; the others have six tenths of it", {.required = true});
+                         "of each such level; in the last one steps shrink after a third of them", {.required = true});
       keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate),
                          "see `optimizer`; half of it in the last such level",
                          {.required = true, .unit = "the parameter's `scale`"});

@@ -36,9 +36,9 @@ std::optional<std::pair<double, double>> narrowed(const Problem& problem, const 
   return std::pair{low + first * width, low + (last + 1) * width};
 }
 
-/// What light has brought to a reading, zero where there was none.
+/// What light has brought to a reading; zero where there was none, as where the reading was left out and has not even its background.
 double light_of(double value, double background) {
-  return std::abs(value - background) <= kRounding * background ? 0 : value - background;
+  return value - background <= kRounding * background ? 0 : value - background;
 }
 
 /// Of an image of readings at theta: whether light has brought anything.
@@ -179,9 +179,12 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
                              const std::string& what) {
   const Scene scene = problem.parameters().apply(theta);
   const int pixels = problem.scene().camera.width * problem.scene().camera.height;
+  const auto is_black = [&](int p) {
+    return scene.capture && !scene.capture->left_out.empty() && scene.capture->left_out[p];
+  };
   double background = 0;
   for (int p = 0; p < pixels; ++p)
-    background += scene.detector.background[scene.detector.background_of(scene.capture, p)] / pixels;
+    if (!is_black(p)) background += scene.detector.background[scene.detector.background_of(scene.capture, p)] / pixels;
   constexpr double kOfSums = 1e-9;  // over all pixels
   std::vector<int> dark;
   for (std::size_t g = 0; g < means.size(); ++g)

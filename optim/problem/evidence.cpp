@@ -55,10 +55,11 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
   for (std::size_t i = 0; i < specs.size(); ++i) {
     if (!specs[i].evidence || !(specs[i].*weight_by_evidence(specs[i]) > 0)) continue;
     const std::vector<double> by_sample = determined_of(problem.parameters().blocks()[i], samples);
-    // What the samples' noise may hide counts as determined, so that the weight stays finite.
-    const double determined = std::max({mean(by_sample), standard_error_of_mean(by_sample), 1.0});
+    // What the samples' noise may hide counts as determined, so that the weight stays finite; so it is with 1, which comes first as
+    // std::max keeps it where another is no number.
+    const double determined = std::max({1.0, mean(by_sample), standard_error_of_mean(by_sample)});
     // One free unknown has an expected penalty of half a nat. Less is taken for that, so that the weight stays finite.
-    factors[i] = determined / std::max(2 * penalty_by_evidence(problem, i, theta, scale), 1.0);
+    factors[i] = determined / std::max(1.0, 2 * penalty_by_evidence(problem, i, theta, scale));
   }
   return factors;
 }

@@ -13,7 +13,8 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   Scene scene = parameters_->apply(theta);
   if (!coordinates_fit(scene)) return no_evaluation(target);
   ReadingLoss rho = reading_loss(target);
-  if (redraws_histograms()) {
+  // Estimates about the end of a run have numbers beyond those of iterations, and all histograms.
+  if (redraws_histograms() && iteration <= kMostIterations + 1u) {
     rho.readings = drawn_readings(iteration);
     scene.capture->left_out = rho.readings.left_out();
   }

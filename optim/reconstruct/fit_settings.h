@@ -26,7 +26,7 @@ struct FitSettings {
   int coarse_histograms = 0;  ///< that coarse levels are fitted to; 0: all
   /// Of the last level by adam, and the largest step in edge lengths. From a silhouette of 0.85, one level of 150 comes to 0.90 with steps of
   /// 0.022, to 0.91 with 0.044 and 0.088, where more that is not there is left.
-  int adam_iterations = 120;
+  int adam_iterations = 72;
   double adam_rate = 0.044;
   double adam_motion = 0;         ///< weight of the offsets' slopes there
   double motion = 0, albedo = 0;  ///< weights of slopes

@@ -32,10 +32,9 @@ void step_by_adam(const RemeshSpec& remesh, int level, Experiment& level_experim
   adam.method = OptimizerMethod::adam;
   adam.learning_rate = std::ldexp(remesh.adam_rate, -remesh.halvings(level));
   adam.stop_window = 0;
-  const int steady = std::max(1, static_cast<int>(6LL * remesh.adam_iterations / 10));
-  const bool last = level == remesh.last_by_adam();
-  adam.iterations = last ? remesh.adam_iterations : steady;
-  if (last) adam.decay = {.start = steady, .half_life = remesh.adam_iterations / 15.0};
+  adam.iterations = remesh.adam_iterations;
+  if (level == remesh.last_by_adam())
+    adam.decay = {.start = remesh.adam_iterations / 3, .half_life = remesh.adam_iterations / 9.0};
   level_experiment.samples.interior *= 2;
   level_experiment.target.histograms = (level_experiment.target.histograms + 1) / 2;
 }

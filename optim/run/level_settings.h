@@ -8,9 +8,9 @@
 
 namespace isochron {
 
-/// Of a level by adam. The last of these halves its steps six times over the last four tenths, so that their noise averages out. Those before
-/// it end where that would begin, as others follow. Where edges are half as long, so are steps. Each iteration has half of the histograms, and
-/// others than the one before, with twice the samples of the gradient (optim/README.md, Histograms).
+/// Of a level by adam. The last of these halves its steps six times over its last two thirds, so that their noise averages out (optim/README.md,
+/// Levels by adam). Where edges are half as long, so are steps. Each iteration has half of the histograms, and others than the one before, with
+/// twice the samples of the gradient (optim/README.md, Histograms).
 void step_by_adam(const RemeshSpec& remesh, int level, Experiment& level_experiment);
 
 /// Weights of a level: those that the whole run's experiment asks for, but where evidence is to be a factor to the ones that it is found

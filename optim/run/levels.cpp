@@ -88,8 +88,12 @@ class Levels {
       write_target();
       const Mesh loaded = mesh_of(load_scene(experiment_.scene), remeshed_.shape);
       for (int level = 1;; ++level) {
-        const bool ready = file_exists(folder(level) + "/experiment.yaml");
-        if (!ready) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
+        const auto ready = [&](int each) { return file_exists(folder(each) + "/experiment.yaml"); };
+        if (!ready(level)) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
+        if (ready(level + 1)) {  // which begins once this one has brought what it has
+          levels_.push_back(found_level(level));
+          continue;
+        }
         status_ = run(level);
         const bool ended = status_ != RunStatus::interrupted && status_ != RunStatus::diverged;
         const bool more = ended && is_followed(level);

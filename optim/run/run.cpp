@@ -101,7 +101,8 @@ class Run {
       load_target();
       result = optimise();
     } catch (const Interrupted&) {
-      save_checkpoint(options_.folder, state_, parameters_);
+      // Once the parameters are final, the checkpoint of the last iteration leads to the same again.
+      if (!is_final_) save_checkpoint(options_.folder, state_, parameters_);
       result.status = RunStatus::interrupted;
     }
     // Ranks that were told to stop do not wait for each other.
@@ -197,10 +198,11 @@ class Run {
       stage.advance();
     };
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
+    is_final_ = true;
     write_exr(path("final.exr"), result.final.image, notes_);
     std::optional<RenderedCurvature> curvature;
     PosteriorSamples samples;
-    const Poll never = [] {};  // as it ends, a run is not interrupted
+    const Poll never = [] {};  // parallel loops are interrupted all the same
     if (options_.errors && !options_.loss && has_errors()) {
       curvature.emplace(problem_, target_, state_.theta, never);
       samples = posterior_samples(*curvature);
@@ -294,7 +296,8 @@ class Run {
   const ExrNotes notes_ = exr_notes(problem_.experiment().gates);
   const bool aims_at_images_ = !options_.loss || has_target(problem_);
   Checkpoint state_;
-  GatedImage target_;  ///< black where there is none
+  bool is_final_ = false;  ///< what `state_` has are the parameters that are reported, which no iteration goes on from
+  GatedImage target_;      ///< black where there is none
   double target_seconds_ = 0;
   LogRow last_;
   ParameterErrors errors_;

@@ -23,15 +23,37 @@ constexpr const char* kParts[] = {"inputs", "geometry", "frames", "report", "lev
 /// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run. Of a reconstruction's files those stay that its
 /// experiment reads, scene.yaml and start.ply: another run may be of these.
 void clear_run(const std::string& folder) {
-  constexpr const char* kFiles[] = {"experiment.yaml", "checkpoint.yaml",    "checkpoint.previous.yaml",
-                                    "log.csv",         "summary.yaml",       "own_loss.yaml",
-                                    "target.exr",      "initial.exr",        "final.exr",
-                                    "final.h5",        "target.png",         "initial.png",
-                                    "final.png",       "residual.png",       "rmse.png",
-                                    "capture.png",     "report.html",        "start.yaml",
-                                    "surface.png",     "back_projection.ply"};
+  constexpr const char* kFiles[] = {"experiment.yaml",
+                                    "checkpoint.yaml",
+                                    "checkpoint.previous.yaml",
+                                    "checkpoint.new.yaml",
+                                    "log.csv",
+                                    "summary.yaml",
+                                    "own_loss.yaml",
+                                    "target.exr",
+                                    "initial.exr",
+                                    "final.exr",
+                                    "final.h5",
+                                    "target.png",
+                                    "initial.png",
+                                    "final.png",
+                                    "residual.png",
+                                    "rmse.png",
+                                    "capture.png",
+                                    "report.html",
+                                    "start.yaml",
+                                    "surface.png",
+                                    "back_projection.ply"};
   for (const char* file : kFiles) std::filesystem::remove(std::filesystem::path(folder) / file);
   for (const char* part : kParts) std::filesystem::remove_all(std::filesystem::path(folder) / part);
+}
+
+/// What a run would go on from. A run that was killed as its folder was cleared may have left it.
+void clear_state(const std::string& folder) {
+  for (const char* file :
+       {"checkpoint.yaml", "checkpoint.previous.yaml", "checkpoint.new.yaml", "log.csv", "summary.yaml", "target.exr"})
+    std::filesystem::remove(std::filesystem::path(folder) / file);
+  if (file_exists(folder + "/levels/1/experiment.yaml")) std::filesystem::remove_all(folder + "/levels");
 }
 
 /// Renames a folder to the first free of FOLDER.1, FOLDER.2, ...; returns the new name.
@@ -91,7 +113,10 @@ FolderLock prepare_run_folder(const std::string& folder, bool force,
                               const std::function<void(const std::string&)>& warning) {
   make_output_folder(folder);
   FolderLock lock(folder, warning);
-  if (!std::filesystem::exists(folder + "/experiment.yaml")) return lock;
+  if (!std::filesystem::exists(folder + "/experiment.yaml")) {
+    clear_state(folder);
+    return lock;
+  }
   if (force) {
     clear_run(folder);
     return lock;

@@ -50,6 +50,8 @@ Descent::Descent(int iterations, DescentState state)
 
 std::string Descent::observe(int iteration, const std::vector<double>& theta, double loss, double noise) {
   if (iteration > iterations_ - averaged_) {
+    // Rows of a shorter schedule, which the run has gone on from since.
+    if (state_.summed >= iteration - (iterations_ - averaged_)) restart_average();
     state_.theta_sum.resize(theta.size(), 0.0);
     for (std::size_t i = 0; i < theta.size(); ++i) state_.theta_sum[i] += theta[i];
     ++state_.summed;

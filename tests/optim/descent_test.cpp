@@ -50,6 +50,18 @@ TEST(Descent, WarnsOnceWhereNoiseHidesIt) {
   EXPECT_EQ(watch(1, 0.01, [](int i) { return i == 0 ? 1 : 0; }).warnings, 0);
 }
 
+TEST(Descent, AverageForgetsAShorterSchedule) {
+  Descent shorter(100);
+  for (int i = 0; i <= 100; ++i) shorter.observe(i, {1.0 * i}, 0, 1);
+  Descent longer(200, shorter.state());
+  for (int i = 101; i <= 200; ++i) {
+    EXPECT_FALSE(longer.settled()) << i;
+    longer.observe(i, {1.0 * i}, 0, 1);
+  }
+  ASSERT_TRUE(longer.settled());
+  EXPECT_NEAR(longer.settled_theta()[0], 150.5, 1e-12);  // rows 101 to 200
+}
+
 TEST(Descent, SettlesUnlessTheLossStillFalls) {
   int flat = 0, falling = 0;
   for (std::uint64_t seed = 1; seed <= 1000; ++seed) {

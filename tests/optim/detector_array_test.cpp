@@ -12,6 +12,7 @@
 #include "core/image/capture_file.h"
 #include "optim/problem/capture_data.h"
 #include "optim/problem/dark_bins.h"
+#include "optim/problem/darkness.h"
 #include "optim/problem/estimates.h"
 #include "optim/problem/photon_noise.h"
 #include "optim/problem/statistics.h"
@@ -224,6 +225,44 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
   for (const char* count : {"30", "31", "0"}) {
     const Problem same(load_experiment(file, {std::string("target.histograms=") + count}));
     EXPECT_EQ(same.readings().count(counts), 30 * 80) << count;
+  }
+}
+
+// What is estimated at a run's end has weights of readings: none may belong to a histogram that was not rendered.
+TEST_F(DetectorArray, EstimatesAtTheEndAreOfTheChosenHistograms) {
+  const Problem problem(load_experiment(fit_of_gain_and_background("adam, learning_rate: 1"), {"target.histograms=7"}));
+  ASSERT_TRUE(problem.redraws_histograms());
+  const GatedImage target = problem.make_target(kGoOn);
+  const auto rendered = [&](std::uint32_t iteration) {
+    const GatedImage image = problem.evaluate(problem.parameters().initial(), target, iteration, kGoOn).image;
+    std::vector<bool> pixels;
+    for (int p = 0; p < image.pixels(); ++p) pixels.push_back(image.at(p, 0) > 0);  // by its background
+    return pixels;
+  };
+  std::vector<bool> chosen;
+  for (int p = 0; p < target.pixels(); ++p) chosen.push_back(problem.readings().uses_pixel(p));
+  EXPECT_EQ(std::count(chosen.begin(), chosen.end(), true), 7);
+  for (const std::uint32_t after : {2u, 3u, 9u}) EXPECT_EQ(rendered(kMostIterations + after), chosen) << after;
+  int others = 0;
+  for (std::uint32_t iteration = 0; iteration < 8; ++iteration) others += rendered(iteration) != chosen;
+  EXPECT_GT(others, 4);
+}
+
+// Histograms that are left out are black, without a background: that is no light.
+TEST_F(DetectorArray, SaysThatNoLightReachesTheChosenHistograms) {
+  const std::string file = fit_of_gain_and_background("quasi_newton");
+  for (const char* z : {"0.05", "5"}) {
+    const Problem problem(load_experiment(file, {"target.histograms=7", std::string("parameters[0].initial=") + z}));
+    const std::vector<double>& theta = problem.parameters().initial();
+    const GatedImage target = problem.make_target(kGoOn), image = problem.evaluate(theta, target, 0, kGoOn).image;
+    const std::string warning = darkness_warning(problem, theta, image, target);
+    if (z == std::string("5"))
+      EXPECT_TRUE(warning.starts_with("no light reaches the gates of the image")) << warning;
+    else
+      EXPECT_EQ(warning, "");
+    std::vector<double> means;
+    for (int g = 0; g < image.gates; ++g) means.push_back(image.mean(g));
+    EXPECT_EQ(darkness_warning(problem, theta, means, "the image").empty(), warning.empty());
   }
 }
 

@@ -85,6 +85,23 @@ TEST_F(LevelsTest, EachHasRandomNumbersOfItsOwn) {
   EXPECT_TRUE(seeds.contains(all.seed));
 }
 
+/// Levels that have ended have brought what they have, and do not bring it again over what later ones found.
+TEST_F(LevelsTest, ResumingLeavesWhatLaterLevelsFound) {
+  write_target();
+  start_run(load_experiment(experiment("flat", "remesh: {levels: 3}", "{images: hill.exr}")), options());
+  const auto found = [&] { return folder_.read("out/final.exr") + folder_.read("out/geometry/final_hill.ply"); };
+  const std::string whole = found();
+  RunOptions again = options();
+  int rows = 0;
+  again.row = [&](const LogRow&, const std::vector<double>&, const Evaluation&, bool) {
+    ++rows;
+    EXPECT_TRUE(found() == whole);
+  };
+  resume_run(again);
+  EXPECT_GT(rows, 0);
+  EXPECT_TRUE(found() == whole);
+}
+
 /// Everything begins where it was found: the same surface, albedos, gain and shift; the image is that of before.
 TEST_F(LevelsTest, EverythingIsCarriedOver) {
   std::string albedos;
