@@ -72,14 +72,16 @@ class ExrTest(unittest.TestCase):
     def test_says_what_is_wrong(self):
         path = self.folder / "bad.exr"
         path.write_bytes(b"no image at all")
-        with self.assertRaisesRegex(exr.ExrError, "not an OpenEXR file"):
-            exr.read(path)
+        for action in exr.read, exr.attributes, exr.channel_names:
+            with self.assertRaisesRegex(exr.ExrError, rf"^{path}: not an OpenEXR file$"):
+                action(path)
         exr.write(path, {"gate000.Y": pixels(False, 0)})
         whole = path.read_bytes()
         for length in range(8, len(whole), 97):
             path.write_bytes(whole[:length])
-            with self.assertRaisesRegex(exr.ExrError, "damaged"):
+            with self.assertRaisesRegex(exr.ExrError, rf"^{path}: damaged"):
                 exr.read(path)
+        self.assertEqual(list(self.folder.glob(".*")), [])
 
 
 if __name__ == "__main__":

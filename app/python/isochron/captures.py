@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 
 from isochron.errors import InputError
+from isochron.files import replacing
 
 H_FORMATS = {"UNKNOWN": 0, "T_Sx_Sy": 1, "T_Lx_Ly_Sx_Sy": 2, "T_Si": 3, "T_Li_Si": 4}
 GRID_FORMATS = {"UNKNOWN": 0, "N_3": 1, "X_Y_3": 2}
@@ -132,29 +133,25 @@ def _write_enumeration(file: h5py.File, name: str, members: dict[str, int], valu
 
 
 @contextlib.contextmanager
-def _temporary(path: pathlib.Path) -> Iterator[pathlib.Path]:
-    """A name beside `path` that becomes it where all went well: there is a whole file or none."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}.tmp")
+def _replacing(path: Any) -> Iterator[pathlib.Path]:
     try:
-        yield temporary
-        os.replace(temporary, path)
+        with replacing(path) as temporary:
+            yield temporary
     except OSError as error:
         reason = os.strerror(error.errno) if error.errno else str(error).splitlines()[0]
         raise CaptureError(f"{path}: cannot be written: {reason}") from None
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_response(path: pathlib.Path, offsets: np.ndarray, values: np.ndarray) -> None:
     """A table of a detector's response, as `response` of gates names it."""
     lines = [f"{offset:.10g},{value:.6g}\n" for offset, value in zip(offsets, values)]
-    with _temporary(path) as temporary:
+    with _replacing(path) as temporary:
         temporary.write_text("offset,value\n" + "".join(lines), encoding="ascii")
 
 
 def write_array(path: pathlib.Path, values: np.ndarray) -> None:
     """A NumPy file, such as the mask of a target. Raises CaptureError."""
-    with _temporary(pathlib.Path(path)) as temporary, open(temporary, "wb") as file:
+    with _replacing(path) as temporary, open(temporary, "wb") as file:
         np.save(file, values)
 
 
@@ -211,5 +208,5 @@ def write_capture(path: Any, counts: np.ndarray, delta_t: float, t_start: float,
         file["scene_info"] = f"{{original_format: {original_format}}}"
         file.flush()
         image = file.id.get_file_image()
-    with _temporary(path) as temporary:
+    with _replacing(path) as temporary:
         temporary.write_bytes(image)

@@ -16,6 +16,7 @@ import yaml
 
 from isochron import exr
 from isochron.errors import InputError
+from isochron.files import replacing
 from isochron.mesh_files import name_in_files, write_ply
 
 DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -115,7 +116,8 @@ class DictionaryFiles:
         try:
             folder.mkdir(parents=True, exist_ok=True)
             for path in self.folder.iterdir():
-                shutil.copyfile(path, folder / path.name)
+                with replacing(folder / path.name) as temporary:
+                    shutil.copyfile(path, temporary)
         except OSError as error:
             raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
         return folder / self.experiment.name

@@ -6,14 +6,16 @@ Of tiled images with several resolutions the finest is read. Follows the OpenEXR
 
 from __future__ import annotations
 
+import contextlib
 import struct
 import zlib
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from isochron.errors import InputError
+from isochron.files import replacing
 
 MAGIC = 20000630
 SAMPLE_TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
@@ -158,34 +160,36 @@ def _parse(data, wanted):
     return images
 
 
+@contextlib.contextmanager
+def _reading(path: Any) -> Iterator[BinaryIO]:
+    """Errors of what is done with the file name it."""
+    try:
+        with open(path, "rb") as file:
+            yield file
+    except ExrError as error:
+        raise ExrError(f"{path}: {error}") from None
+    except (IndexError, KeyError, ValueError, struct.error, zlib.error) as error:
+        raise ExrError(f"{path}: damaged file ({error})") from error
+
+
 def read(path: Any, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """All channels, or those of some names: name -> array of height x width, row 0 at the top. Raises ExrError, OSError."""
-    with open(path, "rb") as file:
-        data = file.read()
-    try:
-        return _parse(data, names)
-    except ExrError:
-        raise
-    except (IndexError, KeyError, ValueError, struct.error, zlib.error) as error:
-        raise ExrError(f"damaged file ({error})") from error
+    with _reading(path) as file:
+        return _parse(file.read(), names)
 
 
 def attributes(path: Any) -> dict[str, bytes]:
     """The header: name -> value as bytes. Raises ExrError, OSError."""
     most = 1 << 24  # bytes of a header, by far
-    with open(path, "rb") as file:
-        data = file.read(most)
-    try:
-        return _header(data)[0]
-    except ExrError:
-        raise
-    except (IndexError, ValueError, struct.error) as error:
-        raise ExrError(f"damaged file ({error})") from error
+    with _reading(path) as file:
+        return _header(file.read(most))[0]
 
 
 def channel_names(path: Any) -> list[str]:
     """In the order in which they are stored. Raises ExrError, OSError."""
-    return [name for name, _ in _channels(attributes(path)["channels"])]
+    header = attributes(path)
+    with _reading(path):
+        return [name for name, _ in _channels(header["channels"])]
 
 
 def write(path: Any, images: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> None:
@@ -222,5 +226,5 @@ def write(path: Any, images: Mapping[str, Any], notes: Mapping[str, str] | None 
         blocks.append(struct.pack("<ii", y, len(packed)) + packed)
     starts = len(out) + 8 * height + np.cumsum([0] + [len(b) for b in blocks[:-1]])
     out += starts.astype("<u8").tobytes() + b"".join(blocks)
-    with open(path, "wb") as file:
-        file.write(out)
+    with replacing(path) as temporary:
+        temporary.write_bytes(out)

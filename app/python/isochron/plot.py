@@ -20,7 +20,6 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")
-from isochron import exr
 from isochron.command_line import Parser
 from isochron.errors import InputError
 from isochron.pictures.curves import plot_log, plot_pixel, plot_row
@@ -73,7 +72,7 @@ class Pictures:
     def attempt(self, action, path, *arguments):
         try:
             return action(*arguments)
-        except (exr.ExrError, OSError, UnicodeDecodeError, csv.Error) as error:
+        except (OSError, UnicodeDecodeError, csv.Error) as error:
             self.failures.append(f"{path}: {error}")
         except InputError as error:
             self.failures.append(str(error))

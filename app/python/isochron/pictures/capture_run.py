@@ -103,7 +103,7 @@ class CaptureRun:
         bins, columns, rows = self.fit.shape
         try:
             images = exr.read(path)
-        except (exr.ExrError, OSError) as error:
+        except OSError as error:
             raise PlotError(f"{path}: {error}") from error
         names = {int(n[4:-2]): n for n in images if re.fullmatch(r"gate\d+\.Y", n)}
         if self.mirrored:

@@ -1,6 +1,5 @@
 """Sheets of gated images: a cell per image, of bounded size however many gates there are."""
 
-import os
 import textwrap
 
 import matplotlib
@@ -9,6 +8,7 @@ import numpy as np
 from matplotlib import colors
 from matplotlib.cm import ScalarMappable
 
+from isochron.files import replacing
 from isochron.pictures.scales import NON_FINITE, pick_gates, scale_of, srgb
 
 COMPONENTS = ["total", "interior", "visibility", "path_length"]
@@ -17,10 +17,9 @@ MOST_CHOSEN = 12  # cells of a sheet of images of more gates, each of which take
 
 
 def save(figure, path):
-    temporary = path.with_name(path.name + ".tmp")
-    figure.savefig(temporary, format="png", dpi=110)
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format="png", dpi=110)
     plt.close(figure)
-    os.replace(temporary, path)
 
 
 def plain_ticks(axis):

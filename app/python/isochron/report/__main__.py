@@ -6,23 +6,14 @@ usage: python3 -m isochron.report DIR... [-o FILE]
   -o FILE  default: DIR/report.html; of several runs comparison.html in the current folder
 """
 
-import os
 import pathlib
 import sys
 
 from isochron.command_line import Parser
+from isochron.files import replacing
 from isochron.report.comparison import comparison_page
 from isochron.report.page import run_page
 from isochron.report.run import NoRun, Run
-
-
-def write(path, text):
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def main(arguments):
@@ -38,7 +29,9 @@ def main(arguments):
     output = options.output or usual
     try:
         runs = [Run(folder) for folder in options.folders]
-        write(output, run_page(runs[0]) if single else comparison_page(runs))
+        page = run_page(runs[0]) if single else comparison_page(runs)
+        with replacing(output) as temporary:
+            temporary.write_text(page, encoding="utf-8")
     except NoRun as error:
         print(f"report: {error}", file=sys.stderr)
         return 2

@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 
-from isochron import exr
 from isochron.errors import InputError
 from isochron.pictures.reading import Folder, read_log, read_stack, read_yaml
 
@@ -98,8 +97,7 @@ class Run:
         try:
             return action(path)
         except (OSError, csv.Error, ValueError) as error:
-            names_it = isinstance(error, InputError) and not isinstance(error, exr.ExrError)
-            self.note(str(error) if names_it else f"{path}: {error}")
+            self.note(str(error) if isinstance(error, InputError) else f"{path}: {error}")
         return None
 
     def note(self, text):
