@@ -9,12 +9,11 @@ namespace isochron {
 namespace {
 
 using Vector = std::vector<double>;
-using Precondition = std::function<Vector(const Vector&)>;
 
 /// Of one right-hand side.
 class Solution {
  public:
-  Solution(const Vector& right_side, const Precondition& precondition, const SolutionLimits& limits)
+  Solution(const Vector& right_side, const ApproximateInverse& precondition, const SolutionLimits& limits)
       : precondition_(precondition), limits_(limits), x_(right_side.size(), 0.0), residual_(right_side) {
     direction_ = precondition_(residual_);
     expected_ = square_ = dot(residual_, direction_);
@@ -51,7 +50,7 @@ class Solution {
   }
 
  private:
-  const Precondition& precondition_;
+  const ApproximateInverse& precondition_;
   const SolutionLimits& limits_;
   Vector x_, residual_, direction_, gains_;
   double square_ = 0, expected_ = 0;  ///< expected: curvature along the direction, by the preconditioner
@@ -61,7 +60,7 @@ class Solution {
 }  // namespace
 
 VectorList solve(const std::function<VectorList(const VectorList&)>& products, const VectorList& right_sides,
-                 const Precondition& precondition, const SolutionLimits& limits) {
+                 const ApproximateInverse& precondition, const SolutionLimits& limits) {
   std::vector<Solution> solutions;
   solutions.reserve(right_sides.size());
   for (const Vector& b : right_sides) solutions.emplace_back(b, precondition, limits);

@@ -14,13 +14,20 @@ struct SolutionLimits {
   double least_curvature = 0;
 };
 
+/// SolutionLimits::least_curvature for noisy products. Where nothing changes the readings, as motion within a surface does not, the noise is
+/// all there is, of either sign; what preconditions has it squared. Two plates that are off by 0.4 mm in the median had stated errors of 0.6 m
+/// without this limit, of 1.1 mm with it; a blob whose curvatures are above has the same errors with and without.
+inline constexpr double kAboveNoise = 0.1;
+
 using VectorList = std::vector<std::vector<double>>;
+
+/// Of a matrix; symmetric.
+using ApproximateInverse = std::function<std::vector<double>(const std::vector<double>&)>;
 
 /// Solutions x of A x = b for several right-hand sides at once, by conjugate gradients: x'b grows from step to step, up to that
 /// of the solution. `products`: A times each of some vectors; A symmetric, and where noise makes it indefinite an equation
-/// ends early. `precondition`: an approximate inverse, symmetric; unknowns for which it gives 0 stay 0.
+/// ends early. Unknowns for which `precondition` gives 0 stay 0.
 VectorList solve(const std::function<VectorList(const VectorList&)>& products, const VectorList& right_sides,
-                 const std::function<std::vector<double>(const std::vector<double>&)>& precondition,
-                 const SolutionLimits& limits = {});
+                 const ApproximateInverse& precondition, const SolutionLimits& limits = {});
 
 }  // namespace isochron

@@ -3,14 +3,38 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
-#include "optim/problem/conjugate_gradients.h"
 #include "optim/problem/vector_math.h"
 
 namespace isochron {
 namespace {
 
 using Vector = std::vector<double>;
+
+/// A solution x of (H + P) x = w.
+struct Solved {
+  Vector solution;
+  double along, curved;  ///< w'x, and x'(H + P)x with H from other random numbers
+
+  double variance() const { return curved > 0 ? along * along / curved : std::numeric_limits<double>::infinity(); }
+  /// Both are the same but for noise, which the solution has followed where they differ by more than a factor of two.
+  bool is_noise() const { return !(curved > along / 2 && curved < 2 * along); }
+};
+
+std::vector<Solved> solve_and_check(const CurvatureProducts& curvature, const VectorList& weights,
+                                    const ApproximateInverse& precondition, double least_curvature) {
+  VectorList solutions = solve([&](const VectorList& vectors) { return curvature.products(vectors); }, weights,
+                               precondition, {.least_curvature = least_curvature});
+  const Curvatures within = curvature.within(solutions);
+  std::vector<Solved> solved;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    const std::size_t entry = k * weights.size() + k;
+    const double along = dot(weights[k], solutions[k]);
+    solved.push_back({std::move(solutions[k]), along, within.data[entry] + within.prior[entry]});
+  }
+  return solved;
+}
 
 }  // namespace
 
@@ -35,23 +59,17 @@ ParameterErrors eliminated_errors(const CurvatureProducts& curvature, const std:
   const Determined determined(blocks, names, theta, curvature.within(columns).bound, changes, unseen, kept);
 
   const auto spreads = [&](const std::vector<Vector>& weights) {
-    Vector inverse_diagonal(n);
-    for (std::size_t i = 0; i < n; ++i)
-      if (!determined.fixed()[i]) inverse_diagonal[i] = 1 / diagonal[i];
     std::vector<Spread> result;
     if (weights.empty()) return result;
-    const auto products = [&](const VectorList& vectors) { return curvature.products(vectors); };
-    const auto precondition = [&](Vector values) {
-      for (std::size_t i = 0; i < n; ++i) values[i] *= inverse_diagonal[i];
-      return values;
-    };
-    const VectorList solutions = solve(products, weights, precondition);
-    const Curvatures within = curvature.within(solutions);
-    for (std::size_t k = 0; k < weights.size(); ++k) {
-      const std::size_t entry = k * weights.size() + k;
-      const double curved = within.data[entry] + within.prior[entry], along = dot(weights[k], solutions[k]);
-      result.push_back({curved > 0 ? along * along / curved : std::numeric_limits<double>::infinity(), {}});
-      for (const Vector& gradient : gradients) result.back().steps.push_back(-dot(gradient, solutions[k]));
+    std::vector<std::size_t> free;
+    for (std::size_t i = 0; i < n; ++i)
+      if (!determined.fixed()[i] && diagonal[i] > 0) free.push_back(i);
+    const ApproximateInverse precondition = curvature.preconditioner(std::move(free));
+    for (Solved& found : solve_and_check(curvature, weights, precondition, 0)) {
+      if (found.is_noise())
+        found = std::move(solve_and_check(curvature, {weights[result.size()]}, precondition, kAboveNoise)[0]);
+      result.push_back({found.variance(), {}});
+      for (const Vector& gradient : gradients) result.back().steps.push_back(-dot(gradient, found.solution));
     }
     return result;
   };

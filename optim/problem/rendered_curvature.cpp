@@ -1,6 +1,7 @@
 #include "optim/problem/rendered_curvature.h"
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -26,11 +27,6 @@ constexpr std::uint32_t kRenderings = 4, kSampleIteration = kMatrixIteration + k
 /// Of a posterior's samples. In tests/optim/evidence_test.cpp, 81 unknowns, twelve steps and 24 give the same trace, 39.4, where the whole
 /// matrix has 37.5; six give 36.8.
 constexpr int kSampleSteps = 12;
-
-/// Where nothing changes the readings, as motion within a surface does not, the noise of products is all there is, of either sign; what
-/// preconditions has it squared. Two plates that are off by 0.4 mm in the median had stated errors of 0.6 m without this limit, of 1.1 mm with
-/// it; a blob whose curvatures are above has the same errors with and without.
-constexpr double kLeastCurvature = 0.1;
 
 /// Of the diagonal, which preconditions: each knows an entry to a factor of about 1 +- sqrt(2 / 12).
 constexpr int kProbes = 12;
@@ -140,12 +136,15 @@ PosteriorSamples RenderedCurvature::samples(int count) const {
   std::vector<std::size_t> free;
   for (std::size_t i = 0; i < theta_.size(); ++i)
     if (at_first[i] > 0 && theta_[i] > low[i] && theta_[i] < high[i]) free.push_back(i);
-  const std::vector<Coupling> couplings = prior_.couplings(scale);
-  const Metric metric(at_first, couplings, std::move(free));
   return {solve([&](const VectorList& vectors) { return products(vectors); }, gradients,
-                [&](const std::vector<double>& residual) { return metric.solve(residual); },
-                {.most_steps = kSampleSteps, .least_curvature = kLeastCurvature}),
+                preconditioner(std::move(free)), {.most_steps = kSampleSteps, .least_curvature = kAboveNoise}),
           pulls(count, kPullIteration)};
+}
+
+ApproximateInverse RenderedCurvature::preconditioner(std::vector<std::size_t> free) const {
+  const auto metric = std::make_shared<const Metric>(diagonal(), prior_.couplings({smoothing_.slopes, priors_.priors}),
+                                                     std::move(free));
+  return [metric](const std::vector<double>& residual) { return metric->solve(residual); };
 }
 
 std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<std::vector<double>>& vectors) const {

@@ -37,6 +37,8 @@ class RenderedCurvature : public CurvatureProducts {
   /// (H + P) v of each vector, with an H that is always the same: symmetric, without bias. Costs a gradient and
   /// another for every kAdjointsTogether vectors. Not for finite differences.
   std::vector<std::vector<double>> products(const std::vector<std::vector<double>>& vectors) const override;
+  /// By the diagonal, and what the prior knows beside it. Must not outlive this.
+  ApproximateInverse preconditioner(std::vector<std::size_t> free) const override;
   /// Some of the loss, penalty included, each from random numbers of its own (the first from those of the weights); 0 for unknowns that a
   /// bound keeps from following it.
   std::vector<std::vector<double>> gradients() const;

@@ -1,5 +1,7 @@
 #include "optim/reconstruct/back_projection.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -35,7 +37,7 @@ struct Setting {
   double narrowest;  ///< sigma that the response and the bins allow
   double sigma;
   double sine;  ///< of the angle between the wall's normal and the way from the light's distance to the wall's edge
-  double ways;  ///< that change from one point of the wall to the next
+  double ways;  ///< see setting()
 };
 
 Setting setting(const Histograms& histograms, const DetectorResponse& response) {
@@ -46,11 +48,17 @@ Setting setting(const Histograms& histograms, const DetectorResponse& response) 
                      " bins are too few for a filter as wide as the response");
   const double half = histograms.half_side(), spacing = histograms.spacing();
   if (!(half > 0)) throw InputError("the capture's sensor points are all at one place");
+  const double ways = histograms.spots.empty() ? 2 : 1;  // that change from one point of the wall to the next
+  if (!(2 * ways * half > narrowest))
+    throw InputError(fmt::format(
+        "the capture's sensor points lie within {:.3g} m, less than light travels in one of its bins or the response's "
+        "width, {:.3g} m (allowed: points in metres, delta_t and t_start as path lengths in metres)",
+        2 * half, narrowest));
   // In groups and with a wide filter, for the few counts of single points.
   const double wide = std::min(4 * narrowest, histograms.bin * histograms.bins / 16);
   const double distance = distance_of_light(grouped(histograms, std::max(half / 8, spacing)), wide, response);
-  Setting result{narrowest, narrowest, half / std::hypot(half, distance), histograms.spots.empty() ? 2.0 : 1.0};
-  const double apart = result.ways * spacing * result.sine, needed = 0.25 * apart * apart - deviation * deviation;
+  Setting result{narrowest, narrowest, half / std::hypot(half, distance), ways};
+  const double apart = ways * spacing * result.sine, needed = 0.25 * apart * apart - deviation * deviation;
   if (needed > narrowest * narrowest) result.sigma = std::sqrt(needed);
   if (2 * FilteredHistograms::margin(result.sigma, histograms.bin) >= histograms.bins)
     throw InputError("the capture's points are too far apart for its " + std::to_string(histograms.bins) +

@@ -153,6 +153,16 @@ std::vector<std::uint8_t> usable_points(const CaptureFile& capture, const std::s
   return used;
 }
 
+/// Of points that are used.
+bool are_whole(const GatedImage& counts, const std::vector<std::uint8_t>& used) {
+  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
+    for (int g = 0; g < counts.gates; ++g)
+      if (const double value = counts.at(pixel, g);
+          value != std::floor(value) && (used.empty() || used[pixel % used.size()] != 0))
+        return false;
+  return true;
+}
+
 BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response,
                               const std::vector<std::uint8_t>& used, const std::string& file) {
   const ProgressStage stage("back-projection", 1);
@@ -213,6 +223,11 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
       warning(fmt::format("{}: {} of {} points are left out: they count nothing, or what is no count", spec.capture,
                           std::ranges::count(used, 0), used.size()));
   }
+  if (warning && !are_whole(capture.counts, used))
+    warning(fmt::format(
+        "{}: has values that are no whole numbers: smoothing and standard errors take them for numbers of photons all "
+        "the same, and whether the surface explains them is not judged",
+        spec.capture));
   const BackProjection volume = back_projected(capture, response, used, spec.capture);
   const FirstSurface first = first_surface(volume);
   const LikelyAlbedos likely = likely_albedos(volume, histograms(capture, volume.frame, used), response);

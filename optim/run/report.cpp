@@ -17,6 +17,9 @@ namespace {
 
 constexpr int kMostRows = 3;
 
+/// Standard errors by which a loss has to have risen before it is said.
+constexpr double kClearly = 5;
+
 struct Row {
   std::string name;
   double initial, found, target, error, initial_error;  ///< NaN: unknown
@@ -106,7 +109,9 @@ std::string run_report(const LoopResult& result, const Checkpoint& state, const 
   if (!std::isnan(last.loss)) {
     fmt::format_to(out, "  loss {:.3g} +- {:.2g} (at the start {:.3g} +- {:.2g}){}\n", last.loss, last.loss_noise,
                    state.loss_initial, state.loss_noise_initial,
-                   last.loss >= 2 * last.loss_noise ? ""
+                   last.loss > state.loss_initial + kClearly * std::hypot(last.loss_noise, state.loss_noise_initial)
+                       ? ": it has risen; try shorter steps"
+                   : last.loss >= 2 * last.loss_noise ? ""
                    : state.loss_initial < 2 * state.loss_noise_initial
                        ? ": it cannot be told from 0, nor could it at the start"
                        : ": it cannot be told from 0");

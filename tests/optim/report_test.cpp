@@ -146,6 +146,19 @@ TEST_F(Report, SummaryHasErrorsAndCost) {
       << text;
 }
 
+TEST_F(Report, SaysThatTheLossHasRisen) {
+  const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7})});
+  state_.theta = {0.6875};
+  state_.loss_initial = 2;
+  state_.loss_noise_initial = 0.3;
+  last_.loss_noise = 0.4;
+  for (const double loss : {4.4, 4.6}) {
+    last_.loss = loss;
+    const std::string text = run_report({}, state_, last_, parameters, {});
+    EXPECT_EQ(text.find(": it has risen; try shorter steps") != std::string::npos, loss > 4.5) << text;
+  }
+}
+
 /// Of 100 readings: a deviance of 150 for 98, with and without light.
 GoodnessOfFit fit_of(double p, double light, double background) {
   GoodnessOfFit fit;

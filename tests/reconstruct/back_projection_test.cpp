@@ -164,6 +164,23 @@ TEST(BackProjection, RefusesWhatCannotBeUsed) {
   EXPECT_THROW(back_project(early), InputError);
 }
 
+/// Points in kilometres, or times in nanoseconds: all points see the light of a place at once.
+TEST(BackProjection, RefusesUnitsThatAreOffByAThousand) {
+  const CaptureFile capture = of_patch(square_wall(4, 0.5));
+  EXPECT_NO_THROW(back_project(capture));
+  CaptureFile kilometres = capture, nanoseconds = capture;
+  for (Vec3& p : kilometres.geometry.sensor) p = p * 1e-3;
+  nanoseconds.delta_t *= 1e3;
+  for (const CaptureFile* file : {&kilometres, &nanoseconds}) try {
+      back_project(*file);
+      ADD_FAILURE();
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("(allowed: points in metres, delta_t and t_start as path lengths"),
+                std::string::npos)
+          << error.what();
+    }
+}
+
 /// What does not fit is refused in one line before it is made.
 TEST(BackProjection, MemoryIsAskedForBeforehand) {
   EXPECT_NO_THROW(require_memory({"a box needs", 3e9}, "leave points out", 3e9));

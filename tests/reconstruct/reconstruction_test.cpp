@@ -96,8 +96,9 @@ TEST(Reconstruction, LeavesOutDeadPoints) {
   const auto note = [&](const std::string& text) { warnings.push_back(text); };
   const std::string text = begun(capture, folder, "capture.h5", note).experiment;
   EXPECT_NE(text.find("\n  mask: mask.npy\n"), std::string::npos) << text;
-  ASSERT_EQ(warnings.size(), 1u);
+  ASSERT_EQ(warnings.size(), 2u);
   EXPECT_NE(warnings[0].find("capture.h5: 3 of 144 points are left out"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[1].find("capture.h5: has values that are no whole numbers"), std::string::npos) << warnings[1];
   const NumberArray mask = read_npy(folder.file("mask.npy"));
   EXPECT_EQ(mask.shape, (std::vector<std::size_t>{12, 12}));
   for (int p = 0; p < 144; ++p) EXPECT_EQ(mask.values[p % 12 * 12 + p / 12], p != 17 && p != 40 && p != 77) << p;
