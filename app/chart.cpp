@@ -36,10 +36,9 @@ void chart_solvers(const ChartCommand& command, const Problem& problem, const st
   options.core_seconds = command.seconds * thread_count(command.common);
   options.error = command.error_percent / 100;
   options.seeds = command.seeds;
-  options.poll = throw_if_stopped;
   options.progress = note_progress;
   ProgressDisplay display(command.common.quiet);
-  const Race race = race_solvers(problem.experiment(), problem.make_target(throw_if_stopped), options);
+  const Race race = race_solvers(problem.experiment(), problem.make_target(), options);
   display.end();
   write_file_atomically(folder + "/chart_solvers.csv", race_csv(race));
   fmt::print("{}", race_table(race));
@@ -54,11 +53,10 @@ void chart_gradient(const ChartCommand& command, const Problem& problem, const s
   options.steps = command.steps;
   if (options.steps.empty() && !command.techniques) options.steps = default_steps(problem, theta);
   options.techniques = command.techniques;
-  options.poll = throw_if_stopped;
   options.progress = note_progress;
   options.progress("target");
   ProgressDisplay display(command.common.quiet);
-  const GatedImage target = problem.make_target(throw_if_stopped);
+  const GatedImage target = problem.make_target();
   const Chart chart = make_chart(problem.experiment(), theta, target, options);
   display.end();
   write_file_atomically(folder + "/chart.csv", chart_csv(chart));

@@ -95,7 +95,7 @@ int check(const CommonOptions& command) {
   {
     ProgressStage stage("comparing derivatives", static_cast<int>(components.size()));
     for (int component : components) {
-      const auto rows = check_derivative(problem, theta, component, throw_if_stopped);
+      const auto rows = check_derivative(problem, theta, component);
       table.insert(table.end(), rows.begin(), rows.end());
       stage.advance();
     }

@@ -55,7 +55,7 @@ int derive(const CommonOptions& command) {
   bool dark = true;  // every derivative is exactly zero
   for (int first = block.begin; first < block.begin + block.count; first += group) {
     const int count = std::min(group, block.begin + block.count - first);
-    auto components = estimate_derivatives(problem, theta, first, count, throw_if_stopped);
+    auto components = estimate_derivatives(problem, theta, first, count);
     for (int i = 0; i < count; ++i) {
       const std::string& name = parameters.component_names()[first + i];
       std::vector<std::string> names;

@@ -18,7 +18,6 @@ std::optional<int> execute_run(const std::string& folder, const CommonOptions& c
   RunOptions options;
   options.folder = folder;
   options.force = common.force;
-  options.stop = stop_requested;
   options.progress = [&](const Progress& progress) { display.show(progress); };
   options.warning = warn;
   std::string report;

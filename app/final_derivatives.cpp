@@ -40,13 +40,13 @@ std::vector<int> chosen_unknowns(const Parameters& parameters, const std::vector
 
 /// Returns the seconds that it took.
 double write_images(const Problem& problem, const std::vector<double>& theta, const std::vector<int>& unknowns,
-                    const std::string& folder, const Poll& poll) {
+                    const std::string& folder) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   for (const int unknown : unknowns) {
     std::vector<std::string> names;
     std::vector<StoredImage> images;
-    for (DerivativeEstimate& component : estimate_derivatives(problem, theta, unknown, 1, poll)) {
+    for (DerivativeEstimate& component : estimate_derivatives(problem, theta, unknown, 1)) {
       names.push_back(component.component);
       images.push_back(std::move(component.images[0]));
     }
@@ -80,12 +80,12 @@ void write_final_derivatives(const std::string& of_run) {
   SampleSpec few = wanted;
   few.set_all(samples);
   problem.set_samples(few);
-  const double seconds = write_images(problem, theta, unknowns, folder, throw_if_stopped);
+  const double seconds = write_images(problem, theta, unknowns, folder);
   const int fitting = static_cast<int>(std::min<double>(most, samples * kSeconds / std::max(seconds, 1e-6)));
   if (fitting >= 2 * samples) {
     few.set_all(samples = fitting);
     problem.set_samples(few);
-    write_images(problem, theta, unknowns, folder, throw_if_stopped);
+    write_images(problem, theta, unknowns, folder);
   }
   write_file_atomically(folder + "/derivatives.yaml", of + fmt::format("samples: {}\n", samples));
 }

@@ -46,12 +46,12 @@ int gradient(const CommonOptions& options) {
   catch_interrupts();
   gradient_repeats(problem);  // too few samples must show before the target is rendered
   ProgressDisplay display(options.quiet);
-  const GatedImage target = problem.make_target(throw_if_stopped);
+  const GatedImage target = problem.make_target();
   const GatedImage image =
       problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
   if (const std::string dark = darkness_warning(problem, theta, image, target); !dark.empty()) warn(dark);
   const auto start = std::chrono::steady_clock::now();
-  const GradientEstimate estimate = estimate_gradient(problem, theta, target, throw_if_stopped);
+  const GradientEstimate estimate = estimate_gradient(problem, theta, target);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
   display.end();

@@ -210,7 +210,7 @@ int inspect_experiment(const InspectCommand& command) {
   make_output_folder(folder);
   catch_interrupts();
   ProgressDisplay display(command.common.quiet);
-  const Inspection inspection = inspect(problem, start, command.seconds, throw_if_stopped);
+  const Inspection inspection = inspect(problem, start, command.seconds);
   display.end();
   fmt::print("{}: {} unknowns, {} gates, {} bounces at most\n", experiment.name, problem.parameters().size(),
              problem.gates().size(), full_bounces(experiment));

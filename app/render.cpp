@@ -27,7 +27,7 @@ int render(const CommonOptions& options) {
   make_output_folder(folder);
   catch_interrupts();
   ProgressDisplay display(options.quiet);
-  const ImageEstimate estimate = estimate_image(problem, theta, throw_if_stopped);
+  const ImageEstimate estimate = estimate_image(problem, theta);
   display.end();
   require_finite(estimate.image, "the image");
   if (const std::string dark = darkness_warning(problem, theta, estimate.gates.mean, "the image"); !dark.empty())

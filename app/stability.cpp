@@ -51,7 +51,6 @@ int stability(const StabilityCommand& command) {
   options.core_seconds = command.seconds * thread_count(command.common);
   options.iterations = command.iterations;
   options.steps = command.steps.empty() ? default_steps(problem, theta) : command.steps;
-  options.poll = throw_if_stopped;
   options.progress = [](const std::string& what) { spdlog::info("{}", what); };
   ProgressDisplay display(command.common.quiet);
   const Stability map = map_stability(experiment, options);

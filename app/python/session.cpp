@@ -76,7 +76,7 @@ py::array Session::render(const Array& array, Samples samples, Seed seed, std::u
     choose(samples, seed, own_evaluations_);
     require_renderable(theta);
     require_memory(*problem_, image_memory(*problem_));
-    const ImageEstimate estimate = estimate_image(*problem_, theta, throw_if_stopped, iteration);
+    const ImageEstimate estimate = estimate_image(*problem_, theta, iteration);
     require_finite(estimate.image, "the image");
     dark = darkness_warning(*problem_, theta, estimate.gates.mean, "the image");
     return estimate.image.to_gated();
@@ -95,8 +95,7 @@ py::array Session::jvp(const Array& array, const Array& tangent, Samples samples
     require_renderable(theta);
     problem_->require_parameters();
     require_memory(*problem_, derivative_memory(*problem_, 1));
-    const StoredImage image =
-        std::move(estimate_tangent(*problem_, theta, direction, throw_if_stopped, iteration)[0].images[0]);
+    const StoredImage image = std::move(estimate_tangent(*problem_, theta, direction, iteration)[0].images[0]);
     require_finite(image, "the derivative");
     return image.to_gated();
   }));
@@ -110,7 +109,7 @@ py::array Session::vjp(const Array& array, const Array& adjoint, Samples samples
     choose(samples, seed, own_evaluations_);
     require_renderable(theta);
     problem_->require_parameters();
-    return problem_->transpose_apply(theta, image, iteration, throw_if_stopped);
+    return problem_->transpose_apply(theta, image, iteration);
   }));
 }
 
@@ -121,7 +120,7 @@ py::dict Session::evaluate(const Array& array, std::uint32_t iteration) {
     choose_own();
     problem_->require_parameters();
     require_two_samples(*problem_);
-    return RenderedObjective(*problem_, *target, throw_if_stopped).evaluate(theta, iteration);
+    return RenderedObjective(*problem_, *target).evaluate(theta, iteration);
   });
   py::dict result;
   result["loss"] = found.loss;
@@ -140,7 +139,7 @@ py::dict Session::gradient(const Array& array, Samples samples, Seed seed) {
     require_renderable(theta);
     problem_->require_parameters();
     gradient_repeats(*problem_);  // too few samples must show before the target is rendered
-    return estimate_gradient(*problem_, theta, problem_->make_target(throw_if_stopped), throw_if_stopped).gradient;
+    return estimate_gradient(*problem_, theta, problem_->make_target()).gradient;
   });
   py::dict result;
   result["gradient"] = to_array(std::move(found.mean));
@@ -157,7 +156,7 @@ std::shared_ptr<const GatedImage> Session::shared_target() {
   require_target();
   if (!target_) {
     choose_own();
-    GatedImage image = problem_->make_target(throw_if_stopped);
+    GatedImage image = problem_->make_target();
     require_finite(image, "the target");
     // Runs read it from a file of such numbers.
     for (double& value : image.data) value = static_cast<float>(value);

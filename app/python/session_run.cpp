@@ -53,7 +53,6 @@ void execute(const std::string& folder, bool force, const py::object& row, const
     RunOptions options;
     options.folder = folder;
     options.force = force;
-    options.stop = stop_requested;
     options.warning = [&](const std::string& text) { warnings.push_back(text); };
     if (!loss.function.is_none()) {
       options.loss = [&](const GatedImage& image) { return loss_of(work, loss.function, image); };

@@ -54,10 +54,10 @@ PerPass real(const std::array<int, kPasses>& samples) {
 
 std::vector<GradientCost> measure_all(const Problem& problem, const std::vector<PointInspection>& points,
                                       const std::array<bool, 3>& kept,
-                                      const std::vector<std::array<int, kPasses>>& samples, const Poll& poll) {
+                                      const std::vector<std::array<int, kPasses>>& samples) {
   std::vector<GradientCost> costs;
   for (std::size_t i = 0; i < points.size(); ++i)
-    costs.push_back(measure_cost(problem, points[i].point.theta, points[i].target, kept, samples[i], poll));
+    costs.push_back(measure_cost(problem, points[i].point.theta, points[i].target, kept, samples[i]));
   return costs;
 }
 
@@ -104,7 +104,7 @@ void choose_samples(Advice& advice, double pixels) {
   advice.seconds_after = best->seconds;
 }
 
-Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds, const Poll& poll) {
+Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds) {
   problem.require_parameters();
   const Experiment& experiment = problem.experiment();
   if (experiment.gradient.method != GradientMethod::analytic)
@@ -115,7 +115,7 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   ProgressStage stage("inspecting", static_cast<int>(points.size()) + 2);  // the points, then costs before and after
   for (const InspectedPoint& point : points) {
     result.points.push_back(
-        inspect_point(problem, point, (1 - kShareOfCosts) * seconds / static_cast<double>(points.size()), poll));
+        inspect_point(problem, point, (1 - kShareOfCosts) * seconds / static_cast<double>(points.size())));
     stage.advance();
   }
 
@@ -138,16 +138,15 @@ Inspection inspect(const Problem& problem, const std::vector<double>& start, dou
   const double each = kShareOfCosts * seconds / (2 - as_before + other_sampling) / static_cast<double>(points.size());
   std::vector<std::array<int, kPasses>> samples;
   for (const PointInspection& p : result.points)
-    samples.push_back(affordable_samples(problem, p.point.theta, p.target, present, each, poll));
-  advice.costs_before = measure_all(problem, result.points, present, samples, poll);
+    samples.push_back(affordable_samples(problem, p.point.theta, p.target, present, each));
+  advice.costs_before = measure_all(problem, result.points, present, samples);
   stage.advance();
   Setting reduced = advice.before;
   reduced.max_bounces = advice.reduction.kept.max_bounces;
   const auto trial = [&](Sampling sampling) {
     reduced.sampling = sampling;
     const Problem own(advised(experiment, reduced));
-    return SamplingTrial{
-        sampling, {}, 0, 0, measure_all(own, result.points, advice.reduction.kept.terms, samples, poll)};
+    return SamplingTrial{sampling, {}, 0, 0, measure_all(own, result.points, advice.reduction.kept.terms, samples)};
   };
   if (as_before)
     advice.trials.push_back({advice.before.sampling, {}, 0, 0, advice.costs_before});

@@ -44,7 +44,7 @@ inline constexpr double kBiasTolerance = 0.01;
 
 /// Inspects an experiment with the analytic method from `start` on, for about so many CPU seconds.
 /// Throws InputError where it has no parameters or another method.
-Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds, const Poll& poll);
+Inspection inspect(const Problem& problem, const std::vector<double>& start, double seconds);
 
 /// From the costs of the present setting and of trials with their costs: fills in the trials' samples,
 /// seconds and effective counts, and the advised samples and sampling. Numbers of samples stay unless new ones save a

@@ -53,10 +53,10 @@ double best_of(const Chart& chart) {
 }
 
 ChartMethod measure_levels(MethodRun& run, const Method& method, const std::vector<double>& theta,
-                           const GatedImage& target, double core_seconds, const Poll& poll) {
+                           const GatedImage& target, double core_seconds) {
   const int unknowns = run.problem().parameters().size();
   if (method.gradient != Method::Gradient::adjoint) run.set_components(spread_components(unknowns, kMostComponents));
-  const SampleTrial trial = try_samples(run, theta, target, kRepeats, core_seconds, poll);
+  const SampleTrial trial = try_samples(run, theta, target, kRepeats, core_seconds);
   int levels = kLevels;
   while (levels > 1 && trial.last_within(core_seconds / levels, kRepeats) < levels - 1) --levels;
   const double of_level = core_seconds / levels;
@@ -71,7 +71,7 @@ ChartMethod measure_levels(MethodRun& run, const Method& method, const std::vect
     std::uint32_t iteration = first_iteration(level.factor);
     double spent = 0;
     do {
-      MethodRun::Estimate estimate = run.gradient(theta, target, iteration++, poll);
+      MethodRun::Estimate estimate = run.gradient(theta, target, iteration++);
       spent += estimate.core_seconds;
       level.repeats.push_back(std::move(estimate.gradient));
       level.core_seconds = spent / static_cast<double>(level.repeats.size());
@@ -93,18 +93,18 @@ bool fine_enough(const Reference& reference, double error) {
 }
 
 Reference make_reference(const Experiment& experiment, const std::vector<double>& theta, const GatedImage& target,
-                         double core_seconds, const Poll& poll) {
+                         double core_seconds) {
   Experiment own = experiment;
   own.seed ^= kReferenceSeed;
   own.estimator.max_bounces = std::max(own.estimator.max_bounces, own.target.max_bounces);
   MethodRun run(own, automatic_method());
-  const SampleTrial trial = try_samples(run, theta, target, kReferenceRepeats, core_seconds, poll);
+  const SampleTrial trial = try_samples(run, theta, target, kReferenceRepeats, core_seconds);
   // All of the time, in equal repeats.
   const int last = trial.last_within(core_seconds, kReferenceRepeats);
   run.set_factor(trial.factor(last) * std::max(1.0, core_seconds / (kReferenceRepeats * trial.core_seconds[last])));
   Reference result;
   for (int i = 0; i < kReferenceRepeats; ++i) {
-    MethodRun::Estimate estimate = run.gradient(theta, target, static_cast<std::uint32_t>(i), poll);
+    MethodRun::Estimate estimate = run.gradient(theta, target, static_cast<std::uint32_t>(i));
     result.repeats.push_back(std::move(estimate.gradient));
     result.core_seconds += estimate.core_seconds;
   }
@@ -121,7 +121,7 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
   chart.error = options.error;
   chart.unknowns = static_cast<int>(theta.size());
   options.progress("reference");
-  chart.reference = make_reference(experiment, theta, target, kReferenceShare * options.core_seconds, options.poll);
+  chart.reference = make_reference(experiment, theta, target, kReferenceShare * options.core_seconds);
   if (!resolved(chart.reference))
     throw std::runtime_error(
         fmt::format("the gradient does not stand out of its noise at this point (squared norm {:.3g} +- {:.2g}): "
@@ -143,7 +143,7 @@ Chart make_chart(const Experiment& experiment, const std::vector<double>& theta,
       continue;
     }
     options.progress(methods[m].name);
-    ChartMethod row = measure_levels(runs[m], methods[m], theta, target, each, options.poll);
+    ChartMethod row = measure_levels(runs[m], methods[m], theta, target, each);
     const std::vector<int> components = spread_components(chart.unknowns, row.components);
     const double scale = static_cast<double>(chart.unknowns) / row.components;
     // A squared loss has a gradient whose mean does not depend on the number of samples.

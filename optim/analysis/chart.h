@@ -19,7 +19,6 @@ struct ChartOptions {
   double error = 0.01;        ///< relative, that the table asks for
   std::vector<double> steps;  ///< of finite differences
   bool techniques = false;    ///< in place of other methods, `auto` without each technique (methods_without)
-  Poll poll;
   std::function<void(const std::string&)> progress;  ///< one line
 };
 
@@ -39,7 +38,7 @@ bool fine_enough(const Reference& reference, double error);
 /// `auto` with random numbers of its own and as many bounces as the target has, in 32 parts that take `core_seconds`
 /// together (or one sample each).
 Reference make_reference(const Experiment& experiment, const std::vector<double>& theta, const GatedImage& target,
-                         double core_seconds, const Poll& poll);
+                         double core_seconds);
 
 struct ChartMethod {
   std::string name;

@@ -65,8 +65,7 @@ struct DifferenceEstimate {
   std::vector<double> rounding;
 };
 
-DifferenceEstimate estimate_difference(const Problem& problem, const std::vector<double>& theta, int component,
-                                       const Poll& poll) {
+DifferenceEstimate estimate_difference(const Problem& problem, const std::vector<double>& theta, int component) {
   const double step = check_step(problem, theta, component);
   const int samples = problem.experiment().samples.primal;
   const EstimatorOptions& options = problem.image_estimator();
@@ -106,7 +105,6 @@ DifferenceEstimate estimate_difference(const Problem& problem, const std::vector
       for (std::size_t i = 0; i < above.data.size(); ++i)
         above.data[i] = (above.data[i] - below.data[i]) / distances[s];
       differences[s] = std::move(above);
-      poll();
     }
     GatedImage& image = differences[0];
     for (std::size_t i = 0; i < image.data.size(); ++i)
@@ -192,12 +190,11 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
   return std::min(step, room);
 }
 
-std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component,
-                                         const Poll& poll) {
+std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component) {
   ProgressStage stage("comparing derivatives", 2);
-  const auto analytic = estimate_derivatives(problem, theta, component, 1, poll, kMostCheckReplicates);
+  const auto analytic = estimate_derivatives(problem, theta, component, 1, kMostCheckReplicates);
   stage.advance();
-  const DifferenceEstimate difference = estimate_difference(problem, theta, component, poll);
+  const DifferenceEstimate difference = estimate_difference(problem, theta, component);
   std::vector<Comparison> rows;
   for (int g = 0; g < problem.gates().size(); ++g) {
     Comparison row;

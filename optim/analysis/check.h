@@ -61,8 +61,7 @@ double check_step(const Problem& problem, const std::vector<double>& theta, int 
 
 /// Compares the derivatives by one unknown at theta, one row per gate. The problem is one of
 /// check_experiment's. Finite differences have their own random numbers, common to all six images.
-std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component,
-                                         const Poll& poll);
+std::vector<Comparison> check_derivative(const Problem& problem, const std::vector<double>& theta, int component);
 
 /// `parameter,gate,interior,visibility,path_length,total,standard_error,finite_difference,finite_difference_error,z,limit,
 /// degrees_of_freedom,effective_count` and the gate's columns (gate_columns.h); `limit`: the |z| above which a row differs.

@@ -108,8 +108,7 @@ class VarianceCollector {
 }  // namespace
 
 std::array<int, kPasses> affordable_samples(const Problem& problem, const std::vector<double>& theta,
-                                            const GatedImage& target, const std::array<bool, 3>& kept, double seconds,
-                                            const Poll& poll) {
+                                            const GatedImage& target, const std::array<bool, 3>& kept, double seconds) {
   const SampleSpec& spec = problem.experiment().samples;
   const std::array<int, kPasses> all{spec.primal, spec.interior, spec.visibility, spec.path_length};
   const auto scaled = [&](double factor) {
@@ -119,7 +118,6 @@ std::array<int, kPasses> affordable_samples(const Problem& problem, const std::v
   };
   const std::array<int, kPasses> few = scaled(0.125);
   const Times times = time_evaluation(problem, theta, target, kept, few, 0);
-  poll();
   double whole = 0;  // of measure_cost with all samples
   for (int i = 0; i < kPasses; ++i) {
     const double repeats = kTimings + (i == 0 ? kImages : kBreakdownTime * kBatches);
@@ -129,12 +127,11 @@ std::array<int, kPasses> affordable_samples(const Problem& problem, const std::v
 }
 
 GradientCost measure_cost(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                          const std::array<bool, 3>& kept, const std::array<int, kPasses>& samples, const Poll& poll) {
+                          const std::array<bool, 3>& kept, const std::array<int, kPasses>& samples) {
   GradientCost result;
   std::vector<Times> times;
   for (int i = 0; i < kTimings; ++i) {
     times.push_back(time_evaluation(problem, theta, target, kept, samples, i));
-    poll();
   }
   const auto median_time = [&](int what) {
     std::vector<double> values;
@@ -154,7 +151,6 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
   for (int i = 0; i < kImages; ++i) {
     const SplitImage image = render_halves(renderer, stream_of(problem, Pass::primal, i), {0, samples[0]});
     adjoints.push_back(loss_adjoint(image, target, robust));
-    poll();
   }
   const std::vector<double> unit = comparable_units(problem.parameters());
   const int columns = problem.parameters().size();
@@ -170,7 +166,6 @@ GradientCost measure_cost(const Problem& problem, const std::vector<double>& the
         const std::size_t column = i / kImages % columns;
         tables[column][i % kImages][b] += unit[column] * breakdown.by_bounces[i];
       }
-      poll();
     }
     collector.add_term(t, tables);
   }

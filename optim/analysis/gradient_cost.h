@@ -22,12 +22,11 @@ struct GradientCost {
 /// The experiment's numbers of samples, or fewer (at least one, of images two), with which measure_cost takes about so many
 /// CPU seconds.
 std::array<int, kPasses> affordable_samples(const Problem& problem, const std::vector<double>& theta,
-                                            const GatedImage& target, const std::array<bool, 3>& kept, double seconds,
-                                            const Poll& poll);
+                                            const GatedImage& target, const std::array<bool, 3>& kept, double seconds);
 
 /// Of the problem's setting at theta, for the terms that `kept` says, against a target image. `samples`: of
 /// the passes that are repeated for it; settings compared with the same numbers have common random numbers.
 GradientCost measure_cost(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                          const std::array<bool, 3>& kept, const std::array<int, kPasses>& samples, const Poll& poll);
+                          const std::array<bool, 3>& kept, const std::array<int, kPasses>& samples);
 
 }  // namespace isochron

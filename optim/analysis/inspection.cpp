@@ -165,7 +165,7 @@ int full_bounces(const Experiment& experiment) {
   return !experiment.target.measured() ? std::max(own, experiment.target.max_bounces) : own;
 }
 
-PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds, const Poll& poll) {
+PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds) {
   const Experiment& experiment = problem.experiment();
   const Parameters& parameters = problem.parameters();
   const int gates = problem.gates().size(), columns = parameters.size(), most = full_bounces(experiment);
@@ -184,7 +184,7 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
   if (rendered)
     target_renderer.emplace(target_scene, problem.gates(), options);
   else
-    target = problem.make_target([] {});
+    target = problem.make_target();
 
   PointInspection result;
   result.point = point;
@@ -219,7 +219,6 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
     };
     pass(1);  // visibility learns once
     result.samples[1 + t] = samples_within(seconds_per_part, pass);
-    poll();
   }
 
   ShareCollector shares;
@@ -230,7 +229,6 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
     of_images.add_to(result.work[0]);
     mean_target.add(target, 1);
     shares.add_light(breakdown);
-    poll();
     const std::vector<GatedImage> adjoint = adjoints(breakdown);
     std::vector<double> limits((most + 1) * 3 * columns, 0.0);
     ShareCollector::Gradient sorted;
@@ -251,7 +249,6 @@ PointInspection inspect_point(const Problem& problem, const InspectedPoint& poin
       for (std::size_t i = 0; i < g.by_shape.size(); ++i) sorted.by_shape.push_back(unit[i % columns] * g.by_shape[i]);
       for (std::size_t i = 0; i < g.by_technique.size(); ++i)
         sorted.by_technique.push_back(unit[i % columns] * g.by_technique[i]);
-      poll();
     }
     if (!std::all_of(limits.begin(), limits.end(), [](double x) { return std::isfinite(x); }))
       throw std::runtime_error(fmt::format("the gradient at {} is not finite", point.name));

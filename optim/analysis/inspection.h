@@ -50,7 +50,7 @@ struct PointInspection {
 /// Measures light and gradient of the full model (full_bounces) in independent replicates, as many samples
 /// each as fit into so many CPU seconds (at least one per pixel). Images at theta and at the target
 /// values share their random numbers: where they look alike their difference has little noise.
-PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds, const Poll& poll);
+PointInspection inspect_point(const Problem& problem, const InspectedPoint& point, double seconds);
 
 /// Per unknown: see PointInspection::gradient.
 std::vector<double> comparable_units(const Parameters& parameters);

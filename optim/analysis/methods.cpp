@@ -190,20 +190,17 @@ void MethodRun::set_factor(double factor) {
 }
 
 template <class F>
-void MethodRun::gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
-                             F&& render) const {
+void MethodRun::gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, F&& render) const {
   const GateSet& gates = problem_.gates();
   const auto count = static_cast<std::uint32_t>(gates.size());
   for (int g = 0; g < gates.size(); ++g) {
     const GateSet gate(gates.shape(), {gates.center(g)});
     const Renderer renderer(scene, gate, problem_.estimator(problem_.experiment().samples.visibility), basis);
     render(renderer, number_of_gate(iteration, count, static_cast<std::uint32_t>(g)), g);
-    poll();
   }
 }
 
-GatedImage MethodRun::derivative(const std::vector<double>& theta, int component, std::uint32_t iteration,
-                                 const Poll& poll) const {
+GatedImage MethodRun::derivative(const std::vector<double>& theta, int component, std::uint32_t iteration) const {
   const SampleSpec& samples = problem_.experiment().samples;
   if (kind_ == Method::Gradient::finite_difference)
     return problem_.finite_difference(theta, component, problem_.stream(Pass::finite_difference, iteration),
@@ -211,7 +208,7 @@ GatedImage MethodRun::derivative(const std::vector<double>& theta, int component
   const Scene scene = problem_.parameters().apply(theta);
   const TangentBasis basis = select_columns(problem_.parameters().tangent(theta), component, 1);
   GatedImage sum = problem_.blank();
-  gate_by_gate(scene, &basis, iteration, poll, [&](const Renderer& renderer, std::uint32_t number, int g) {
+  gate_by_gate(scene, &basis, iteration, [&](const Renderer& renderer, std::uint32_t number, int g) {
     for (Term term : kTerms)
       if (samples.term(term) > 0)
         add_to_gate(sum, g, renderer.derive(term, problem_.stream(pass_of(term), number), {0, samples.term(term)})[0]);
@@ -220,10 +217,10 @@ GatedImage MethodRun::derivative(const std::vector<double>& theta, int component
 }
 
 MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const GatedImage& target,
-                                        std::uint32_t iteration, const Poll& poll) const {
+                                        std::uint32_t iteration) const {
   const double start = cpu_seconds();
   if (kind_ == Method::Gradient::adjoint) {
-    const std::vector<double> all = problem_.evaluate(theta, target, iteration, poll).gradient;
+    const std::vector<double> all = problem_.evaluate(theta, target, iteration).gradient;
     Estimate result{{}, cpu_seconds() - start};
     for (int component : components_) result.gradient.push_back(all[component]);
     return result;
@@ -234,11 +231,10 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
   if (kind_ == Method::Gradient::finite_difference) {
     const Renderer renderer(scene, problem_.gates(), problem_.estimator());
     image = render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, primal});
-    poll();
   } else {
     image.image = problem_.blank();
     if (primal > 1) image.difference = image.image;
-    gate_by_gate(scene, nullptr, iteration, poll, [&](const Renderer& renderer, std::uint32_t number, int g) {
+    gate_by_gate(scene, nullptr, iteration, [&](const Renderer& renderer, std::uint32_t number, int g) {
       const SplitImage gate = render_halves(renderer, problem_.stream(Pass::primal, number), {0, primal});
       image.first = gate.first;
       add_to_gate(image.image, g, gate.image);
@@ -251,9 +247,7 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
   const double before_derivatives = cpu_seconds();
   Estimate result;
   for (int component : components_) {
-    result.gradient.push_back(inner_product(adjoint, derivative(theta, component, iteration, poll)) +
-                              penalty[component]);
-    poll();
+    result.gradient.push_back(inner_product(adjoint, derivative(theta, component, iteration)) + penalty[component]);
   }
   const double share = static_cast<double>(theta.size()) / static_cast<double>(components_.size());
   result.core_seconds = before_derivatives - start + share * (cpu_seconds() - before_derivatives);
@@ -271,13 +265,13 @@ int SampleTrial::last_within(double seconds, int repeats) const {
 }
 
 SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,
-                        double core_seconds, const Poll& poll) {
+                        double core_seconds) {
   constexpr int kMostSteps = 24;
   SampleTrial trial{std::exp2(std::ceil(std::log2(run.least_factor()))), {}};
   for (int step = 0; step < kMostSteps; ++step) {
     run.set_factor(trial.factor(step));
     trial.core_seconds.push_back(
-        run.gradient(theta, target, kTrialIteration + static_cast<std::uint32_t>(step), poll).core_seconds);
+        run.gradient(theta, target, kTrialIteration + static_cast<std::uint32_t>(step)).core_seconds);
     if (repeats * 2 * trial.core_seconds.back() > core_seconds) break;
   }
   return trial;

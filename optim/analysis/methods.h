@@ -73,17 +73,14 @@ class MethodRun {
     double core_seconds = 0;
   };
   /// An estimate with the random numbers of one iteration.
-  Estimate gradient(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                    const Poll& poll) const;
+  Estimate gradient(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration) const;
 
  private:
   /// Derivative images by one unknown, of all gates.
-  GatedImage derivative(const std::vector<double>& theta, int component, std::uint32_t iteration,
-                        const Poll& poll) const;
+  GatedImage derivative(const std::vector<double>& theta, int component, std::uint32_t iteration) const;
   /// Calls `render(renderer, iteration, gate)` for every gate, with a renderer and an iteration number of its own.
   template <class F>
-  void gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, const Poll& poll,
-                    F&& render) const;
+  void gate_by_gate(const Scene& scene, const TangentBasis* basis, std::uint32_t iteration, F&& render) const;
 
   Method::Gradient kind_;
   Problem problem_;
@@ -117,6 +114,6 @@ constexpr std::uint32_t number_of_gate(std::uint32_t iteration, std::uint32_t ga
 /// Goes on up to where `repeats` of the next step would take more than `core_seconds`. Takes other random
 /// numbers than iterations below 2^31.
 SampleTrial try_samples(MethodRun& run, const std::vector<double>& theta, const GatedImage& target, int repeats,
-                        double core_seconds, const Poll& poll);
+                        double core_seconds);
 
 }  // namespace isochron

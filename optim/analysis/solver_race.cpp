@@ -22,12 +22,12 @@ constexpr double kFirstStep = 0.5;
 /// Ends a run from within.
 struct TimeIsUp {};
 
-RaceRun race(const Problem& problem, const GatedImage& target, double core_seconds, const Poll& poll) {
+RaceRun race(const Problem& problem, const GatedImage& target, double core_seconds) {
   const Experiment& experiment = problem.experiment();
   const Parameters& parameters = problem.parameters();
   const std::unique_ptr<Optimizer> optimizer =
       make_optimizer(experiment.optimizer, problem.preconditioner(), parameters.scales());
-  const RenderedObjective objective(problem, target, poll);
+  const RenderedObjective objective(problem, target);
   problem.estimator();  // its trial is no part of a run
   RaceRun run{name_of(experiment.optimizer.method), experiment.seed, {{0, 0, 1}}};
   Checkpoint state;
@@ -79,7 +79,7 @@ Race race_solvers(const Experiment& experiment, const GatedImage& target, const 
         result.notes.push_back(error.what());
         break;
       }
-      result.runs.push_back(race(problem, target, each, options.poll));
+      result.runs.push_back(race(problem, target, each));
       stage.advance();
     }
   }

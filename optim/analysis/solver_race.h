@@ -13,7 +13,6 @@ struct RaceOptions {
   double core_seconds = 120;  ///< for all runs together, about; a run ends after the iteration that uses up its share
   int seeds = 3;              ///< runs of each method: the experiment's seed and those after it
   double error = 0.01;        ///< relative to the error at the start, that the table asks for
-  Poll poll;
   std::function<void(const std::string&)> progress;  ///< one line
 };
 

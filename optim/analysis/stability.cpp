@@ -25,7 +25,7 @@ constexpr double kMostOfBias = 0.1, kMostOfVariance = 0.5;
 constexpr int kMostUnknowns = 16;
 
 /// Target images with as many samples as fit the time, but no more than the experiment's.
-GatedImage quick_target(Experiment experiment, double core_seconds, const Poll& poll) {
+GatedImage quick_target(Experiment experiment, double core_seconds) {
   automatic_method().change(experiment);
   const int most = experiment.target.samples;
   for (int samples = 1;; samples = std::min(2 * samples, most)) {
@@ -33,14 +33,14 @@ GatedImage quick_target(Experiment experiment, double core_seconds, const Poll& 
     const Problem problem(experiment);
     problem.estimator();
     const double start = cpu_seconds();
-    GatedImage image = problem.make_target(poll);
+    GatedImage image = problem.make_target();
     const double time = cpu_seconds() - start;
     if (samples == most || 4 * time > core_seconds) return image;
   }
 }
 
 /// Adam from the initial values; returns the parameters' error at the end over that at the start.
-double reconstruct(const Problem& problem, const GatedImage& target, int iterations, const Poll& poll) {
+double reconstruct(const Problem& problem, const GatedImage& target, int iterations) {
   const Parameters& parameters = problem.parameters();
   if (!parameters.target_known()) return std::numeric_limits<double>::quiet_NaN();
   OptimizerSpec spec = problem.experiment().optimizer;
@@ -51,7 +51,7 @@ double reconstruct(const Problem& problem, const GatedImage& target, int iterati
   spec.decay.start = static_cast<int>(std::lround(spec.decay.start / larger));
   spec.decay.half_life /= larger;
   const std::unique_ptr<Optimizer> optimizer = make_optimizer(spec, problem.preconditioner(), parameters.scales());
-  const RenderedObjective objective(problem, target, poll);
+  const RenderedObjective objective(problem, target);
   LoopOptions options;
   options.iterations = iterations;
   options.row = [](const Evaluation&, const std::vector<double>&, bool) {};
@@ -66,7 +66,7 @@ double reconstruct(const Problem& problem, const GatedImage& target, int iterati
 StabilityCell map_cell(MethodRun& run, const GatedImage& target, const Reference& reference, double core_seconds,
                        const StabilityOptions& options) {
   const std::vector<double> theta = run.problem().parameters().initial();
-  const SampleTrial trial = try_samples(run, theta, target, 1, core_seconds, options.poll);
+  const SampleTrial trial = try_samples(run, theta, target, 1, core_seconds);
   const int step = trial.last_within(core_seconds, 1);
   StabilityCell cell;
   cell.factor = trial.factor(step);
@@ -76,18 +76,18 @@ StabilityCell map_cell(MethodRun& run, const GatedImage& target, const Reference
     run.set_factor(cell.factor);
     double time = std::numeric_limits<double>::infinity();
     for (std::uint32_t i = 0; i < 2; ++i)
-      time = std::min(time, run.gradient(theta, target, kEstimates + 2 * round + i, options.poll).core_seconds);
+      time = std::min(time, run.gradient(theta, target, kEstimates + 2 * round + i).core_seconds);
     cell.factor = std::max(run.least_factor(), cell.factor * std::clamp(core_seconds / time, 0.25, 4.0));
   }
   run.set_factor(cell.factor);
   Repeats estimates;
   for (std::uint32_t i = 0; i < kEstimates; ++i) {
-    MethodRun::Estimate estimate = run.gradient(theta, target, i, options.poll);
+    MethodRun::Estimate estimate = run.gradient(theta, target, i);
     cell.core_seconds += estimate.core_seconds / kEstimates;
     estimates.push_back(std::move(estimate.gradient));
   }
   cell.direction = direction(estimates, reference);
-  cell.error_ratio = reconstruct(run.problem(), target, options.iterations, options.poll);
+  cell.error_ratio = reconstruct(run.problem(), target, options.iterations);
   cell.failure = failure(cell.direction, resolved(reference), cell.error_ratio);
   cell.reference_error = reference.error;
   return cell;
@@ -224,8 +224,8 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
     options.progress(fmt::format("width {:.3g}", width));
     Experiment narrow = experiment;
     narrow.gates = with_relative_width(experiment.gates, width);
-    const GatedImage target = quick_target(narrow, kTargetShare * of_width, options.poll);
-    const Reference reference = make_reference(narrow, theta, target, kShareOfReference * of_width, options.poll);
+    const GatedImage target = quick_target(narrow, kTargetShare * of_width);
+    const Reference reference = make_reference(narrow, theta, target, kShareOfReference * of_width);
     std::vector<Method> methods = all;
     std::erase_if(methods, [&](const Method& method) { return !may_find(method, narrow); });
     std::deque<MethodRun> runs;
@@ -237,7 +237,7 @@ Stability map_stability(const Experiment& experiment, const StabilityOptions& op
       if (first[m] < m) continue;
       ++different;
       runs[m].set_factor(runs[m].least_factor());
-      slowest = std::max(slowest, runs[m].gradient(theta, target, 0, options.poll).core_seconds);
+      slowest = std::max(slowest, runs[m].gradient(theta, target, 0).core_seconds);
     }
     const double of_methods = (1 - kShareOfReference - kTargetShare) * of_width;
     const double time = std::max(slowest, of_methods / different / (kEstimates + options.iterations));

@@ -45,7 +45,6 @@ struct StabilityOptions {
   double core_seconds = 360;   ///< for the whole map, about; but a sample per term and pixel at least
   int iterations = 50;         ///< of a reconstruction
   std::vector<double> steps;   ///< of finite differences
-  Poll poll;
   std::function<void(const std::string&)> progress;  ///< one line
 };
 

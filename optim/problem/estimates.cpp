@@ -20,7 +20,7 @@ void require_replicates(const char* term, int samples) {
 /// Means and statistics of the images that `render` makes of so many replicates, each from a part of the samples.
 template <class Render>
 DerivativeEstimate collect(const std::string& component, int samples, int replicates, bool pixels_are_independent,
-                           const Poll& poll, Render&& render) {
+                           Render&& render) {
   std::vector<SampleRange> ranges;
   for (int r = 0; r < replicates; ++r) ranges.push_back(Share{r, replicates}.of(samples));
   const ProgressStage stage("rendering the " + component, 1);
@@ -29,14 +29,13 @@ DerivativeEstimate collect(const std::string& component, int samples, int replic
     result.gates.push_back(gate_statistics(image.gates, image.mean.pixels(), pixels_are_independent));
     result.images.push_back(std::move(image.mean));
   }
-  poll();
   return result;
 }
 
 /// The same of `count` images that estimate(range) makes one replicate of.
 template <class Estimate>
 DerivativeEstimate collect_whole(const std::string& component, int samples, int replicates, bool pixels_are_independent,
-                                 int count, const Poll& poll, Estimate&& estimate) {
+                                 int count, Estimate&& estimate) {
   std::vector<ImageStatistics> statistics(count, ImageStatistics(pixels_are_independent));
   ProgressStage stage("rendering the " + component, replicates);
   for (int r = 0; r < replicates; ++r) {
@@ -44,7 +43,6 @@ DerivativeEstimate collect_whole(const std::string& component, int samples, int 
     std::vector<GatedImage> images = estimate(range);
     for (int i = 0; i < count; ++i) statistics[i].add(std::move(images[i]), range.count());
     stage.advance();
-    poll();
   }
   DerivativeEstimate result{component, {}, {}};
   for (ImageStatistics& of_image : statistics) {
@@ -88,20 +86,19 @@ bool by_differences(const Problem& problem) {
 /// Only `total`, from so many images that `difference(stream, range)` makes.
 template <class Difference>
 std::vector<DerivativeEstimate> differences(const Problem& problem, int count, std::uint32_t iteration,
-                                            const Poll& poll, int most_replicates, Difference&& difference) {
+                                            int most_replicates, Difference&& difference) {
   const int samples = problem.experiment().samples.primal;
   require_replicates("primal", samples);
   const Stream stream = problem.stream(Pass::finite_difference, iteration);
   const bool independent = sampling_mix(problem.estimator(), problem.gates(), problem.scene()).image_stays_in_pixels();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
-  return {collect_whole("total", samples, replicates, independent, count, poll,
+  return {collect_whole("total", samples, replicates, independent, count,
                         [&](SampleRange range) { return difference(stream, range); })};
 }
 
 /// Along each column of the basis.
 std::vector<DerivativeEstimate> derivatives(const Problem& problem, const std::vector<double>& theta,
-                                            const TangentBasis& basis, std::uint32_t iteration, const Poll& poll,
-                                            int most_replicates) {
+                                            const TangentBasis& basis, std::uint32_t iteration, int most_replicates) {
   const SampleSpec& spec = problem.experiment().samples;
   for (Term term : kTerms)
     if (spec.term(term) > 0) require_replicates(name(term), spec.term(term));  // before anything is rendered
@@ -117,7 +114,7 @@ std::vector<DerivativeEstimate> derivatives(const Problem& problem, const std::v
     const bool independent = renderer.pixels_are_independent(term);
     const int replicates = replicate_count(samples, pixels_of(problem), independent, most_replicates);
     components.push_back(collect(
-        name(term), samples, replicates, independent, poll,
+        name(term), samples, replicates, independent,
         [&](const std::vector<SampleRange>& ranges) { return renderer.derive_replicates(term, stream, ranges); }));
     stage.advance();
   }
@@ -128,8 +125,7 @@ std::vector<DerivativeEstimate> derivatives(const Problem& problem, const std::v
 
 }  // namespace
 
-ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll,
-                             std::uint32_t iteration) {
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, std::uint32_t iteration) {
   const int samples = problem.experiment().samples.primal;
   require_replicates("primal", samples);
   const Scene scene = problem.parameters().apply(theta);
@@ -138,7 +134,7 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
   const bool independent = renderer.pixels_are_independent();
   const int replicates = replicate_count(samples, pixels_of(problem), independent, kMostReplicates);
   DerivativeEstimate result =
-      collect("image", samples, replicates, independent, poll, [&](const std::vector<SampleRange>& ranges) {
+      collect("image", samples, replicates, independent, [&](const std::vector<SampleRange>& ranges) {
         std::vector<ReplicatedImage> images;
         images.push_back(renderer.render_replicates(stream, ranges));
         return images;
@@ -147,22 +143,21 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
 }
 
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
-                                                     int first, int count, const Poll& poll, int most_replicates) {
+                                                     int first, int count, int most_replicates) {
   if (by_differences(problem))
-    return differences(problem, count, 0, poll, most_replicates, [&](const Stream& stream, SampleRange range) {
+    return differences(problem, count, 0, most_replicates, [&](const Stream& stream, SampleRange range) {
       std::vector<GatedImage> images;
       for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
       return images;
     });
-  return derivatives(problem, theta, select_columns(problem.parameters().tangent(theta), first, count), 0, poll,
+  return derivatives(problem, theta, select_columns(problem.parameters().tangent(theta), first, count), 0,
                      most_replicates);
 }
 
 std::vector<DerivativeEstimate> estimate_tangent(const Problem& problem, const std::vector<double>& theta,
-                                                 const std::vector<double>& tangent, const Poll& poll,
-                                                 std::uint32_t iteration) {
+                                                 const std::vector<double>& tangent, std::uint32_t iteration) {
   if (by_differences(problem))
-    return differences(problem, 1, iteration, poll, kMostReplicates, [&](const Stream& stream, SampleRange range) {
+    return differences(problem, 1, iteration, kMostReplicates, [&](const Stream& stream, SampleRange range) {
       GatedImage sum = problem.blank();
       for (int i = 0; i < problem.parameters().size(); ++i) {
         if (tangent[i] == 0) continue;
@@ -171,8 +166,7 @@ std::vector<DerivativeEstimate> estimate_tangent(const Problem& problem, const s
       }
       return std::vector<GatedImage>{std::move(sum)};
     });
-  return derivatives(problem, theta, problem.parameters().tangent(theta).combined(tangent), iteration, poll,
-                     kMostReplicates);
+  return derivatives(problem, theta, problem.parameters().tangent(theta).combined(tangent), iteration, kMostReplicates);
 }
 
 int gradient_repeats(const Problem& problem) {
@@ -198,14 +192,13 @@ int gradient_repeats(const Problem& problem) {
   return repeats;
 }
 
-GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                   const Poll& poll) {
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target) {
   const int repeats = gradient_repeats(problem);
   ReplicateStatistics statistics;
   ProgressStage stage("estimating the gradient", repeats);
   for (int r = 0; r < repeats; ++r) {
     std::vector<std::vector<double>> parts;
-    const Evaluation evaluation = problem.evaluate(theta, target, 0, poll, {r, repeats}, &parts);
+    const Evaluation evaluation = problem.evaluate(theta, target, 0, {r, repeats}, &parts);
     statistics.add(evaluation.gradient, std::move(parts), 1);
     stage.advance();
   }

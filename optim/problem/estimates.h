@@ -19,8 +19,7 @@ struct ImageEstimate {
 };
 
 /// The gated images at theta. Throws InputError when samples.primal is below 2.
-ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, const Poll& poll,
-                             std::uint32_t iteration = 0);
+ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& theta, std::uint32_t iteration = 0);
 
 /// One component of the derivative images of a range of unknowns.
 struct DerivativeEstimate {
@@ -33,13 +32,11 @@ struct DerivativeEstimate {
 /// samples. The finite-difference method gives only `total`, from samples.primal. Throws InputError when a
 /// term has one sample.
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
-                                                     int first, int count, const Poll& poll,
-                                                     int most_replicates = kMostReplicates);
+                                                     int first, int count, int most_replicates = kMostReplicates);
 
 /// The same of one unknown, along which all others move as `tangent` says, with the random numbers of an iteration.
 std::vector<DerivativeEstimate> estimate_tangent(const Problem& problem, const std::vector<double>& theta,
-                                                 const std::vector<double>& tangent, const Poll& poll,
-                                                 std::uint32_t iteration = 0);
+                                                 const std::vector<double>& tangent, std::uint32_t iteration = 0);
 
 struct GradientEstimate {
   Statistics gradient;  ///< one entry per unknown; replicates of residual and derivative
@@ -51,7 +48,6 @@ int gradient_repeats(const Problem& problem);
 
 /// The gradient of the loss at theta. All replicates together use the experiment's samples once. Throws as
 /// above.
-GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target,
-                                   const Poll& poll);
+GradientEstimate estimate_gradient(const Problem& problem, const std::vector<double>& theta, const GatedImage& target);
 
 }  // namespace isochron

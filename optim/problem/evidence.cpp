@@ -66,8 +66,7 @@ std::vector<double> evidence_factors(const Problem& problem, const GatedImage& t
 
 std::vector<double> evidence_factors(const Problem& problem, const GatedImage& target,
                                      const std::vector<double>& theta) {
-  const Poll poll = [] {};
-  return evidence_factors(problem, target, theta, RenderedCurvature(problem, target, theta, poll).samples());
+  return evidence_factors(problem, target, theta, RenderedCurvature(problem, target, theta).samples());
 }
 
 double determined_unknowns(const Problem& problem, const std::vector<char>& free, const PosteriorSamples& samples) {

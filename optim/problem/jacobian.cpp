@@ -18,7 +18,7 @@ constexpr double kSquareMatrices = 8;
 
 /// Adds the derivative images, or central differences, of one half of the samples to the columns of `jacobian`.
 void add_half(const Problem& problem, const std::vector<double>& theta, const TangentBasis& all,
-              std::uint32_t iteration, int half, const Poll& poll, JacobianHalves& jacobian) {
+              std::uint32_t iteration, int half, JacobianHalves& jacobian) {
   const SampleSpec& samples = problem.experiment().samples;
   const auto add = [&](int column, const GatedImage& image) {
     double* entry = jacobian.half[half].data() + jacobian.residuals * static_cast<std::size_t>(column);
@@ -31,7 +31,6 @@ void add_half(const Problem& problem, const std::vector<double>& theta, const Ta
     for (int i = 0; i < columns; ++i) {
       add(i, problem.finite_difference(theta, i, problem.stream(Pass::finite_difference, iteration),
                                        half_of(samples.primal, half)));
-      poll();
     }
     return;
   }
@@ -46,7 +45,6 @@ void add_half(const Problem& problem, const std::vector<double>& theta, const Ta
       const auto images =
           renderer.derive(term, problem.stream(pass_of(term), iteration), half_of(samples.term(term), half));
       for (int i = 0; i < basis.columns; ++i) add(first + i, images[i]);
-      poll();
     }
   }
 }
@@ -63,11 +61,11 @@ double linearisation_bytes(const Problem& problem, double columns) {
 }
 
 JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>& theta, const TangentBasis& basis,
-                               std::uint32_t iteration, const Poll& poll) {
+                               std::uint32_t iteration) {
   const bool differences = problem.experiment().gradient.method == GradientMethod::finite_difference;
   JacobianHalves jacobian(static_cast<std::size_t>(residual_count(problem)),
                           differences ? theta.size() : static_cast<std::size_t>(basis.columns));
-  for (const int half : {0, 1}) add_half(problem, theta, basis, iteration, half, poll, jacobian);
+  for (const int half : {0, 1}) add_half(problem, theta, basis, iteration, half, jacobian);
   return jacobian;
 }
 
@@ -78,7 +76,7 @@ SampleRange half_of(int samples, int half) {
 
 std::vector<std::vector<double>> probe_readings(const Problem& problem, const std::vector<double>& theta,
                                                 const std::vector<double>& weights, std::uint32_t iteration,
-                                                Probes probes, std::uint32_t rendered, const Poll& poll) {
+                                                Probes probes, std::uint32_t rendered) {
   std::vector<std::vector<double>> products;
   for (int done = 0; done < probes.count; done += kAdjointsTogether) {
     std::vector<GatedImage> signs(std::min(kAdjointsTogether, probes.count - done), problem.blank());
@@ -90,7 +88,7 @@ std::vector<std::vector<double>> probe_readings(const Problem& problem, const st
         values[i] = std::copysign(std::sqrt(weights[i]), rng.uniform() - 0.5);
       }
     });
-    for (std::vector<double>& product : problem.transpose_apply(theta, signs, rendered, poll))
+    for (std::vector<double>& product : problem.transpose_apply(theta, signs, rendered))
       products.push_back(std::move(product));
   }
   return products;
@@ -98,9 +96,8 @@ std::vector<std::vector<double>> probe_readings(const Problem& problem, const st
 
 std::vector<std::vector<double>> probe_diagonals(const Problem& problem, const std::vector<double>& theta,
                                                  const std::vector<double>& weights, std::uint32_t iteration,
-                                                 Probes probes, const Poll& poll) {
-  std::vector<std::vector<double>> diagonals =
-      probe_readings(problem, theta, weights, iteration, probes, iteration, poll);
+                                                 Probes probes) {
+  std::vector<std::vector<double>> diagonals = probe_readings(problem, theta, weights, iteration, probes, iteration);
   for (std::vector<double>& diagonal : diagonals)
     for (double& d : diagonal) d *= d;
   return diagonals;

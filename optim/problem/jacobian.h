@@ -18,7 +18,7 @@ double linearisation_bytes(const Problem& problem, double columns);
 /// two halves, an odd number rounded up. It is rendered for a group of columns at a time, each time from the same random numbers.
 /// With finite differences as gradient.method, `basis` is not looked at: the columns are those of all unknowns.
 JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>& theta, const TangentBasis& basis,
-                               std::uint32_t iteration, const Poll& poll);
+                               std::uint32_t iteration);
 
 /// Half `half` (0 or 1) of so many samples, as above.
 SampleRange half_of(int samples, int half);
@@ -28,12 +28,12 @@ SampleRange half_of(int samples, int half);
 /// same for all probes.
 std::vector<std::vector<double>> probe_readings(const Problem& problem, const std::vector<double>& theta,
                                                 const std::vector<double>& weights, std::uint32_t iteration,
-                                                Probes probes, std::uint32_t rendered, const Poll& poll);
+                                                Probes probes, std::uint32_t rendered);
 
 /// Estimates of the diagonal of J'WJ: see Objective::probe_curvature(), without a penalty's part.
 std::vector<std::vector<double>> probe_diagonals(const Problem& problem, const std::vector<double>& theta,
                                                  const std::vector<double>& weights, std::uint32_t iteration,
-                                                 Probes probes, const Poll& poll);
+                                                 Probes probes);
 
 /// A basis whose columns are combinations of those of another.
 TangentBasis combinations_of(const TangentBasis& basis, const std::vector<std::vector<double>>& coefficients);

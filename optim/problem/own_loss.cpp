@@ -82,7 +82,7 @@ Evaluation OwnLossObjective::evaluate(const std::vector<double>& theta, std::uin
     result.mean_squared_error = squares.mean_squared_error;
     result.mean_squared_error_noise = squares.mean_squared_error_noise;
   }
-  result.gradient = problem().transpose_apply(theta, found.adjoint, iteration, poll());
+  result.gradient = problem().transpose_apply(theta, found.adjoint, iteration);
   result.image = std::move(image.image);
   return result;
 }

@@ -27,8 +27,8 @@ void require_for_own_loss(const Problem& problem);
 class OwnLossObjective : public RenderedObjective {
  public:
   /// All must outlive this. `target`, where has_target(), is for the mean squared error alone.
-  OwnLossObjective(const Problem& problem, const GatedImage& target, Poll poll, const OwnLoss& loss)
-      : RenderedObjective(problem, target, std::move(poll)), loss_(loss) {}
+  OwnLossObjective(const Problem& problem, const GatedImage& target, const OwnLoss& loss)
+      : RenderedObjective(problem, target), loss_(loss) {}
 
   double loss(const std::vector<double>& theta, std::uint32_t iteration) const override;
   /// The standard error of the loss is that of its first derivative: too large, by up to 1.4 times, where that is noise.

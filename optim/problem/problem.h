@@ -52,9 +52,6 @@ struct Share {
   }
 };
 
-/// Called between the passes of an estimate. May throw to abandon it (see Interrupted).
-using Poll = std::function<void()>;
-
 class Problem {
  public:
   /// Loads the scene and binds the parameters. Throws InputError. `warning` receives one line where shapes
@@ -110,15 +107,13 @@ class Problem {
   /// Gated images at theta. Throws InputError where it cannot be rendered.
   GatedImage render(const std::vector<double>& theta, const Stream& stream, SampleRange range) const;
 
-  /// The same of many samples with options of its own, in parts, between which `poll` is called: a request to stop does not
-  /// wait for all of them.
+  /// The same of many samples with options of its own, in parts, so that a request to stop does not wait for all of them.
   GatedImage render_in_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
-                             int samples, const std::string& stage, const Poll& poll) const;
+                             int samples, const std::string& stage) const;
 
   /// The same in two halves, where there are two samples.
   SplitImage render_halves_in_parts(const std::vector<double>& theta, const EstimatorOptions& options,
-                                    const Stream& stream, int samples, const std::string& stage,
-                                    const Poll& poll) const;
+                                    const Stream& stream, int samples, const std::string& stage) const;
 
   /// A renderer of a scene that parameters() made. Scene and basis must outlive it.
   Renderer renderer(const Scene& scene, const EstimatorOptions& options, const TangentBasis* basis = nullptr) const;
@@ -126,7 +121,7 @@ class Problem {
   /// The images that the optimisation aims at: rendered at the target values, with photon noise where it is
   /// asked for, or read from a file. Throws InputError when the file's shape is not that of this experiment's
   /// images.
-  GatedImage make_target(const Poll& poll) const;
+  GatedImage make_target() const;
   /// Reads a target image and checks its shape against this experiment's, and whether the loss has a use for it.
   GatedImage read_target(const std::string& file) const;
 
@@ -160,15 +155,15 @@ class Problem {
   /// `parts`, where asked for, becomes what terms and sets of pixels contribute to the gradient, the penalty aside:
   /// [part][unknown], the same terms and pixels whatever the share.
   Evaluation evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                      const Poll& poll, Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
+                      Share share = {}, std::vector<std::vector<double>>* parts = nullptr) const;
 
   /// Products of the transposed Jacobian of the images at theta, as `evaluate` samples it, with images, which share its samples. theta must
   /// be one that can_render() accepts.
   std::vector<std::vector<double>> transpose_apply(const std::vector<double>& theta, std::span<const GatedImage> images,
-                                                   std::uint32_t iteration, const Poll& poll) const;
+                                                   std::uint32_t iteration) const;
   std::vector<double> transpose_apply(const std::vector<double>& theta, const GatedImage& image,
-                                      std::uint32_t iteration, const Poll& poll) const {
-    return std::move(transpose_apply(theta, {&image, 1}, iteration, poll)[0]);
+                                      std::uint32_t iteration) const {
+    return std::move(transpose_apply(theta, {&image, 1}, iteration)[0]);
   }
 
   /// Central difference of the images along one unknown with common random numbers. Where theta +- step
@@ -191,7 +186,7 @@ class Problem {
   /// Renders `samples` in parts: use(image, samples, index of the part of so many).
   template <class F>
   void render_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
-                    int samples, const std::string& stage, const Poll& poll, F&& use) const;
+                    int samples, const std::string& stage, F&& use) const;
 
   /// The name of a light at the camera that parameters move away from it; empty where there is none.
   std::string light_that_leaves_the_camera() const;

@@ -8,7 +8,7 @@
 namespace isochron {
 
 Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage& target, std::uint32_t iteration,
-                             const Poll& poll, Share share, std::vector<std::vector<double>>* parts) const {
+                             Share share, std::vector<std::vector<double>>* parts) const {
   const SampleSpec& samples = experiment_.samples;
   Scene scene = parameters_->apply(theta);
   if (!coordinates_fit(scene)) return no_evaluation(target);
@@ -29,7 +29,6 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const GatedImage adjoint = loss_adjoint(image, target, rho);
   stage.advance();
   result.image = std::move(image.image);
-  poll();
   if (differences) {
     if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
     for (int i = 0; i < parameters_->size(); ++i) {
@@ -40,7 +39,6 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
       const std::size_t values = derivative.data.size() / derivative.pixels();
       for (std::size_t k = 0; parts && k < derivative.data.size(); ++k)
         (*parts)[k / values % kGradientParts][i] += adjoint.data[k] * derivative.data[k];
-      poll();
     }
     penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
     return result;
@@ -54,7 +52,6 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
                           parts ? &of_term : nullptr);
     if (parts) parts->insert(parts->end(), of_term.begin(), of_term.end());
     stage.advance();
-    poll();
   }
   result.gradient = basis.transpose_apply(dof_gradient);
   penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
@@ -62,8 +59,8 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
 }
 
 std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<double>& theta,
-                                                          std::span<const GatedImage> images, std::uint32_t iteration,
-                                                          const Poll& poll) const {
+                                                          std::span<const GatedImage> images,
+                                                          std::uint32_t iteration) const {
   const SampleSpec& samples = experiment_.samples;
   const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
   const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
@@ -75,7 +72,6 @@ std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<doub
           finite_difference(theta, i, stream(Pass::finite_difference, iteration), {0, samples.primal});
       for (std::size_t k = 0; k < images.size(); ++k) products[k].push_back(inner_product(images[k], difference));
       stage.advance();
-      poll();
     }
     return products;
   }
@@ -87,7 +83,6 @@ std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<doub
     if (samples.term(term) == 0) continue;
     renderer.add_gradients(term, images, stream(pass_of(term), iteration), {0, samples.term(term)}, dof_gradients);
     stage.advance();
-    poll();
   }
   for (std::size_t k = 0; k < images.size(); ++k) products[k] = basis.transpose_apply(dof_gradients[k]);
   return products;

@@ -29,7 +29,7 @@ GatedImage Problem::read_target(const std::string& file) const {
 
 template <class F>
 void Problem::render_parts(const std::vector<double>& theta, const EstimatorOptions& options, const Stream& stream,
-                           int samples, const std::string& name, const Poll& poll, F&& use) const {
+                           int samples, const std::string& name, F&& use) const {
   const int parts = std::min(32, samples);
   const Scene scene = parameters_->apply(theta);
   const Renderer renderer(scene, gates_, options);
@@ -38,25 +38,22 @@ void Problem::render_parts(const std::vector<double>& theta, const EstimatorOpti
     const SampleRange range = Share{i, parts}.of(samples);
     use(renderer.render(stream, range), range.count(), i, parts);
     stage.advance();
-    poll();
   }
 }
 
 GatedImage Problem::render_in_parts(const std::vector<double>& theta, const EstimatorOptions& options,
-                                    const Stream& stream, int samples, const std::string& name,
-                                    const Poll& poll) const {
+                                    const Stream& stream, int samples, const std::string& name) const {
   ImageMean mean;
-  render_parts(theta, options, stream, samples, name, poll,
+  render_parts(theta, options, stream, samples, name,
                [&](const GatedImage& image, int count, int, int) { mean.add(image, count); });
   return mean.mean();
 }
 
 SplitImage Problem::render_halves_in_parts(const std::vector<double>& theta, const EstimatorOptions& options,
-                                           const Stream& stream, int samples, const std::string& name,
-                                           const Poll& poll) const {
+                                           const Stream& stream, int samples, const std::string& name) const {
   ImageMean halves[2];
   int counts[2] = {};
-  render_parts(theta, options, stream, samples, name, poll, [&](const GatedImage& image, int count, int i, int parts) {
+  render_parts(theta, options, stream, samples, name, [&](const GatedImage& image, int count, int i, int parts) {
     const int half = 2 * i >= parts;
     halves[half].add(image, count);
     counts[half] += count;
@@ -65,15 +62,14 @@ SplitImage Problem::render_halves_in_parts(const std::vector<double>& theta, con
   return join_halves(halves[0].mean(), counts[0], halves[1].mean(), counts[1]);
 }
 
-GatedImage Problem::make_target(const Poll& poll) const {
+GatedImage Problem::make_target() const {
   const TargetSpec& target = experiment_.target;
   if (!target.images.empty()) return read_target(target.images);
   if (counts_) return *counts_;
   const Stream stream{target.seed, 0, pass_number(Pass::target)};
   EstimatorOptions options = estimator();
   options.max_bounces = target.max_bounces;
-  GatedImage image =
-      render_in_parts(parameters_->target(), options, stream, target.samples, "rendering the target", poll);
+  GatedImage image = render_in_parts(parameters_->target(), options, stream, target.samples, "rendering the target");
   const Stream noise{target.seed, 0, pass_number(Pass::photon_noise)};
   if (target.photons > 0) add_photon_noise(image, target.photons, noise);
   if (target.counts) draw_counts(image, noise);

@@ -33,18 +33,16 @@ constexpr int kProbes = 12;
 
 }  // namespace
 
-RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
-                                     const Poll& poll)
+RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta)
     : problem_(problem),
       target_(target),
       theta_(theta),
-      poll_(poll),
       prior_(problem.prior()),
       smoothing_{problem.penalty_scale(target).slopes, 0},
       priors_{0, problem.penalty_scale(target).priors},
       scene_(problem.parameters().apply(theta)),
       basis_(problem.parameters().tangent(theta)) {
-  Evaluation at = problem.evaluate(theta, target, kMatrixIteration, poll);
+  Evaluation at = problem.evaluate(theta, target, kMatrixIteration);
   first_gradient_ = std::move(at.gradient);
   weights_ = curvature_weights(at.image, target, problem.reading_loss(target));
 }
@@ -53,9 +51,9 @@ std::vector<std::vector<double>> RenderedCurvature::gradients() const {
   const Parameters& parameters = problem_.parameters();
   std::vector<std::vector<double>> gradients;
   for (int k = 0; k < kGradients; ++k)
-    gradients.push_back(within_bounds(
-        k == 0 ? first_gradient_ : problem_.evaluate(theta_, target_, kMatrixIteration + k, poll_).gradient, theta_,
-        parameters.lower(), parameters.upper()));
+    gradients.push_back(
+        within_bounds(k == 0 ? first_gradient_ : problem_.evaluate(theta_, target_, kMatrixIteration + k).gradient,
+                      theta_, parameters.lower(), parameters.upper()));
   return gradients;
 }
 
@@ -63,7 +61,7 @@ const std::vector<double>& RenderedCurvature::diagonal() const {
   if (!diagonal_.empty()) return diagonal_;
   std::vector<double> mean(theta_.size(), 0.0);
   for (const std::vector<double>& found :
-       probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbes}, poll_))
+       probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbes}))
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbes;
   for (const PenaltyScale& scale : {smoothing_, priors_}) prior_.add_diagonal(scale, mean);
   return diagonal_ = std::move(mean);
@@ -76,7 +74,7 @@ std::vector<double> RenderedCurvature::prior_diagonal() const {
 }
 
 Curvatures RenderedCurvature::readings(const TangentBasis& basis, std::uint32_t iteration) const {
-  JacobianHalves jacobian = render_jacobian(problem_, theta_, basis, iteration, poll_);
+  JacobianHalves jacobian = render_jacobian(problem_, theta_, basis, iteration);
   Evaluation found;
   gauss_newton(jacobian, std::vector<double>(weights_.size(), 0.0), weights_, found);
   return {std::move(found.curvature), std::move(found.curvature_bound), {}};
@@ -118,7 +116,7 @@ std::vector<std::vector<double>> RenderedCurvature::pulls(int count, std::uint32
   std::vector<std::vector<double>> means(count, std::vector<double>(theta_.size(), 0.0));
   for (std::uint32_t rendered = first; rendered < first + kRenderings; ++rendered) {
     const std::vector<std::vector<double>> found =
-        probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, rendered, poll_);
+        probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, rendered);
     for (int k = 0; k < count; ++k)
       for (std::size_t i = 0; i < theta_.size(); ++i) means[k][i] += found[k][i] / kRenderings;
   }
@@ -149,8 +147,7 @@ ApproximateInverse RenderedCurvature::preconditioner(std::vector<std::size_t> fr
 
 std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<std::vector<double>>& vectors) const {
   const SampleSpec& samples = problem_.experiment().samples;
-  JacobianHalves forward =
-      render_jacobian(problem_, theta_, combinations_of(basis_, vectors), kProductsIteration, poll_);
+  JacobianHalves forward = render_jacobian(problem_, theta_, combinations_of(basis_, vectors), kProductsIteration);
   const Renderer renderer = problem_.renderer(scene_, problem_.estimator(samples.visibility), &basis_);
   std::vector<std::vector<double>> products;
   std::vector<GatedImage> images(std::min<std::size_t>(kAdjointsTogether, vectors.size()), problem_.blank());
@@ -170,7 +167,6 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
         renderer.add_gradients(term, images, problem_.stream(pass_of(term), kProductsIteration),
                                half_of(samples.term(term), half), dof_gradients);
       }
-      poll_();
     }
     for (const std::vector<double>& dof_gradient : dof_gradients) {
       const std::vector<double>& vector = vectors[products.size()];

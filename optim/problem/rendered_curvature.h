@@ -26,8 +26,7 @@ struct PosteriorSamples {
 class RenderedCurvature : public CurvatureProducts {
  public:
   /// Problem, target and theta must outlive this; theta is one that can be rendered.
-  RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta,
-                    const Poll& poll);
+  RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta);
 
   /// Over all unknowns.
   Curvatures all() const;
@@ -60,7 +59,6 @@ class RenderedCurvature : public CurvatureProducts {
   const Problem& problem_;
   const GatedImage& target_;
   const std::vector<double>& theta_;
-  const Poll poll_;
   const QuadraticPenalty prior_;
   PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
   Scene scene_;

@@ -37,7 +37,6 @@ SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint
   const Renderer renderer = problem_.renderer(scene, problem_.estimator());
   SplitImage image =
       render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
-  poll_();
   return image;
 }
 
@@ -47,7 +46,7 @@ double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t i
 }
 
 Evaluation RenderedObjective::evaluate(const std::vector<double>& theta, std::uint32_t iteration) const {
-  return problem_.evaluate(theta, target_, iteration, poll_);
+  return problem_.evaluate(theta, target_, iteration);
 }
 
 Evaluation RenderedObjective::evaluate_part(const std::vector<double>& theta, std::uint32_t iteration,
@@ -56,7 +55,7 @@ Evaluation RenderedObjective::evaluate_part(const std::vector<double>& theta, st
   int most = samples.primal / 2;
   for (const Term term : kTerms)
     if (samples.term(term) > 0) most = std::min(most, samples.term(term));
-  return problem_.evaluate(theta, target_, iteration, poll_, {0, std::clamp(parts, 1, std::max(1, most))});
+  return problem_.evaluate(theta, target_, iteration, {0, std::clamp(parts, 1, std::max(1, most))});
 }
 
 Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::uint32_t iteration) const {
@@ -66,7 +65,7 @@ Evaluation RenderedObjective::linearise(const std::vector<double>& theta, std::u
   Evaluation result;
   set_loss(problem_.loss(image, target_, theta), result);
 
-  JacobianHalves jacobian = render_jacobian(problem_, theta, problem_.parameters().tangent(theta), iteration, poll_);
+  JacobianHalves jacobian = render_jacobian(problem_, theta, problem_.parameters().tangent(theta), iteration);
   gauss_newton(jacobian, loss_adjoint(image, target_, rho).data, curvature_weights(image.image, target_, rho), result);
   result.image = std::move(image.image);
   const PenaltyScale scale = problem_.penalty_scale(target_);
@@ -81,7 +80,7 @@ std::vector<std::vector<double>> RenderedObjective::probe_curvature(const std::v
                                                                     std::uint32_t iteration, const Evaluation& now,
                                                                     Probes probes) const {
   std::vector<std::vector<double>> diagonals = probe_diagonals(
-      problem_, theta, curvature_weights(now.image, target_, problem_.reading_loss(target_)), iteration, probes, poll_);
+      problem_, theta, curvature_weights(now.image, target_, problem_.reading_loss(target_)), iteration, probes);
   for (std::vector<double>& diagonal : diagonals)
     problem_.penalty().add_diagonal(problem_.penalty_scale(target_), diagonal);
   return diagonals;

@@ -17,9 +17,8 @@ void require_two_samples(const Problem& problem);
 
 class RenderedObjective : public Objective {
  public:
-  /// All must outlive this. `poll` is called between passes; what it throws leaves every function.
-  RenderedObjective(const Problem& problem, const GatedImage& target, Poll poll)
-      : problem_(problem), target_(target), poll_(std::move(poll)) {}
+  /// Both must outlive this.
+  RenderedObjective(const Problem& problem, const GatedImage& target) : problem_(problem), target_(target) {}
 
   const std::vector<double>& lower() const override { return problem_.parameters().lower(); }
   const std::vector<double>& upper() const override { return problem_.parameters().upper(); }
@@ -39,12 +38,10 @@ class RenderedObjective : public Objective {
   SplitImage render(const std::vector<double>& theta, std::uint32_t iteration) const;
   const Problem& problem() const { return problem_; }
   const GatedImage& target() const { return target_; }
-  const Poll& poll() const { return poll_; }
 
  private:
   const Problem& problem_;
   const GatedImage& target_;
-  Poll poll_;
 };
 
 }  // namespace isochron

@@ -170,7 +170,7 @@ TimeWindow time_window(const Mesh& mesh, const CaptureGeometry& geometry, const 
 void measure(const std::string& experiment, const Mesh& start, FitSettings& settings,
              const std::function<void(const std::string&)>& warning) {
   const Problem problem(load_experiment(experiment), warning);
-  const GatedImage counts = problem.make_target([] {});
+  const GatedImage counts = problem.make_target();
   const Readings& readings = problem.readings();
   std::vector<double> theta = problem.parameters().initial();
   for (const Parameters::Block& block : problem.parameters().blocks())

@@ -13,7 +13,7 @@ namespace {
 
 SplitImage render_expected(const Problem& problem, const std::vector<double>& theta, int samples, int number) {
   return problem.render_halves_in_parts(theta, problem.estimator(), problem.stream(Pass::histograms, number), samples,
-                                        "rendering the expected counts", [] {});
+                                        "rendering the expected counts");
 }
 
 /// The mean of two images of as many samples each, half by half.

@@ -111,18 +111,12 @@ class Levels {
   std::string folder(int level) const { return fmt::format("{}/levels/{}", folder_, level); }
   std::string file(const char* name) const { return folder_ + "/" + name; }
 
-  Poll poll() const {
-    return [this] {
-      if (options_.stop && options_.stop()) throw Interrupted{};
-    };
-  }
-
   void write_target() const {
     if (file_exists(file("target.exr"))) return;
     const Problem problem(experiment_);
     const Parameters& parameters = problem.parameters();
     GeometryFiles(folder_, experiment_.output, parameters).write("target", parameters.target());
-    write_exr(file("target.exr"), problem.make_target(poll()), exr_notes(experiment_.gates));
+    write_exr(file("target.exr"), problem.make_target(), exr_notes(experiment_.gates));
   }
 
   /// Makes the level's folder.

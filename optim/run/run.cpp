@@ -119,10 +119,6 @@ class Run {
  private:
   std::string path(const char* file) const { return options_.folder + "/" + file; }
 
-  void poll() const {
-    if (options_.stop && options_.stop()) throw Interrupted{};
-  }
-
   void load_target() {
     const std::string file = path("target.exr");
     const Clock::time_point start = Clock::now();
@@ -130,15 +126,14 @@ class Run {
       target_ = problem_.blank();
       return;
     }
-    if (!file_exists(file)) write_exr(file, problem_.make_target([this] { poll(); }), notes_);
+    if (!file_exists(file)) write_exr(file, problem_.make_target(), notes_);
     target_ = problem_.read_target(file);
     target_seconds_ = seconds_since(start);
   }
 
   std::unique_ptr<const Objective> make_objective() const {
-    const Poll poll = [this] { this->poll(); };
-    if (options_.loss) return std::make_unique<OwnLossObjective>(problem_, target_, poll, options_.loss);
-    return std::make_unique<RenderedObjective>(problem_, target_, poll);
+    if (options_.loss) return std::make_unique<OwnLossObjective>(problem_, target_, options_.loss);
+    return std::make_unique<RenderedObjective>(problem_, target_);
   }
 
   LoopResult optimise() {
@@ -186,15 +181,12 @@ class Run {
       if (!closing) report(first, seconds_since(call_start));
       if (options_.row) options_.row(last_, theta, now, closing);
     };
+    ProgressStage stage("optimising", std::max(1, spec.iterations - first));
     loop.save = [&] {
       state_.seconds += seconds_since(iteration_start);
       iteration_start = Clock::now();
       save_checkpoint(options_.folder, state_, parameters_);
-      poll();
-    };
-    ProgressStage stage("optimising", std::max(1, spec.iterations - first));
-    loop.save = [&, save = loop.save] {
-      save();
+      throw_if_stopped();
       stage.advance();
     };
     LoopResult result = run_loop(*objective, *optimizer, spec.window(), loop, state_);
@@ -202,9 +194,8 @@ class Run {
     write_exr(path("final.exr"), result.final.image, notes_);
     std::optional<RenderedCurvature> curvature;
     PosteriorSamples samples;
-    const Poll never = [] {};  // parallel loops are interrupted all the same
     if (options_.errors && !options_.loss && has_errors()) {
-      curvature.emplace(problem_, target_, state_.theta, never);
+      curvature.emplace(problem_, target_, state_.theta);
       samples = posterior_samples(*curvature);
     }
     judge_expected_counts();
@@ -270,9 +261,8 @@ class Run {
       fit_ = judge_rendered_fit(problem_, state_.theta, target_, expected, determined_,
                                 options_.errors ? kMostDoublings : 0);
     else
-      expected.image =
-          problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
-                                   experiment.output.histogram_samples, "rendering the expected counts", [] {});
+      expected.image = problem_.render_in_parts(state_.theta, problem_.estimator(), problem_.stream(Pass::histograms),
+                                                experiment.output.histogram_samples, "rendering the expected counts");
     if (histograms) write_histograms(path("final.h5"), experiment, problem_.scene(), expected.image);
   }
 

@@ -38,7 +38,6 @@ struct RunOptions {
   /// target then. A run remembers that it had one: it is not resumed without.
   OwnLoss loss;
   std::string loss_name;
-  std::function<bool()> stop;                     ///< asked between passes; true: leave a checkpoint and return
   std::function<void(const Progress&)> progress;  ///< after every row of the log
   /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends
   /// the run; Interrupted as `stop` does.
@@ -56,7 +55,7 @@ struct RunOptions {
   std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
 };
 
-/// Optimises from the initial values. Throws InputError, before any rendering, when the experiment does not
+/// Optimises from the initial values. A stop that is requested (progress.h) leaves a checkpoint. Throws InputError, before any rendering, when the experiment does not
 /// fit its scene, has no parameters, or the folder cannot be written or holds a run already.
 RunStatus start_run(const Experiment& experiment, const RunOptions& options);
 

@@ -15,7 +15,7 @@ namespace isochron {
 struct RunCost {
   int first_iteration = 0;    ///< the one that it began with
   double seconds = 0;         ///< target and closing images included
-  long long rays = 0;         ///< of the iterations
+  long long rays = 0;         ///< of all passes
   long long peak_memory = 0;  ///< of the process, bytes
   /// Seconds by what they were for, in the order in which they are written.
   std::vector<std::pair<std::string, double>> passes = {};

@@ -53,7 +53,7 @@ TEST_F(CheckTiny, SeesAFactorOfTwoAndAMissingTerm) {
   EXPECT_EQ(problem.experiment().samples.path_length, 0);  // a gaussian has no jumps
   std::vector<Comparison> table;
   for (int component : {0, 1})
-    for (const Comparison& row : check_derivative(problem, problem.parameters().initial(), component, [] {}))
+    for (const Comparison& row : check_derivative(problem, problem.parameters().initial(), component))
       table.push_back(row);
   ASSERT_EQ(table.size(), 4u);
   for (const Comparison& row : table) EXPECT_FALSE(disagrees(row, 4));  // false alarm: 1 %, seed fixed
@@ -108,7 +108,7 @@ TEST_F(CheckTiny, RareHitsAreFlagged) {
                                 "parameters[0]=", "samples={primal: 64, interior: 64, visibility: 0, path_length: 0}"}),
         notes));
     double least = INFINITY;
-    for (const Comparison& row : check_derivative(problem, problem.parameters().initial(), 0, [] {}))
+    for (const Comparison& row : check_derivative(problem, problem.parameters().initial(), 0))
       least = std::min(least, row.effective_count);
     return least;
   };
@@ -147,7 +147,7 @@ TEST_F(CheckTiny, ATinyStepMissesShadowEdges) {
   const Problem problem(check_experiment(load_experiment(file_, {"gates={kind: boxcar, centers: [4.5, 6], width: 0.5}",
                                                                  "gradient={step: 1e-6}", "samples.primal=64"}),
                                          notes));
-  const auto rows = check_derivative(problem, problem.parameters().initial(), 0, [] {});
+  const auto rows = check_derivative(problem, problem.parameters().initial(), 0);
   EXPECT_GT(rows[1].rounding, 0);
   EXPECT_EQ(finding(rows[0], 2), Finding::differs);
   EXPECT_EQ(finding(rows[1], 2), Finding::difference_saw_nothing);

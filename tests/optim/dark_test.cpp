@@ -36,8 +36,8 @@ const char* const kEmission = "{name: p, type: emission, shape: spot, initial: 7
 // 5 standard errors, 6e-7 by chance, seeds fixed.
 TEST_F(Dark, LossAtTheTruthIsZero) {
   const Problem problem(load(kAlbedo));
-  const GatedImage target = problem.make_target(kGoOn);
-  const RenderedObjective objective(problem, target, kGoOn);
+  const GatedImage target = problem.make_target();
+  const RenderedObjective objective(problem, target);
   const std::vector<double> truth = problem.parameters().target();
   const Scene scene = problem.parameters().apply(truth);
   const Renderer renderer(scene, problem.gates(), problem.estimator());
@@ -76,10 +76,10 @@ TEST_F(Dark, EveryMethodFindsTheTruth) {
       {kAlbedo, "{method: adam, iterations: 360, stop: {window: 90}}"},
       {kEmission, "{method: levenberg_marquardt, iterations: 30}"},
   };
-  const GatedImage target = Problem(load(kAlbedo)).make_target(kGoOn);  // the same for both
+  const GatedImage target = Problem(load(kAlbedo)).make_target();  // the same for both
   for (const OptimizerCase& c : cases) {
     const Problem problem(load(c.parameter, {std::string("optimizer=") + c.optimizer}));
-    const RenderedObjective objective(problem, target, kGoOn);
+    const RenderedObjective objective(problem, target);
     const OptimizerSpec& spec = problem.experiment().optimizer;
     const auto method = make_optimizer(spec, problem.preconditioner(), problem.parameters().scales());
     Checkpoint state;

@@ -128,7 +128,7 @@ class DetectorArray : public ::testing::Test {
   void write_counts(const std::string& parameters, double hot) const {
     const std::string target = "{samples: 4096, seed: 7, noise: {counts: true}}";
     const Problem problem(load_experiment(experiment(target, parameters, "{method: quasi_newton}")));
-    GatedImage counts = problem.make_target(kGoOn);
+    GatedImage counts = problem.make_target();
     Rng rng({11, 0, 0}, 0, 0);
     for (int g = 0; hot > 0 && g < counts.gates; ++g) counts.at(14, g, 0) += poisson(hot, rng);
     ASSERT_TRUE(write_histograms(folder_.file("counts.h5"), problem.experiment(), problem.scene(), counts));
@@ -166,7 +166,7 @@ TEST_F(DetectorArray, BinsOfTheFileEndWithTheWindow) {
   const std::string target = "{capture: counts.h5, window: [1.9, 2.54]}";  // centres 1.91 to 2.53
   const std::string file = experiment(target, parameters, "{method: quasi_newton}");
   const Problem cut(load_experiment(file, {"gates={kind: bins}"})), whole(load_experiment(file));
-  const GatedImage seen = cut.make_target(kGoOn), all = whole.make_target(kGoOn);
+  const GatedImage seen = cut.make_target(), all = whole.make_target();
   ASSERT_EQ(seen.gates, 32);
   ASSERT_EQ(all.gates, 80);
   EXPECT_NEAR(cut.gates().center(0), 1.91, 1e-12);
@@ -174,7 +174,7 @@ TEST_F(DetectorArray, BinsOfTheFileEndWithTheWindow) {
     for (int g = 0; g < seen.gates; ++g) EXPECT_EQ(seen.at(p, g), all.at(p, 25 + g));
   EXPECT_EQ(cut.readings().count(seen), whole.readings().count(all));
   const std::vector<double> theta = cut.parameters().initial();
-  const Evaluation one = cut.evaluate(theta, seen, 0, kGoOn), other = whole.evaluate(theta, all, 0, kGoOn);
+  const Evaluation one = cut.evaluate(theta, seen, 0), other = whole.evaluate(theta, all, 0);
   EXPECT_GT(one.loss, 0);
   EXPECT_NEAR(one.loss, other.loss, 0.02 * other.loss);
   const Problem none(load_experiment(file, {"gates={kind: bins}", "target.window=[1.4, 3]"}));
@@ -189,7 +189,7 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
   const Problem whole(load_experiment(file)), some(load_experiment(file, {"target.histograms=7"}));
   const Problem precise(load_experiment(
       file, {"target.histograms=7", "samples.primal=16384", "samples.interior=16384", "samples.path_length=16384"}));
-  const GatedImage counts = whole.make_target(kGoOn);
+  const GatedImage counts = whole.make_target();
   EXPECT_EQ(some.readings().count(counts), 7 * 80);
   EXPECT_NEAR(some.share_of_histograms(), 7.0 / 30, 1e-12);
   const std::vector<double> theta = some.parameters().initial();
@@ -203,18 +203,18 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
     }
   EXPECT_GT(light, 0);
   const long long before = some.rays();
-  some.evaluate(theta, counts, 0, kGoOn);
+  some.evaluate(theta, counts, 0);
   const long long of_some = some.rays() - before, none = whole.rays();
-  whole.evaluate(theta, counts, 0, kGoOn);
+  whole.evaluate(theta, counts, 0);
   EXPECT_NEAR(static_cast<double>(of_some) / (whole.rays() - none), 7.0 / 30, 0.05);
-  const Evaluation now = precise.evaluate(theta, counts, 0, kGoOn);
+  const Evaluation now = precise.evaluate(theta, counts, 0);
   for (const int unknown : {0, 1, 2}) {
     const double step = unknown == 0 ? 1e-3 : unknown == 1 ? 5 : 0.01;
     std::vector<double> above = theta, below = theta;
     above[unknown] += step;
     below[unknown] -= step;
     const double slope =
-        (precise.evaluate(above, counts, 0, kGoOn).loss - precise.evaluate(below, counts, 0, kGoOn).loss) / (2 * step);
+        (precise.evaluate(above, counts, 0).loss - precise.evaluate(below, counts, 0).loss) / (2 * step);
     EXPECT_NEAR(now.gradient[unknown] / slope, 1, 0.1) << unknown;
   }
   for (const int count : {1, 20, 29}) {
@@ -232,9 +232,9 @@ TEST_F(DetectorArray, SomeHistogramsAreUsed) {
 TEST_F(DetectorArray, EstimatesAtTheEndAreOfTheChosenHistograms) {
   const Problem problem(load_experiment(fit_of_gain_and_background("adam, learning_rate: 1"), {"target.histograms=7"}));
   ASSERT_TRUE(problem.redraws_histograms());
-  const GatedImage target = problem.make_target(kGoOn);
+  const GatedImage target = problem.make_target();
   const auto rendered = [&](std::uint32_t iteration) {
-    const GatedImage image = problem.evaluate(problem.parameters().initial(), target, iteration, kGoOn).image;
+    const GatedImage image = problem.evaluate(problem.parameters().initial(), target, iteration).image;
     std::vector<bool> pixels;
     for (int p = 0; p < image.pixels(); ++p) pixels.push_back(image.at(p, 0) > 0);  // by its background
     return pixels;
@@ -254,7 +254,7 @@ TEST_F(DetectorArray, SaysThatNoLightReachesTheChosenHistograms) {
   for (const char* z : {"0.05", "5"}) {
     const Problem problem(load_experiment(file, {"target.histograms=7", std::string("parameters[0].initial=") + z}));
     const std::vector<double>& theta = problem.parameters().initial();
-    const GatedImage target = problem.make_target(kGoOn), image = problem.evaluate(theta, target, 0, kGoOn).image;
+    const GatedImage target = problem.make_target(), image = problem.evaluate(theta, target, 0).image;
     const std::string warning = darkness_warning(problem, theta, image, target);
     if (z == std::string("5"))
       EXPECT_TRUE(warning.starts_with("no light reaches the gates of the image")) << warning;
@@ -275,14 +275,14 @@ TEST_F(DetectorArray, AdamDrawsOtherHistogramsInEachIteration) {
   ASSERT_TRUE(some.redraws_histograms());
   EXPECT_FALSE(Problem(load_experiment(file, {"target.histograms=7", "gradient.method=finite_difference"}))
                    .redraws_histograms());
-  const GatedImage counts = whole.make_target(kGoOn);
+  const GatedImage counts = whole.make_target();
   const std::vector<double> theta = some.parameters().initial();
   constexpr int kIterations = 200;
   std::vector<int> drawn(30, 0);
   ReplicateStatistics differences, noises;
   std::vector<double> scale(4);
   for (std::uint32_t i = 0; i < kIterations; ++i) {
-    const Evaluation one = some.evaluate(theta, counts, i, kGoOn), other = whole.evaluate(theta, counts, i, kGoOn);
+    const Evaluation one = some.evaluate(theta, counts, i), other = whole.evaluate(theta, counts, i);
     int lit = 0;
     for (int p = 0; p < 30; ++p) {
       const bool used = one.image.at(p, 0) != 0;
@@ -321,8 +321,8 @@ TEST_F(DetectorArray, EstimatesAreBlackWhereHistogramsAreLeftOut) {
   const Problem some(load_experiment(experiment("{capture: counts.h5}", parameters, "{method: quasi_newton}"),
                                      {"target.histograms=7"}));
   const std::vector<double> theta = some.parameters().initial();
-  const GatedImage image = estimate_image(some, theta, kGoOn).image.to_gated(),
-                   slope = estimate_derivatives(some, theta, 1, 1, kGoOn)[0].images[0].to_gated();
+  const GatedImage image = estimate_image(some, theta).image.to_gated(),
+                   slope = estimate_derivatives(some, theta, 1, 1)[0].images[0].to_gated();
   for (int p = 0; p < 30; ++p)
     for (int g = 0; g < 80; ++g) {
       const bool used = some.readings().uses_pixel(p);

@@ -43,7 +43,7 @@ TEST_F(Estimates, FewReplicatesKeepTheGainOfLowDiscrepancy) {
   for (int seed = 1; seed <= 24; ++seed) {
     const Problem tiny = problem(seed, "samples.primal=64");
     const std::vector<double> theta = tiny.parameters().initial();
-    ours.push_back(estimate_image(tiny, theta, [] {}).image.to_gated());
+    ours.push_back(estimate_image(tiny, theta).image.to_gated());
     ImageStatistics of_pairs(true);  // 32 pairs of samples, as it was
     for (int b = 0; b < 32; ++b) of_pairs.add(tiny.render(theta, tiny.stream(Pass::primal), {2 * b, 2 * b + 2}), 2);
     batches.push_back(of_pairs.mean());
@@ -57,8 +57,8 @@ TEST_F(Estimates, FewReplicatesKeepTheGainOfLowDiscrepancy) {
 TEST_F(Estimates, ImagesAreTargetsOfRunsWithTheSameSeed) {
   const Problem tiny = problem(1);
   const std::vector<double> theta = tiny.parameters().initial();
-  const GatedImage target = estimate_image(tiny, theta, [] {}).image.to_gated();
-  const Evaluation at = tiny.evaluate(theta, target, 0, [] {});
+  const GatedImage target = estimate_image(tiny, theta).image.to_gated();
+  const Evaluation at = tiny.evaluate(theta, target, 0);
   double variance = 0;
   for (std::size_t i = 0; i < target.data.size(); ++i)
     variance += (at.image.data[i] - target.data[i]) * (at.image.data[i] - target.data[i]) / target.data.size();
@@ -74,8 +74,8 @@ TEST_F(Estimates, ReportedErrorsAreThoseOfRepeats) {
     for (int seed = 1; seed <= kSeeds; ++seed) {
       const Problem tiny = problem(seed, sampling);
       const std::vector<double> theta = tiny.parameters().initial();
-      const Statistics image = estimate_image(tiny, theta, [] {}).gates;
-      const auto derivatives = estimate_derivatives(tiny, theta, 1, 1, [] {});  // by the lamp's power
+      const Statistics image = estimate_image(tiny, theta).gates;
+      const auto derivatives = estimate_derivatives(tiny, theta, 1, 1);  // by the lamp's power
       ASSERT_EQ(derivatives[1].component, "interior");
       int i = 0;
       for (const Statistics* s : {&image, &derivatives[1].gates[0]}) {

@@ -88,9 +88,9 @@ class Painted : public testing::Test {
 /// themselves, with a standard deviation of 0.005 over seeds (false alarms: 1e-17 for all).
 TEST_F(Painted, GradientsOfTheEndDifferByTheirNoiseAlone) {
   const Problem problem(load_experiment(experiment_));
-  const GatedImage target = problem.make_target([] {});
+  const GatedImage target = problem.make_target();
   const std::vector<double> theta = problem.parameters().initial();
-  const std::vector<std::vector<double>> gradients = RenderedCurvature(problem, target, theta, [] {}).gradients();
+  const std::vector<std::vector<double>> gradients = RenderedCurvature(problem, target, theta).gradients();
   ASSERT_GT(gradients.size(), 2u);
   for (std::size_t k = 0; k < gradients.size(); ++k) {
     std::vector<double> off = gradients[k];
@@ -145,7 +145,7 @@ double log_determinant(const std::vector<double>& a, const std::vector<double>& 
 /// these, 6e-7. A factor of 1.5 would show.
 TEST_F(Painted, TheDiagonalIsThatOfTheWholeMatrix) {
   const Fit fit = this->fit(1e-6);
-  const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta, [] {});
+  const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta);
   const std::vector<double>& diagonal = curvature.diagonal();
   const Curvatures all = curvature.all();
   const std::size_t n = fit.theta.size();
@@ -164,7 +164,7 @@ TEST_F(Painted, TheDiagonalIsThatOfTheWholeMatrix) {
 /// false alarms at 5 of them: 6e-7. Conjugate gradients end 5 % below, and the noise of the Jacobian adds to the samples.
 TEST_F(Painted, SamplesHaveTheCovarianceOfThePosterior) {
   const Fit fit = this->fit(1e-6);
-  const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta, [] {});
+  const RenderedCurvature curvature(*fit.problem, fit.target, fit.theta);
   const Curvatures all = curvature.all();
   // Without the gain, which its bounds hold all but fixed.
   const double expected = trace_of_solution(all.data, all.prior, fit.theta.size());
@@ -192,13 +192,13 @@ TEST_F(Painted, NoiseOfTheJacobianDeterminesNothing) {
   const std::string slopes = "parameters[0].smoothing.slopes=1e-4";
   const Problem problem(load_experiment(experiment_, {slopes})),
       noisy(load_experiment(experiment_, {slopes, "samples.interior=8"}));
-  const GatedImage target = problem.make_target([] {});
+  const GatedImage target = problem.make_target();
   const std::vector<double>& theta = problem.parameters().target();
-  const Curvatures all = RenderedCurvature(problem, target, theta, [] {}).all();
+  const Curvatures all = RenderedCurvature(problem, target, theta).all();
   const std::size_t n = theta.size();
   EXPECT_NEAR(static_cast<double>(n - 1) - trace_of_solution(all.data, all.prior, n), 6.6, 0.3);
   constexpr int kSamples = 120;
-  const PosteriorSamples samples = RenderedCurvature(noisy, target, theta, [] {}).samples(kSamples);
+  const PosteriorSamples samples = RenderedCurvature(noisy, target, theta).samples(kSamples);
   double determined = 0;
   for (int k = 0; k < kSamples; ++k)
     for (std::size_t i = 0; i + 1 < n; ++i) determined += samples.pulls[k][i] * samples.unknowns[k][i] / kSamples;
@@ -218,10 +218,10 @@ TEST_F(Painted, ErrorsOfSurfacesAreThoseAlongTheNormal) {
                "smoothing: {bending: 30, slopes: 0.01}}\n");
   const std::string shape = folder_.write("bent.yaml", text);
   const Problem problem(load_experiment(shape, {"samples.interior=16384"}));
-  const GatedImage target = problem.make_target([] {});
+  const GatedImage target = problem.make_target();
   const std::vector<double>& theta = problem.parameters().initial();
   ASSERT_TRUE(has_surface_errors(problem));
-  const RenderedCurvature curvature(problem, target, theta, [] {});
+  const RenderedCurvature curvature(problem, target, theta);
   const Curvatures all = curvature.all();
   const std::size_t n = theta.size(), m = n - 1;  // without the gain
   const std::vector<double> factor = cholesky(all.bound, all.prior, n);
@@ -309,8 +309,8 @@ TEST_F(Painted, EvidenceIsTheWeightOfTheMostProbableData) {
     const Fit fit = this->fit(w, kSamples);
     const Problem& problem = *fit.problem;
     const double readings = 1 / problem.penalty_scale(fit.target).priors, rank = kSide * (kSide + 2.0);
-    const Curvatures all = RenderedCurvature(problem, fit.target, fit.theta, [] {}).all();
-    const double loss = problem.evaluate(fit.theta, fit.target, 77, [] {}).loss;
+    const Curvatures all = RenderedCurvature(problem, fit.target, fit.theta).all();
+    const double loss = problem.evaluate(fit.theta, fit.target, 77).loss;
     return -readings * loss + 0.5 * rank * std::log(w) - 0.5 * log_determinant(all.bound, all.prior, fit.theta.size());
   };
   const double chosen = log_probability(weight), half = log_probability(weight / 2),

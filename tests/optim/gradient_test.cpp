@@ -21,11 +21,10 @@ TEST(Gradient, AgreesWithFiniteDifferences) {
   std::vector<std::string> with_method = samples;
   with_method.push_back("gradient={method: finite_difference, step: 0.01}");
   const Problem differences(load_experiment(file, with_method));
-  const Poll go_on = [] {};
-  const GatedImage target = analytic.make_target(go_on);
+  const GatedImage target = analytic.make_target();
   const std::vector<double> theta = analytic.parameters().initial();
-  const GradientEstimate a = estimate_gradient(analytic, theta, target, go_on);
-  const GradientEstimate b = estimate_gradient(differences, theta, target, go_on);
+  const GradientEstimate a = estimate_gradient(analytic, theta, target);
+  const GradientEstimate b = estimate_gradient(differences, theta, target);
   ASSERT_EQ(a.gradient.replicates, kMostReplicates);
   for (int i = 0; i < 2; ++i) {
     // Student's t of 7 degrees of freedom exceeds 8 with probability 9e-5.
@@ -41,11 +40,10 @@ TEST(Gradient, DifferencesOfIndependentImagesAreAsRightAndNoisier) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
-  const Poll go_on = [] {};
   const auto estimate = [&](const std::string& method) {
     const Problem problem(load_experiment(file, {"samples={primal: 512, interior: 0, visibility: 0, path_length: 0}",
                                                  "parameters[1].initial=2", method}));
-    return estimate_gradient(problem, problem.parameters().initial(), problem.make_target(go_on), go_on).gradient;
+    return estimate_gradient(problem, problem.parameters().initial(), problem.make_target()).gradient;
   };
   const auto common = estimate("gradient={method: finite_difference, step: 0.05}"),
              independent = estimate("gradient={method: finite_difference, step: 0.05, common_numbers: false}");
@@ -65,10 +63,9 @@ TEST(Gradient, OfAnEmissionIsKnown) {
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
   const Problem problem(load_experiment(
       file, {"samples={primal: 1024, interior: 1024, visibility: 0, path_length: 0}", "parameters[1].initial=2"}));
-  const Poll go_on = [] {};
-  const GatedImage target = problem.make_target(go_on);
+  const GatedImage target = problem.make_target();
   const std::vector<double> theta = problem.parameters().initial();
-  const GradientEstimate estimate = estimate_gradient(problem, theta, target, go_on);
+  const GradientEstimate estimate = estimate_gradient(problem, theta, target);
   const GatedImage image = problem.render(theta, {99, 0, 0}, {0, 8192});
   const double expected = inner_product(loss_adjoint(image, target), image) / theta[1];
   const double error = estimate.gradient.standard_error[1];
@@ -85,12 +82,11 @@ TEST(Gradient, ResidualAndDerivativeAreIndependent) {
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
   const Problem problem(load_experiment(
       file, {"samples={primal: 1, interior: 1, visibility: 0, path_length: 0}", "target.samples=16384"}));
-  const Poll go_on = [] {};
-  const GatedImage target = problem.make_target(go_on);
+  const GatedImage target = problem.make_target();
   const std::vector<double> theta = problem.parameters().target();
   ReplicateStatistics statistics;
   for (std::uint32_t i = 0; i < 1000; ++i) {
-    const Evaluation e = problem.evaluate(theta, target, i, go_on);
+    const Evaluation e = problem.evaluate(theta, target, i);
     GatedImage residual = e.image;
     for (std::size_t k = 0; k < residual.data.size(); ++k) residual.data[k] -= target.data[k];
     statistics.add({e.gradient[1], mean_square(residual)}, 1);
@@ -108,9 +104,8 @@ TEST(Gradient, ReplicatesOfALikelihoodHaveTwoHalvesEach) {
   const auto replicates = [&](int primal) {
     const Problem problem(load_experiment(
         file, {"loss={kind: poisson}", "samples={primal: " + std::to_string(primal) + ", interior: 16}"}));
-    const Poll go_on = [] {};
     const auto theta = problem.parameters().initial();
-    return estimate_gradient(problem, theta, problem.make_target(go_on), go_on).gradient.replicates;
+    return estimate_gradient(problem, theta, problem.make_target()).gradient.replicates;
   };
   EXPECT_EQ(replicates(8), 4);
   EXPECT_EQ(replicates(5), 2);

@@ -196,17 +196,16 @@ TEST(HeavyTail, NarrowGatesInABoxWithShadows) {
   // Pairs of lengths 0.0001 apart that a shadow edge parts are rare and weigh 1 / 0.0001: of a few million
   // pairs a few make most of the variance. At 0.3, 6 % of the path, nothing is heavy.
   const TemporaryFolder folder;
-  const Poll go_on = [] {};
   const Problem wide = box(folder, 0.3);
   const std::vector<double> theta = wide.parameters().initial();
   const auto of_derivatives = [&](const Problem& problem) {
     double least = INFINITY;
-    for (const DerivativeEstimate& e : estimate_derivatives(problem, theta, 0, 1, go_on))
+    for (const DerivativeEstimate& e : estimate_derivatives(problem, theta, 0, 1))
       if (e.component != "visibility") least = std::min(least, smallest(e.gates[0].effective_count));
     return least;
   };
   const auto of_gradient = [&](const Problem& problem) {
-    return smallest(estimate_gradient(problem, theta, problem.make_target(go_on), go_on).gradient.effective_count);
+    return smallest(estimate_gradient(problem, theta, problem.make_target()).gradient.effective_count);
   };
   EXPECT_GT(of_derivatives(wide), kFewestDeviations);
   EXPECT_GT(of_gradient(wide), kFewestDeviations);

@@ -18,7 +18,7 @@ class InspectionTest : public testing::Test {
   }
   Inspection run(const std::vector<std::string>& overrides, double seconds = 1) const {
     const Problem problem(load_experiment(file_, overrides));
-    return inspect(problem, problem.parameters().initial(), seconds, [] {});
+    return inspect(problem, problem.parameters().initial(), seconds);
   }
   TemporaryFolder folder_;
   std::string file_;
@@ -96,12 +96,11 @@ TEST_F(InspectionTest, PredictsTheVarianceThatRepeatsHave) {
     const Problem problem(load_experiment(
         file_, {"samples={primal: 16, interior: 2, visibility: 6}", "seed=" + std::to_string(3 + rerun)}));
     const std::vector<double> theta = problem.parameters().initial();
-    const GatedImage target = problem.make_target([] {});
-    const GradientVariance parts =
-        measure_cost(problem, theta, target, {true, true, false}, {16, 2, 6, 1}, [] {}).variance;
+    const GatedImage target = problem.make_target();
+    const GradientVariance parts = measure_cost(problem, theta, target, {true, true, false}, {16, 2, 6, 1}).variance;
     ReplicateStatistics repeats;
     for (int r = 0; r < kRepeats; ++r) {
-      std::vector<double> gradient = problem.evaluate(theta, target, r, [] {}).gradient;
+      std::vector<double> gradient = problem.evaluate(theta, target, r).gradient;
       gradient[0] *= 0.2;  // ways from initial to target
       gradient[1] *= 2;
       repeats.add(gradient, 1);

@@ -21,7 +21,7 @@ namespace {
 /// the samples of the gradient. The others are the experiment's.
 TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
-  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  write_exr(folder_.file("target.exr"), problem.make_target(), {});
   const Experiment asked = load_experiment(experiment(
       "flat",
       "smoothing: {slopes: 0.01}, remesh: {levels: 4, coarse_levels: 3, edge_length: 0.5, adam: {iterations: "
@@ -64,7 +64,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
 /// Of steps that are far too long: alone, the level's experiment warns that the loss rises.
 TEST_F(LevelsTest, LevelsByAdamDoNotWarn) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
-  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  write_exr(folder_.file("target.exr"), problem.make_target(), {});
   std::vector<std::string> warnings;
   RunOptions both = options();
   both.warning = [&](const std::string& text) { warnings.push_back(text); };
@@ -112,7 +112,7 @@ TEST(Remesh, EdgesAreHalvedBehindTheCoarseLevels) {
 /// last coarse ones have edges and steps of half the length.
 TEST_F(LevelsTest, AdamsStepsShrinkOnceInTheEnd) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
-  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  write_exr(folder_.file("target.exr"), problem.make_target(), {});
   const auto run = [&](int levels) {
     RunOptions anew = options();
     anew.force = true;
@@ -158,7 +158,7 @@ std::vector<double> last_property(const std::string& ply, int doubles) {
 /// the farthest of the surfaces that they have found. Levels keep a translation of the whole apart from their meshes.
 TEST_F(LevelsTest, ErrorsCountHowFarLevelsAreApart) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
-  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  write_exr(folder_.file("target.exr"), problem.make_target(), {});
   const std::string file = "/geometry/final_hill.ply";
   const std::string lift =
       "  - {name: lift, type: translation, shape: hill, direction: [0, 0, 1], initial: 0.02, target: 0.02}\n";

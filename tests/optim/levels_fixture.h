@@ -71,7 +71,7 @@ class LevelsTest : public testing::Test {
   /// Images of the hill itself.
   void write_target() {
     const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
-    write_exr(folder_.file("hill.exr"), problem.make_target(kGoOn), {});
+    write_exr(folder_.file("hill.exr"), problem.make_target(), {});
   }
 
   RunOptions options() {

@@ -166,7 +166,7 @@ TEST_F(LevelsTest, TheOutlineIsWhereAlbedosBecomeDark) {
     return text.replace(text.find("flat.obj"), 8, "small.obj");
   }());
   const Problem problem(load_experiment(experiment("small", "target: 0", "{samples: 256}")));
-  write_exr(folder_.file("target.exr"), problem.make_target(kGoOn), {});
+  write_exr(folder_.file("target.exr"), problem.make_target(), {});
   const std::string albedo =
       "  - {name: paint, type: albedo, per: vertex, shape: hill, initial: 0.4, smoothing: {slopes: 10}}\n";
   const auto of = [&](const std::string& outline) {

@@ -63,8 +63,8 @@ TEST(Memory, EstimatesHold) {
     std::ofstream("/proc/self/clear_refs") << 5;  // the peak counts from here
     const double before = status("VmRSS:");
     if (status("VmHWM:") > before + 0.1 * kImage) GTEST_SKIP() << "the system keeps the peak of what ran before";
-    const GatedImage target = problem.make_target(kGoOn);
-    problem.evaluate(problem.parameters().initial(), target, 0, kGoOn);
+    const GatedImage target = problem.make_target();
+    problem.evaluate(problem.parameters().initial(), target, 0);
     const double peak = status("VmHWM:") - before;
     EXPECT_LT(peak, estimated) << sampling;
     EXPECT_GT(peak, 0.25 * estimated) << sampling;

@@ -38,10 +38,8 @@ TEST(Methods, KnowsWhatAutomaticSamplingComesDownTo) {
     EXPECT_EQ(notes, std::vector<std::string>{"here: auto comes down to " + c.alike + ": measured once"});
 
     const std::vector<double> theta = runs[0].problem().parameters().initial();
-    const Poll poll = [] {};
-    const GatedImage target = runs[0].problem().make_target(poll);
-    EXPECT_EQ(runs[automatic].gradient(theta, target, 5, poll).gradient,
-              runs[alike].gradient(theta, target, 5, poll).gradient);
+    const GatedImage target = runs[0].problem().make_target();
+    EXPECT_EQ(runs[automatic].gradient(theta, target, 5).gradient, runs[alike].gradient(theta, target, 5).gradient);
   }
 }
 
@@ -52,13 +50,12 @@ TEST(Methods, AllOfThemKnowTheSlopeOfALikelihood) {
   folder.write("tiny.yaml", tiny_experiment());
   const Experiment experiment = load_experiment(folder.file("tiny.yaml"), {"loss={kind: poisson}"});
   std::vector<std::string> notes;
-  const Poll poll = [] {};
   for (const Method& method : methods_for(experiment, {0.05}, notes)) {
     SCOPED_TRACE(method.name);
     MethodRun run(experiment, method);
     run.set_factor(run.least_factor());
     const std::vector<double> theta = run.problem().parameters().initial();
-    EXPECT_NO_THROW(run.gradient(theta, run.problem().make_target(poll), 0, poll));
+    EXPECT_NO_THROW(run.gradient(theta, run.problem().make_target(), 0));
   }
 }
 

@@ -35,7 +35,7 @@ TEST(Problem, GradientOfDetectorUnderAWindow) {
   // Paths by standard sampling do not change with the offset, so that the difference has no noise of its own.
   const Problem standard = sampled("standard");
   const std::vector<double> theta = standard.parameters().initial();
-  GatedImage target = standard.make_target(kGoOn);
+  GatedImage target = standard.make_target();
   // The first gate is outside of the window.
   for (int p = 0; p < 64; ++p) target.at(p, 0) = std::numeric_limits<double>::quiet_NaN();
   const auto render = [&](double late) {
@@ -56,7 +56,7 @@ TEST(Problem, GradientOfDetectorUnderAWindow) {
     constexpr int kIterations = 300;
     double sum[3] = {0, 0, 0}, squares[3] = {0, 0, 0};
     for (int i = 0; i < kIterations; ++i) {
-      const Evaluation at = problem.evaluate(theta, target, test_seed(i), kGoOn);
+      const Evaluation at = problem.evaluate(theta, target, test_seed(i));
       for (int k = 0; k < 3; ++k) sum[k] += at.gradient[k], squares[k] += at.gradient[k] * at.gradient[k];
     }
     for (int k = 0; k < 3; ++k) {

@@ -110,19 +110,19 @@ TEST_F(ReadingsOfTiny, LossAndGradientAreThoseOfTheOthers) {
   for (const char* kind : {"{kind: squared}", "{kind: cauchy, scale: 0.3}", "{kind: poisson}"}) {
     const std::string loss = std::string("loss=") + kind;
     const Problem part(experiment({loss, "target.mask=left.npy"})), whole(experiment({loss}));
-    GatedImage target = part.make_target(kGoOn), other = target;
+    GatedImage target = part.make_target(), other = target;
     for (int p = 0; p < 64; ++p)
       for (int g = 0; g < 2; ++g)
         if (p % 8 >= 4) target.at(p, g) = std::numeric_limits<double>::quiet_NaN(), other.at(p, g) = 0;
     const std::vector<double> theta = part.parameters().initial();
-    const Evaluation at = RenderedObjective(part, target, kGoOn).linearise(theta, 0);
+    const Evaluation at = RenderedObjective(part, target).linearise(theta, 0);
     EXPECT_TRUE(std::isfinite(at.loss) && std::isfinite(at.gradient[0]) && std::isfinite(at.curvature[0])) << kind;
-    const Evaluation plain = RenderedObjective(part, other, kGoOn).linearise(theta, 0);
+    const Evaluation plain = RenderedObjective(part, other).linearise(theta, 0);
     EXPECT_EQ(at.loss, plain.loss);
     EXPECT_EQ(at.gradient, plain.gradient);
     EXPECT_EQ(at.curvature, plain.curvature);
     // Twice the mean over half of the readings is that over all of the left half's, where the others fit exactly.
-    GatedImage fits = part.make_target(kGoOn);
+    GatedImage fits = part.make_target();
     const SplitImage image{fits, GatedImage(8, 8, 2, 1), 0.5};
     for (int p = 0; p < 64; ++p)
       if (p % 8 < 4) fits.at(p, 0) *= 1.5;
@@ -165,9 +165,9 @@ TEST_F(ReadingsOfTiny, LikelihoodNeedsCounts) {
 
 TEST_F(ReadingsOfTiny, RenderedTargetsBecomeCounts) {
   const Problem clean(experiment({"target.samples=64"})), counted(experiment({"target.noise={counts: true}"}));
-  GatedImage expected = clean.make_target(kGoOn);
+  GatedImage expected = clean.make_target();
   draw_counts(expected, {7, 0, 6});
-  const GatedImage counts = counted.make_target(kGoOn);
+  const GatedImage counts = counted.make_target();
   EXPECT_EQ(counts.data, expected.data);
   for (double value : counts.data) EXPECT_EQ(value, std::floor(value));
 }

@@ -26,8 +26,8 @@ class Rendered : public testing::Test {
 TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
   for (const char* loss : {"loss={kind: squared}", "loss={kind: cauchy, scale: 0.3}"}) {
     const Problem problem(load_experiment(file_, {loss}));
-    const GatedImage target = problem.make_target(kGoOn);
-    const RenderedObjective objective(problem, target, kGoOn);
+    const GatedImage target = problem.make_target();
+    const RenderedObjective objective(problem, target);
     const std::vector<double> theta = problem.parameters().initial();
     const Evaluation at = objective.linearise(theta, 5), plain = objective.evaluate(theta, 5);
     EXPECT_EQ(at.loss, plain.loss);
@@ -68,8 +68,8 @@ TEST_F(Rendered, LinearisationIsMadeOfTheDerivativeImages) {
 // Their samples go to other pixels and gates. 2 components at 4.5 standard errors.
 TEST_F(Rendered, GradientsWithAndWithoutTheJacobianAgreeOnAverage) {
   const Problem problem(load_experiment(file_));
-  const GatedImage target = problem.make_target(kGoOn);
-  const RenderedObjective objective(problem, target, kGoOn);
+  const GatedImage target = problem.make_target();
+  const RenderedObjective objective(problem, target);
   const std::vector<double> theta = problem.parameters().initial();
   ReplicateStatistics differences;
   for (int i = 0; i < 200; ++i) {
@@ -87,11 +87,11 @@ TEST_F(Rendered, GradientsWithAndWithoutTheJacobianAgreeOnAverage) {
 TEST_F(Rendered, CurvatureIsUnbiased) {
   const Problem few(load_experiment(file_, {"samples={primal: 1, interior: 2, visibility: 2, path_length: 0}"}));
   const Problem many(load_experiment(file_, {"samples={primal: 1, interior: 8192, visibility: 8192, path_length: 0}"}));
-  const GatedImage target = few.make_target(kGoOn);
+  const GatedImage target = few.make_target();
   const std::vector<double> theta = few.parameters().initial();
-  const Evaluation exact = RenderedObjective(many, target, kGoOn).linearise(theta, 0);
+  const Evaluation exact = RenderedObjective(many, target).linearise(theta, 0);
   ReplicateStatistics statistics;
-  const RenderedObjective objective(few, target, kGoOn);
+  const RenderedObjective objective(few, target);
   for (std::uint32_t i = 1; i <= 200; ++i) {
     const Evaluation at = objective.linearise(theta, i);
     statistics.add({at.curvature[0], at.curvature[1], at.curvature[3], at.curvature_bound[0]}, 1);
@@ -110,12 +110,12 @@ std::vector<double> diagonal_by_readings(const Problem& problem, const std::vect
                                          const std::vector<double>& weights) {
   GatedImage adjoint = problem.blank();
   for (std::size_t k = 0; k < weights.size(); ++k) adjoint.data[k] = std::sqrt(weights[k]);
-  const std::vector<double> all = problem.transpose_apply(theta, adjoint, 3, kGoOn);
+  const std::vector<double> all = problem.transpose_apply(theta, adjoint, 3);
   std::vector<double> diagonal(all.size(), 0.0);
   for (std::size_t k = 0; k < weights.size(); ++k) {
     if (weights[k] == 0) continue;
     adjoint.data[k] *= -1;
-    const std::vector<double> turned = problem.transpose_apply(theta, adjoint, 3, kGoOn);
+    const std::vector<double> turned = problem.transpose_apply(theta, adjoint, 3);
     adjoint.data[k] *= -1;
     for (std::size_t i = 0; i < all.size(); ++i) diagonal[i] += std::pow((all[i] - turned[i]) / 2, 2);
   }
@@ -134,8 +134,8 @@ TEST_F(Rendered, ProbesAreTheDiagonalOfTheCurvature) {
       const Problem problem(load_experiment(
           file_, {"loss={kind: " + loss + "}", "estimator={sampling: standard, guiding: false, numbers: independent}",
                   "target.window=[5, 6]"}));
-      const GatedImage target = problem.make_target(kGoOn);
-      const RenderedObjective objective(problem, target, kGoOn);
+      const GatedImage target = problem.make_target();
+      const RenderedObjective objective(problem, target);
       const std::vector<double> theta = problem.parameters().initial();
       const Evaluation now = objective.evaluate(theta, 3);
       const std::vector<double> weights = curvature_weights(now.image, target, problem.reading_loss(target));
@@ -205,10 +205,10 @@ TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
     const std::string standard = "estimator={sampling: standard, numbers: independent}";
     const Problem with(load_experiment(file, {standard})),
         without(load_experiment(file, {standard, "parameters[0].smoothing={slopes: 0}"}));
-    const GatedImage target = with.make_target(kGoOn);
+    const GatedImage target = with.make_target();
     const std::vector<double> theta = with.parameters().initial();
-    const Evaluation a = RenderedObjective(with, target, kGoOn).linearise(theta, 0),
-                     b = RenderedObjective(without, target, kGoOn).linearise(theta, 0);
+    const Evaluation a = RenderedObjective(with, target).linearise(theta, 0),
+                     b = RenderedObjective(without, target).linearise(theta, 0);
     // Edges of the block's two triangles: four sides of length 1 and one diagonal of sqrt(2), from vertex 0
     // to 2.
     const double unit = 3 * mean_square(target) / 5;
@@ -217,9 +217,7 @@ TEST_F(Rendered, PenaltyIsPartOfLossGradientAndCurvature) {
     EXPECT_NEAR(a.gradient[0] - b.gradient[0], unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
     EXPECT_NEAR(a.curvature[2] - b.curvature[2], -unit * 2 / 2, 1e-12 * a.loss);
     EXPECT_EQ(a.mean_squared_error, b.mean_squared_error);
-    const auto gradient = [&](const Problem& p) {
-      return RenderedObjective(p, target, kGoOn).evaluate(theta, 0).gradient[0];
-    };
+    const auto gradient = [&](const Problem& p) { return RenderedObjective(p, target).evaluate(theta, 0).gradient[0]; };
     EXPECT_NEAR(gradient(with) - gradient(without), unit * 2 * (-0.1 + 0.1 - 0.2 / 2), 1e-12 * a.loss);
   }
 }
@@ -230,8 +228,8 @@ TEST_F(Rendered, EveryMethodFindsTheTinyScenesParameters) {
                                 "{method: levenberg_marquardt, iterations: 12}",
                                 "{method: quasi_newton, iterations: 12, inner_iterations: 5}"}) {
     const Problem problem(load_experiment(file_, {std::string("optimizer=") + optimizer, "target.samples=4096"}));
-    const GatedImage target = problem.make_target(kGoOn);
-    const RenderedObjective objective(problem, target, kGoOn);
+    const GatedImage target = problem.make_target();
+    const RenderedObjective objective(problem, target);
     const OptimizerSpec& spec = problem.experiment().optimizer;
     const auto method = make_optimizer(spec, problem.preconditioner(), problem.parameters().scales());
     Checkpoint state;
@@ -255,8 +253,8 @@ TEST_F(Rendered, OneRateFindsMetresDegreesAlbedosAndWatts) {
   const auto distances = [&](bool scaled) {
     const Problem problem(load_experiment(
         file_, {parameters, "optimizer={method: adam, learning_rate: 0.02, iterations: 150}", "target.samples=4096"}));
-    const GatedImage target = problem.make_target(kGoOn);
-    const RenderedObjective objective(problem, target, kGoOn);
+    const GatedImage target = problem.make_target();
+    const RenderedObjective objective(problem, target);
     const OptimizerSpec& spec = problem.experiment().optimizer;
     const Parameters& all = problem.parameters();
     const auto method = make_optimizer(spec, problem.preconditioner(), scaled ? all.scales() : std::vector<double>{});

@@ -129,16 +129,16 @@ TEST(SampleShare, PartsAreTheFirstSamples) {
   write_tiny_scene(folder);
   const Problem problem(load_experiment(folder.write(
       "tiny.yaml", replaced(tiny_experiment(), "interior: 16, visibility: 16", "interior: 8, visibility: 16"))));
-  const GatedImage target = problem.make_target(kGoOn);
-  const RenderedObjective objective(problem, target, kGoOn);
+  const GatedImage target = problem.make_target();
+  const RenderedObjective objective(problem, target);
   const std::vector<double> theta = problem.parameters().initial();
   const auto expect_same = [](const Evaluation& a, const Evaluation& b) {
     EXPECT_EQ(a.gradient, b.gradient);
     EXPECT_EQ(a.loss, b.loss);
   };
   expect_same(objective.evaluate_part(theta, 3, 1), objective.evaluate(theta, 3));
-  expect_same(objective.evaluate_part(theta, 3, 4), problem.evaluate(theta, target, 3, kGoOn, {0, 4}));
-  expect_same(objective.evaluate_part(theta, 3, 64), problem.evaluate(theta, target, 3, kGoOn, {0, 8}));
+  expect_same(objective.evaluate_part(theta, 3, 4), problem.evaluate(theta, target, 3, {0, 4}));
+  expect_same(objective.evaluate_part(theta, 3, 64), problem.evaluate(theta, target, 3, {0, 8}));
 }
 
 }  // namespace

@@ -103,8 +103,8 @@ TEST_F(SeveralShapes, GradientIsTheSumOfThoseOfEach) {
             "  - {name: other, type: translation, shape: lamp, direction: [0, 1, 0], initial: 0.1, target: 0}\n")));
   GatedImage adjoint = together.blank();
   std::fill(adjoint.data.begin(), adjoint.data.end(), 1.0);
-  const std::vector<double> sum = together.transpose_apply({0.1}, adjoint, 0, kGoOn);
-  const std::vector<double> parts = each.transpose_apply({0.1, 0.1}, adjoint, 0, kGoOn);
+  const std::vector<double> sum = together.transpose_apply({0.1}, adjoint, 0);
+  const std::vector<double> parts = each.transpose_apply({0.1, 0.1}, adjoint, 0);
   EXPECT_NE(parts[0], 0);
   EXPECT_NE(parts[1], 0);
   EXPECT_NEAR(sum[0], parts[0] + parts[1], 1e-9 * (std::abs(parts[0]) + std::abs(parts[1])));

@@ -105,7 +105,6 @@ TEST(Stability, RotationsAreSteppedInRadians) {
   options.widths = {0.2};
   options.core_seconds = 2;
   options.iterations = iterations;
-  options.poll = kGoOn;
   options.progress = [](const std::string&) {};
   const Stability map = map_stability(load_experiment(folder.file("tilt.yaml")), options);
   ASSERT_FALSE(map.cells.empty());

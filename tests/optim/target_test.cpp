@@ -83,11 +83,11 @@ TEST(Target, NoiseComesOnTopOfTheRenderedImages) {
   const TemporaryFolder folder;
   write_tiny_scene(folder);
   const std::string file = folder.write("tiny.yaml", tiny_experiment());
-  const GatedImage clean = Problem(load_experiment(file)).make_target([] {});
+  const GatedImage clean = Problem(load_experiment(file)).make_target();
   GatedImage expected = clean;
   add_photon_noise(expected, 50, {7, 0, 6});
   const Problem noisy(load_experiment(file, {"target.noise={photons: 50}"}));
-  EXPECT_EQ(noisy.make_target([] {}).data, expected.data);
+  EXPECT_EQ(noisy.make_target().data, expected.data);
   EXPECT_NE(expected.data, clean.data);
   EXPECT_THROW(load_experiment(file, {"target.noise={photons: 0}"}), InputError);
 }

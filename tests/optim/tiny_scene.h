@@ -6,9 +6,6 @@
 
 namespace isochron {
 
-/// For what may be stopped from outside: nothing stops it.
-inline const Poll kGoOn = [] {};
-
 /// A floor, a raised quad and a lamp seen by 8 x 8 pixels; path lengths about 3.5 to 6.
 inline void write_tiny_scene(const TemporaryFolder& folder) {
   folder.write("floor.obj", "v -2 0 -2\nv -2 0 2\nv 2 0 2\nv 2 0 -2\nf 1 2 3 4\n");
