@@ -79,10 +79,6 @@ int pixels_of(const Problem& problem) {
   return problem.scene().camera.width * problem.scene().camera.height;
 }
 
-bool by_differences(const Problem& problem) {
-  return problem.experiment().gradient.method == GradientMethod::finite_difference;
-}
-
 /// Only `total`, from so many images that `difference(stream, range)` makes.
 template <class Difference>
 std::vector<DerivativeEstimate> differences(const Problem& problem, int count, std::uint32_t iteration,
@@ -144,7 +140,7 @@ ImageEstimate estimate_image(const Problem& problem, const std::vector<double>& 
 
 std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, const std::vector<double>& theta,
                                                      int first, int count, int most_replicates) {
-  if (by_differences(problem))
+  if (problem.by_differences())
     return differences(problem, count, 0, most_replicates, [&](const Stream& stream, SampleRange range) {
       std::vector<GatedImage> images;
       for (int i = first; i < first + count; ++i) images.push_back(problem.finite_difference(theta, i, stream, range));
@@ -156,7 +152,7 @@ std::vector<DerivativeEstimate> estimate_derivatives(const Problem& problem, con
 
 std::vector<DerivativeEstimate> estimate_tangent(const Problem& problem, const std::vector<double>& theta,
                                                  const std::vector<double>& tangent, std::uint32_t iteration) {
-  if (by_differences(problem))
+  if (problem.by_differences())
     return differences(problem, 1, iteration, kMostReplicates, [&](const Stream& stream, SampleRange range) {
       GatedImage sum = problem.blank();
       for (int i = 0; i < problem.parameters().size(); ++i) {
@@ -183,7 +179,7 @@ int gradient_repeats(const Problem& problem) {
     samples /= 2;
   }
   int repeats = replicate_count(samples, pixels, false, kMostReplicates);
-  if (problem.experiment().gradient.method == GradientMethod::finite_difference) return repeats;
+  if (problem.by_differences()) return repeats;
   for (Term term : kTerms) {
     if (spec.term(term) == 0) continue;
     require_replicates(name(term), spec.term(term));

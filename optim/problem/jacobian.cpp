@@ -27,7 +27,7 @@ void add_half(const Problem& problem, const std::vector<double>& theta, const Ta
     });
   };
   const int columns = static_cast<int>(jacobian.unknowns);
-  if (problem.experiment().gradient.method == GradientMethod::finite_difference) {
+  if (problem.by_differences()) {
     for (int i = 0; i < columns; ++i) {
       add(i, problem.finite_difference(theta, i, problem.stream(Pass::finite_difference, iteration),
                                        half_of(samples.primal, half)));
@@ -62,7 +62,7 @@ double linearisation_bytes(const Problem& problem, double columns) {
 
 JacobianHalves render_jacobian(const Problem& problem, const std::vector<double>& theta, const TangentBasis& basis,
                                std::uint32_t iteration) {
-  const bool differences = problem.experiment().gradient.method == GradientMethod::finite_difference;
+  const bool differences = problem.by_differences();
   JacobianHalves jacobian(static_cast<std::size_t>(residual_count(problem)),
                           differences ? theta.size() : static_cast<std::size_t>(basis.columns));
   for (const int half : {0, 1}) add_half(problem, theta, basis, iteration, half, jacobian);

@@ -128,8 +128,7 @@ std::vector<MemoryUse> image_memory(const Problem& problem) {
 std::vector<MemoryUse> derivative_memory(const Problem& problem, int columns) {
   constexpr int kComponents = 4;
   const Experiment& experiment = problem.experiment();
-  if (experiment.gradient.method == GradientMethod::finite_difference)
-    return difference_memory(problem, kMostReplicates * columns);
+  if (problem.by_differences()) return difference_memory(problem, kMostReplicates * columns);
   const int samples =
       std::max({experiment.samples.interior, experiment.samples.visibility, experiment.samples.path_length});
   return {{fmt::format("derivative images of {} unknown{}", columns, columns == 1 ? "" : "s"),

@@ -128,7 +128,7 @@ Problem::Problem(Experiment experiment, const std::function<void(const std::stri
     const ParameterSpec& spec = experiment_.parameters[i];
     const Parameters::Block& block = parameters_->blocks()[i];
     if (spec.diffusion > 0) preconditioner_.add_diffusion(scene_, parameters_->vertex_field(block), spec.diffusion);
-    if (spec.evidence && experiment_.gradient.method == GradientMethod::finite_difference)
+    if (spec.evidence && by_differences())
       spec.fail("smoothing", "evidence needs products with the Jacobian, which finite differences have not",
                 "gradient: {method: analytic}");
     const bool smooth_prior = spec.bends() || spec.tangential > 0 || spec.evidence;
@@ -214,8 +214,7 @@ const EstimatorOptions& Problem::estimator(Purpose purpose) const {
     const double interior = samples.interior, one = std::max(1.0, interior);
     Job job{0, interior, samples.visibility / one, samples.path_length / one};
     if (purpose == Purpose::gradients) {
-      const double images =
-          experiment_.gradient.method == GradientMethod::finite_difference ? 1 + 2 * parameters_->size() : 1;
+      const double images = by_differences() ? 1 + 2 * parameters_->size() : 1;
       job.image = evaluations_ * images * samples.primal;
       job.interior *= evaluations_;
       if (!experiment_.target.measured()) job.image += experiment_.target.samples;

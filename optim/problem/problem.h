@@ -174,7 +174,17 @@ class Problem {
   /// Whether paths can change their length, gates jump, and no samples are there for that.
   bool leaves_out_jumps() const;
 
+  /// Whether derivatives are differences of images.
+  bool by_differences() const;
+
  private:
+  /// The same with a renderer of the scene at theta, by a share of the samples; `parts`: see evaluate(), of the first image.
+  std::vector<std::vector<double>> transpose_apply(const std::vector<double>& theta, std::span<const GatedImage> images,
+                                                   std::uint32_t iteration, const Renderer& renderer,
+                                                   const TangentBasis& basis, Share share, ProgressStage& stage,
+                                                   std::vector<std::vector<double>>* parts = nullptr) const;
+  /// Of a gradient, for a ProgressStage.
+  int gradient_steps() const;
   EstimatorOptions guided(EstimatorOptions options, int visibility_samples) const;
   /// As `target.histograms` says, in the readings and in the scene.
   void leave_out_histograms();

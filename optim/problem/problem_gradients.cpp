@@ -1,5 +1,6 @@
 // What iterations ask of a Problem: losses with their gradients, and products with the transposed Jacobian.
 #include <algorithm>
+#include <utility>
 
 #include "core/base/parallel.h"
 #include "optim/problem/loss.h"
@@ -21,39 +22,14 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const TangentBasis basis = parameters_->tangent(theta);
   const Renderer renderer = this->renderer(scene, estimator(share.of(samples.visibility).count()), &basis);
   Evaluation result;
-  const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
-  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
-  ProgressStage stage("evaluating the loss", 1 + (differences ? parameters_->size() : static_cast<int>(terms)));
+  ProgressStage stage("evaluating the loss", 1 + gradient_steps());
   SplitImage image = render_halves(renderer, stream(Pass::primal, iteration), share.of(samples.primal));
   set_loss(loss(image, target, theta, rho), result);
   const GatedImage adjoint = loss_adjoint(image, target, rho);
   stage.advance();
   result.image = std::move(image.image);
-  if (differences) {
-    if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
-    for (int i = 0; i < parameters_->size(); ++i) {
-      const GatedImage derivative =
-          finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(samples.primal));
-      result.gradient.push_back(inner_product(adjoint, derivative));
-      stage.advance();
-      const std::size_t values = derivative.data.size() / derivative.pixels();
-      for (std::size_t k = 0; parts && k < derivative.data.size(); ++k)
-        (*parts)[k / values % kGradientParts][i] += adjoint.data[k] * derivative.data[k];
-    }
-    penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
-    return result;
-  }
-  std::vector<double> dof_gradient(DofLayout(scene).size(), 0.0);
-  for (Term term : kTerms) {
-    const SampleRange range = share.of(samples.term(term));
-    if (range.count() == 0) continue;
-    std::vector<std::vector<double>> of_term;
-    renderer.add_gradient(term, adjoint, stream(pass_of(term), iteration), range, dof_gradient,
-                          parts ? &of_term : nullptr);
-    if (parts) parts->insert(parts->end(), of_term.begin(), of_term.end());
-    stage.advance();
-  }
-  result.gradient = basis.transpose_apply(dof_gradient);
+  result.gradient =
+      std::move(transpose_apply(theta, {&adjoint, 1}, iteration, renderer, basis, share, stage, parts)[0]);
   penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
   return result;
 }
@@ -61,31 +37,54 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
 std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<double>& theta,
                                                           std::span<const GatedImage> images,
                                                           std::uint32_t iteration) const {
+  const Scene scene = parameters_->apply(theta);
+  const TangentBasis basis = parameters_->tangent(theta);
+  const Renderer renderer = this->renderer(scene, estimator(experiment_.samples.visibility), &basis);
+  ProgressStage stage("differentiating", gradient_steps());
+  return transpose_apply(theta, images, iteration, renderer, basis, {}, stage);
+}
+
+std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<double>& theta,
+                                                          std::span<const GatedImage> images, std::uint32_t iteration,
+                                                          const Renderer& renderer, const TangentBasis& basis,
+                                                          Share share, ProgressStage& stage,
+                                                          std::vector<std::vector<double>>* parts) const {
   const SampleSpec& samples = experiment_.samples;
-  const bool differences = experiment_.gradient.method == GradientMethod::finite_difference;
-  const auto terms = std::count_if(std::begin(kTerms), std::end(kTerms), [&](Term t) { return samples.term(t) > 0; });
-  ProgressStage stage("differentiating", differences ? parameters_->size() : static_cast<int>(terms));
   std::vector<std::vector<double>> products(images.size());
-  if (differences) {
+  if (by_differences()) {
+    if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
     for (int i = 0; i < parameters_->size(); ++i) {
       const GatedImage difference =
-          finite_difference(theta, i, stream(Pass::finite_difference, iteration), {0, samples.primal});
+          finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(samples.primal));
       for (std::size_t k = 0; k < images.size(); ++k) products[k].push_back(inner_product(images[k], difference));
+      const std::size_t values = difference.data.size() / difference.pixels();
+      for (std::size_t k = 0; parts && k < difference.data.size(); ++k)
+        (*parts)[k / values % kGradientParts][i] += images[0].data[k] * difference.data[k];
       stage.advance();
     }
     return products;
   }
-  const Scene scene = parameters_->apply(theta);
-  const TangentBasis basis = parameters_->tangent(theta);
-  const Renderer renderer = this->renderer(scene, estimator(samples.visibility), &basis);
-  std::vector<std::vector<double>> dof_gradients(images.size(), std::vector<double>(DofLayout(scene).size(), 0.0));
-  for (Term term : kTerms) {
-    if (samples.term(term) == 0) continue;
-    renderer.add_gradients(term, images, stream(pass_of(term), iteration), {0, samples.term(term)}, dof_gradients);
+  std::vector<std::vector<double>> dof_gradients(images.size(), std::vector<double>(basis.row_begin.size() - 1, 0.0));
+  for (const Term term : kTerms) {
+    const SampleRange range = share.of(samples.term(term));
+    if (range.count() == 0) continue;
+    std::vector<std::vector<double>> of_term;
+    renderer.add_gradients(term, images, stream(pass_of(term), iteration), range, dof_gradients,
+                           parts ? &of_term : nullptr);
+    if (parts) parts->insert(parts->end(), of_term.begin(), of_term.end());
     stage.advance();
   }
   for (std::size_t k = 0; k < images.size(); ++k) products[k] = basis.transpose_apply(dof_gradients[k]);
   return products;
+}
+
+bool Problem::by_differences() const {
+  return experiment_.gradient.method == GradientMethod::finite_difference;
+}
+
+int Problem::gradient_steps() const {
+  const auto has = [&](Term term) { return experiment_.samples.term(term) > 0; };
+  return by_differences() ? parameters_->size() : static_cast<int>(std::ranges::count_if(kTerms, has));
 }
 
 GatedImage Problem::finite_difference(const std::vector<double>& theta, int component, const Stream& stream,

@@ -93,7 +93,9 @@ Curvatures RenderedCurvature::within(const std::vector<std::vector<double>>& col
   Curvatures result = readings(combinations_of(basis_, columns), kMatrixIteration);
   std::size_t entry = 0;
   for (const std::vector<double>& a : columns) {
-    const std::vector<double> smoothing = penalty_product(smoothing_, a), priors = penalty_product(priors_, a);
+    std::vector<double> smoothing(a.size(), 0.0), priors = smoothing;
+    prior_.add_product(smoothing_, a, smoothing);
+    prior_.add_product(priors_, a, priors);
     for (const std::vector<double>& b : columns) {
       result.prior.push_back(dot(smoothing, b));
       for (std::vector<double>* matrix : {&result.data, &result.bound}) (*matrix)[entry] += dot(priors, b);
@@ -101,15 +103,6 @@ Curvatures RenderedCurvature::within(const std::vector<std::vector<double>>& col
     }
   }
   return result;
-}
-
-std::vector<double> RenderedCurvature::penalty_product(PenaltyScale scale, const std::vector<double>& vector) const {
-  std::vector<double> product(vector.size(), 0.0), nothing = product,
-                                                   constant = product;  // the gradient is linear but for a constant
-  prior_.add_gradient(vector, scale, product);
-  prior_.add_gradient(nothing, scale, constant);
-  for (std::size_t i = 0; i < product.size(); ++i) product[i] -= constant[i];
-  return product;
 }
 
 std::vector<std::vector<double>> RenderedCurvature::pulls(int count, std::uint32_t first) const {
@@ -169,12 +162,8 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
       }
     }
     for (const std::vector<double>& dof_gradient : dof_gradients) {
-      const std::vector<double>& vector = vectors[products.size()];
       products.push_back(basis_.transpose_apply(dof_gradient));
-      for (const PenaltyScale& scale : {smoothing_, priors_}) {
-        const std::vector<double> penalty = penalty_product(scale, vector);
-        for (std::size_t i = 0; i < penalty.size(); ++i) products.back()[i] += penalty[i];
-      }
+      prior_.add_product({smoothing_.slopes, priors_.priors}, vectors[products.size() - 1], products.back());
     }
   }
   return products;

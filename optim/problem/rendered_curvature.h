@@ -54,7 +54,6 @@ class RenderedCurvature : public CurvatureProducts {
   Curvatures readings(const TangentBasis& basis, std::uint32_t iteration) const;
   /// The part of the readings in the gradients that samples solve for, the mean over renderings from iteration `first` on.
   std::vector<std::vector<double>> pulls(int count, std::uint32_t first) const;
-  std::vector<double> penalty_product(PenaltyScale scale, const std::vector<double>& vector) const;
 
   const Problem& problem_;
   const GatedImage& target_;

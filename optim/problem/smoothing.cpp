@@ -120,6 +120,15 @@ void QuadraticPenalty::add_gradient(const std::vector<double>& theta, PenaltySca
   }
 }
 
+void QuadraticPenalty::add_product(PenaltyScale scale, const std::vector<double>& vector,
+                                   std::vector<double>& product) const {
+  for (const Square& s : squares_) {
+    double sum = 0;
+    for (const auto& [i, factor] : s.form.entries) sum += factor * vector[i];
+    for (const auto& [i, factor] : s.form.entries) product[i] += 2 * s.scaled(scale) * sum * factor;
+  }
+}
+
 void QuadraticPenalty::add_diagonal(PenaltyScale scale, std::vector<double>& diagonal) const {
   for (const Square& s : squares_)
     for (const auto& [i, factor] : s.form.entries) diagonal[i] += 2 * s.scaled(scale) * factor * factor;

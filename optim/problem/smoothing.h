@@ -53,6 +53,8 @@ class QuadraticPenalty {
   bool empty() const { return squares_.empty(); }
   double value(const std::vector<double>& theta, PenaltyScale scale) const;
   void add_gradient(const std::vector<double>& theta, PenaltyScale scale, std::vector<double>& gradient) const;
+  /// Adds the second derivative times `vector`.
+  void add_product(PenaltyScale scale, const std::vector<double>& vector, std::vector<double>& product) const;
   /// Whether it depends on unknowns of the block.
   bool holds(const Parameters::Block& block) const;
   /// Adds the second derivative, n x n row after row.

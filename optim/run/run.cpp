@@ -220,14 +220,13 @@ class Run {
     return unknowns <= kMostTogether && linearisation_bytes(problem_, unknowns) <= kMostLinearisationBytes;
   }
 
-  bool by_differences() const { return problem_.experiment().gradient.method == GradientMethod::finite_difference; }
-
-  bool has_errors() const { return problem_.can_render(state_.theta) && (together() || !by_differences()); }
+  bool has_errors() const { return problem_.can_render(state_.theta) && (together() || !problem_.by_differences()); }
 
   /// Of the final parameters, where anything is made of them.
   PosteriorSamples posterior_samples(const RenderedCurvature& curvature) {
     const bool surfaces = has_surface_errors(problem_);
-    if (by_differences() || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty()))) return {};
+    if (problem_.by_differences() || !(surfaces || (has_fit(problem_, target_) && !problem_.penalty().empty())))
+      return {};
     PosteriorSamples samples = curvature.samples();
     determined_ = determined_unknowns(problem_, free_unknowns(problem_, state_.theta), samples);
     return samples;
