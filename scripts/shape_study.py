@@ -163,7 +163,7 @@ def table_of(rows):
     table = []
     for shape in dict.fromkeys(shape for shape, _ in by):
         fit, other = by[shape, "fit"], by[shape, "back_projection"]
-        cells = [f"{fit[key]} / {other[key]}" for key in ("median_mm", "within_80_mm", "silhouette", "seconds")]
+        cells = [f"{fit[key]} / {other[key]}" if fit[key] else "" for key in ("median_mm", "within_80_mm", "silhouette", "seconds")]
         table.append([shape.replace("_", " "), *cells, fit["verdict"], f"{100 * float(fit['covered']):.1f} %"])
     return markdown(["shape", "median, mm", "80 %, mm", "silhouette", "seconds", "verdict", "within 3 errors"], table)
 
