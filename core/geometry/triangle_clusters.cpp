@@ -47,12 +47,11 @@ void TriangleClusters::divide(Item* begin, Item* end) {
 }
 
 void TriangleClusters::fit(const Scene& scene, int shape) {
-  constexpr int kChunk = 512;
-  const int begin = first_[shape], end = first_[shape + 1];
-  parallel((end - begin + kChunk - 1) / kChunk, [&](int chunk) {
-    for (int i = begin + chunk * kChunk; i < std::min(begin + (chunk + 1) * kChunk, end); ++i) fit_cluster(scene, i);
+  const int first = first_[shape], count = first_[shape + 1] - first;
+  parallel_ranges(count, 512, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) fit_cluster(scene, first + static_cast<int>(i));
   });
-  if (begin != end) fit_node(root(shape));
+  if (count > 0) fit_node(root(shape));
 }
 
 void TriangleClusters::fit_cluster(const Scene& scene, int i) {

@@ -72,10 +72,9 @@ void PreparedScene::update(const Scene& source, const TangentBasis* basis, const
     any_changed = true;
     shape_changed_[s] = revision_;
     const Shape& shape = scene.shapes[s];
-    constexpr int kChunk = 4096;
-    parallel((shape.triangle_count + kChunk - 1) / kChunk, [&](int chunk) {
-      const int begin = chunk * kChunk, end = std::min(begin + kChunk, shape.triangle_count);
-      for (int t = shape.first_triangle + begin; t < shape.first_triangle + end; ++t) {
+    parallel_ranges(shape.triangle_count, 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const int t = shape.first_triangle + static_cast<int>(i);
         const auto& v = scene.triangles[t].vertex;
         if (same_pattern && !moved[v[0]] && !moved[v[1]] && !moved[v[2]]) continue;
         update_record(t);

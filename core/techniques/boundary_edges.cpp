@@ -118,12 +118,11 @@ void BoundaryEdges::update(const PreparedScene& scene) {
 
 bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all) {
   if (!all && scene.shape_changed(shape) <= revision_) return false;
-  const int first = scene.scene.shapes[shape].first_edge, last = first + scene.scene.shapes[shape].edge_count;
-  constexpr int kChunk = 4096, kAhead = 8;
-  parallel((last - first + kChunk - 1) / kChunk, [&](int chunk) {
-    const int begin = first + chunk * kChunk, end = std::min(begin + kChunk, last);
-    std::vector<int> edges;
-    for (int i = begin; i < end; ++i) {
+  const int first = scene.scene.shapes[shape].first_edge;
+  constexpr int kAhead = 8;
+  parallel_ranges(scene.scene.shapes[shape].edge_count, 4096, [&](std::size_t begin, std::size_t end) {
+    std::vector<std::size_t> edges;
+    for (std::size_t i = first + begin; i < first + end; ++i) {
       const auto& face = scene.scene.edges[i].face;
       // What is next to a face may depend on all that meet there.
       if (all || scene.scene.edges[i].sector || scene.changed(face[0]) > revision_ ||
@@ -133,7 +132,7 @@ bool BoundaryEdges::update_shape(const PreparedScene& scene, int shape, bool all
     for (std::size_t k = 0; k < edges.size(); ++k) {
       if (k + kAhead < edges.size())
         for (const int t : scene.scene.edges[edges[k + kAhead]].face) scene.prefetch(std::max(t, 0));
-      update_edge(scene, static_cast<std::size_t>(edges[k]));
+      update_edge(scene, edges[k]);
     }
   });
   return true;

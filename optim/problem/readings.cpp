@@ -32,8 +32,8 @@ void parallel_pixels(const GatedImage& image, const std::function<void(int)>& f)
   constexpr int kReadings =
       1 << 15;  // of a chunk: many beside what it takes to share one out, few beside an image; not tuned
   const int pixels = image.pixels(), chunk = std::max(1, kReadings / std::max(1, image.gates * image.channels));
-  parallel((pixels + chunk - 1) / chunk, [&](int number) {
-    for (int p = number * chunk; p < std::min((number + 1) * chunk, pixels); ++p) f(p);
+  parallel_ranges(pixels, chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t p = begin; p < end; ++p) f(static_cast<int>(p));
   });
 }
 
