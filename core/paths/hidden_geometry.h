@@ -29,8 +29,6 @@ class HiddenGeometry {
   bool empty() const { return triangles_.empty(); }
   /// Not of empty geometry.
   bool holds(int triangle) const { return triangle >= 0 && on_it_[triangle]; }
-  /// Whether area sampling can draw every point that a sensor point sees.
-  bool is_all() const { return is_all_; }
 
   /// EstimatorOptions::hidden where it is of use: in derivatives, to which paths that miss these shapes add nothing, and, of later
   /// steps, where there are other shapes.
@@ -66,7 +64,8 @@ class HiddenGeometry {
   std::vector<int> candidates_, triangles_;  ///< in an order in which neighbours are close
   DiscreteDistribution distribution_;        ///< of the triangles, by their areas
   std::vector<char> on_it_;                  ///< of every triangle of the scene
-  bool is_all_ = false, of_captures_ = false, is_best_alone_ = false, is_chosen_ = false;
+  bool is_all_ = false;                      ///< area sampling can draw every point that a sensor point sees
+  bool of_captures_ = false, is_best_alone_ = false, is_chosen_ = false;
   /// Whether every vertex, or every first vertex x1 of a capture's paths, that gives its path a derivative is area-sampled.
   bool alone_changes_ = false, alone_changes_x1_ = false;
 };

@@ -281,10 +281,6 @@ class PreparedScene {
     if (triangle < 0 || dot(records_[triangle].normal, w) == 0) return std::nullopt;
     return point_on_triangle(triangle, origin, w);
   }
-  /// First surface point of such a ray.
-  std::optional<SurfacePoint> trace_camera(const Vec3& direction) const {
-    return end_point(closest_camera_hit(direction), camera.position, direction);
-  }
   /// Whether a triangle that lies on y's is what is seen there along d.
   bool covered(const SurfacePoint& y, const Vec3& d) const {
     return y.triangle >= 0 && stacked.may_cover(y.triangle, y.n, d) && top_face(y.triangle, y.p, d) != y.triangle;

@@ -8,6 +8,8 @@
 namespace isochron {
 namespace {
 
+constexpr int kLastSteps = 4;
+
 using Vector = std::vector<double>;
 
 /// Of one right-hand side.
@@ -43,10 +45,9 @@ class Solution {
     expected_ = square + kept * kept * expected_;  // the residual is at right angles to the former direction
     square_ = square;
     const auto count = static_cast<int>(gains_.size());
-    const double last = std::accumulate(gains_.end() - std::min(limits_.last_steps, count), gains_.end(), 0.0);
-    ended_ =
-        !(square_ > 0) || count == limits_.most_steps ||
-        (count > limits_.last_steps && last < limits_.least_gain * std::accumulate(gains_.begin(), gains_.end(), 0.0));
+    const double last = std::accumulate(gains_.end() - std::min(kLastSteps, count), gains_.end(), 0.0);
+    ended_ = !(square_ > 0) || count == limits_.most_steps ||
+             (count > kLastSteps && last < limits_.least_gain * std::accumulate(gains_.begin(), gains_.end(), 0.0));
   }
 
  private:

@@ -5,10 +5,9 @@
 
 namespace isochron {
 
-/// When a system counts as solved: once the last steps add less than `least_gain` to x'b, but after `most_steps` in any case.
+/// When a system counts as solved: once the last four steps add less than `least_gain` to x'b, but after `most_steps` in any case.
 struct SolutionLimits {
   int most_steps = 24;
-  int last_steps = 4;
   double least_gain = 0.05;
   /// An equation ends, too, at a direction whose curvature is below this part of what the preconditioner expects.
   double least_curvature = 0;

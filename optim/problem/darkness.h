@@ -22,11 +22,4 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
 std::string darkness_warning(const Problem& problem, const std::vector<double>& theta, const GatedImage& image,
                              const GatedImage& target);
 
-/// The target values where all are known, else `theta`: where to look for the target's light.
-std::vector<double> point_of_target(const Problem& problem, const std::vector<double>& theta);
-
-/// Shortest and longest path length in scene units among 16 paths per pixel of an image of 32 pixels at most across, with 16
-/// bounces at most, to about a hundredth of their distance. Empty where no path brings light.
-std::optional<std::pair<double, double>> path_length_range(const Problem& problem, const std::vector<double>& theta);
-
 }  // namespace isochron

@@ -136,8 +136,6 @@ class Problem {
 
   /// Which of a target's readings count.
   const Readings& readings() const { return readings_; }
-  /// That `target.histograms` leaves of those that count without it.
-  double share_of_histograms() const { return share_of_histograms_; }
   /// Whether `evaluate` takes as many others in each iteration: adam averages over its iterations, so that all histograms count.
   bool redraws_histograms() const;
   /// Throws InputError, which begins with `what`, where the loss has no use for a target.
@@ -214,7 +212,7 @@ class Problem {
   std::optional<GatedImage> counts_;  ///< of the target's file; reading them may set the gates' bins
   GateSet gates_;
   Readings readings_, all_readings_;  ///< all: with the histograms that are left out
-  double share_of_histograms_ = 1;
+  double share_of_histograms_ = 1;    ///< that `target.histograms` leaves of those that count without it
   std::unique_ptr<Parameters> parameters_;
   CasterUpdate caster_update_;
   std::unique_ptr<SceneCache> cache_;

@@ -83,7 +83,7 @@ inline std::vector<RecordedRay> record_rays(const PreparedScene& scene, const Ga
     Rng rng(Stream{.seed = 3}, static_cast<std::uint64_t>(pixel), static_cast<std::uint32_t>(i % samples));
     const Vec3 direction = worker.direction_through(pixel, rng);
     recorder.closest_hit(scene.camera.position, direction);
-    const auto hit = scene.trace_camera(direction);
+    const auto hit = worker.trace_camera(direction);
     if (!hit) continue;
     worker.start_at_sensor(path, 0);
     path.push(scene, *hit);

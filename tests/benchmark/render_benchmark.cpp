@@ -65,10 +65,11 @@ BENCHMARK_CAPTURE(BM_RayCaster, occluded, Kind::occluded)->ArgName("large")->Arg
 /// Point seen by every pixel's centre; leaves out pixels that see nothing.
 std::vector<SurfacePoint> first_points(const PreparedScene& prepared) {
   std::vector<SurfacePoint> points;
-  for (int pixel = 0; pixel < prepared.camera.pixels(); ++pixel)
-    if (const auto hit = prepared.trace_camera(
-            prepared.camera.direction(pixel % prepared.camera.width + 0.5, pixel / prepared.camera.width + 0.5)))
+  for (int pixel = 0; pixel < prepared.camera.pixels(); ++pixel) {
+    const Vec3 w = prepared.camera.direction(pixel % prepared.camera.width + 0.5, pixel / prepared.camera.width + 0.5);
+    if (const auto hit = prepared.end_point(prepared.closest_camera_hit(w), prepared.camera.position, w))
       points.push_back(*hit);
+  }
   return points;
 }
 

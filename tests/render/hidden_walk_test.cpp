@@ -66,7 +66,6 @@ TEST(HiddenGeometry, IsWhatIsNamed) {
     const int board = scene.find_shape("board");
     scene.shapes[board].hidden = named;
     const PreparedScene prepared(scene, nullptr);
-    EXPECT_EQ(prepared.hidden.is_all(), !named);
     EXPECT_NEAR(1 / prepared.hidden.pdf(), named ? 0.16 : 0.16 + 2 * 1.6 * 1.6 + 4 * 1.6 * 1.1, 1e-12);
     constexpr int kDraws = 1000;
     int on_board = 0;
