@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <vector>
 
-#include "core/base/progress.h"
+#include "core/base/clock.h"
 #include "core/base/ranks.h"
 #include "core/image/image.h"
 #include "optim/experiment/files.h"
@@ -41,7 +40,6 @@ std::vector<int> chosen_unknowns(const Parameters& parameters, const std::vector
 /// Returns the seconds that it took.
 double write_images(const Problem& problem, const std::vector<double>& theta, const std::vector<int>& unknowns,
                     const std::string& folder) {
-  using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
   for (const int unknown : unknowns) {
     std::vector<std::string> names;
@@ -53,7 +51,7 @@ double write_images(const Problem& problem, const std::vector<double>& theta, co
     write_exr_components(folder + "/" + problem.parameters().component_names()[unknown] + ".exr", names, images,
                          exr_notes(problem.experiment().gates));
   }
-  return std::chrono::duration<double>(Clock::now() - start).count();
+  return seconds_since(start);
 }
 
 }  // namespace

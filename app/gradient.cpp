@@ -1,14 +1,13 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
 #include <cmath>
 #include <stdexcept>
 
 #include "app/commands.h"
 #include "app/interrupt.h"
 #include "app/progress.h"
-#include "core/base/progress.h"
+#include "core/base/clock.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/darkness.h"
 #include "optim/problem/estimates.h"
@@ -50,9 +49,9 @@ int gradient(const CommonOptions& options) {
   const GatedImage image =
       problem.render(theta, problem.stream(Pass::primal), {0, problem.experiment().samples.primal});
   if (const std::string dark = darkness_warning(problem, theta, image, target); !dark.empty()) warn(dark);
-  const auto start = std::chrono::steady_clock::now();
+  const auto start = Clock::now();
   const GradientEstimate estimate = estimate_gradient(problem, theta, target);
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double seconds = seconds_since(start);
 
   display.end();
   std::string table = "parameter,value,gradient,standard_error,degrees_of_freedom,effective_count,half_width_95\n";

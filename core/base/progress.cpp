@@ -1,14 +1,13 @@
 #include "core/base/progress.h"
 
 #include <algorithm>
-#include <chrono>
 #include <mutex>
 #include <vector>
 
+#include "core/base/clock.h"
+
 namespace isochron {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct Stage {
   std::string name;
@@ -52,7 +51,7 @@ std::optional<WorkProgress> work_progress() {
     fraction = std::min(1.0, (stage->done + fraction) / stage->steps);
   // A step may hold several loops, each of which counts from zero.
   highest = std::max(highest, fraction);
-  return WorkProgress{stages.front().name, highest, std::chrono::duration<double>(Clock::now() - start).count()};
+  return WorkProgress{stages.front().name, highest, seconds_since(start)};
 }
 
 void begin_parts(int count) {

@@ -73,8 +73,7 @@ Race race_solvers(const Experiment& experiment, const GatedImage& target, const 
         for (ParameterSpec& parameter : own.parameters) parameter.diffusion = 0;
       const Problem problem(own);
       try {
-        require_two_samples(problem);
-        require_jacobian_fits(problem);
+        require_optimisable(problem);
       } catch (const InputError& error) {
         result.notes.push_back(error.what());
         break;

@@ -28,9 +28,6 @@ constexpr std::uint32_t kRenderings = 4, kSampleIteration = kMatrixIteration + k
 /// matrix has 37.5; six give 36.8.
 constexpr int kSampleSteps = 12;
 
-/// Of the diagonal, which preconditions: each knows an entry to a factor of about 1 +- sqrt(2 / 12).
-constexpr int kProbes = 12;
-
 }  // namespace
 
 RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& target, const std::vector<double>& theta)
@@ -61,8 +58,8 @@ const std::vector<double>& RenderedCurvature::diagonal() const {
   if (!diagonal_.empty()) return diagonal_;
   std::vector<double> mean(theta_.size(), 0.0);
   for (const std::vector<double>& found :
-       probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbes}))
-    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbes;
+       probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbesOfDiagonal}))
+    for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbesOfDiagonal;
   for (const PenaltyScale& scale : {smoothing_, priors_}) prior_.add_diagonal(scale, mean);
   return diagonal_ = std::move(mean);
 }
@@ -109,7 +106,7 @@ std::vector<std::vector<double>> RenderedCurvature::pulls(int count, std::uint32
   std::vector<std::vector<double>> means(count, std::vector<double>(theta_.size(), 0.0));
   for (std::uint32_t rendered = first; rendered < first + kRenderings; ++rendered) {
     const std::vector<std::vector<double>> found =
-        probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbes, count}, rendered);
+        probe_readings(problem_, theta_, weights_, kProductsIteration, {kProbesOfDiagonal, count}, rendered);
     for (int k = 0; k < count; ++k)
       for (std::size_t i = 0; i < theta_.size(); ++i) means[k][i] += found[k][i] / kRenderings;
   }
@@ -120,8 +117,8 @@ PosteriorSamples RenderedCurvature::samples(int count) const {
   const PenaltyScale scale{smoothing_.slopes, priors_.priors};
   std::vector<std::vector<double>> gradients = pulls(count, kSampleIteration);
   for (int k = 0; k < count; ++k)
-    prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration), static_cast<std::uint32_t>(kProbes + k),
-                     gradients[k]);
+    prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration),
+                     static_cast<std::uint32_t>(kProbesOfDiagonal + k), gradients[k]);
   const std::vector<double>& at_first = diagonal();
   const std::vector<double>&low = problem_.parameters().lower(), &high = problem_.parameters().upper();
   std::vector<std::size_t> free;

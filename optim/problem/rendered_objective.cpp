@@ -13,6 +13,8 @@
 
 namespace isochron {
 
+namespace {
+
 void require_jacobian_fits(const Problem& problem) {
   if (problem.experiment().optimizer.method != OptimizerMethod::levenberg_marquardt) return;
   const double residuals = residual_count(problem), unknowns = problem.parameters().size();
@@ -24,12 +26,20 @@ void require_jacobian_fits(const Problem& problem) {
         problem.experiment().file, bytes / 1e9, residuals, unknowns, kMostLinearisationBytes / 1e9));
 }
 
+}  // namespace
+
 void require_two_samples(const Problem& problem) {
   if (problem.experiment().samples.primal < 2)
     throw InputError(fmt::format(
         "{}: samples.primal: 1 is too few: the loss comes from two independent halves of the samples (allowed: at "
         "least 2)",
         problem.experiment().file));
+}
+
+void require_optimisable(const Problem& problem) {
+  problem.require_parameters();
+  require_two_samples(problem);
+  require_jacobian_fits(problem);
 }
 
 SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint32_t iteration) const {

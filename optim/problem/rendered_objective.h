@@ -9,11 +9,11 @@ namespace isochron {
 /// unknowns, and matrices of unknowns x unknowns.
 inline constexpr double kMostLinearisationBytes = 2e9;
 
-/// Throws InputError when the experiment's method is Levenberg-Marquardt and that would be more.
-void require_jacobian_fits(const Problem& problem);
-
 /// Throws InputError when the image has a single sample per pixel, of which no loss can be estimated without bias.
 void require_two_samples(const Problem& problem);
+
+/// The same, when there are no parameters, and when the experiment's method is Levenberg-Marquardt and its linearisation would be too large.
+void require_optimisable(const Problem& problem);
 
 class RenderedObjective : public Objective {
  public:

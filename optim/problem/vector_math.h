@@ -32,6 +32,12 @@ inline double norm(const std::vector<double>& v) {
   return std::sqrt(sum);
 }
 
+/// The point that lies `part` of the way from one to another.
+inline std::vector<double> part_way(const std::vector<double>& from, std::vector<double> to, double part) {
+  for (std::size_t i = 0; i < to.size(); ++i) to[i] = from[i] + part * (to[i] - from[i]);
+  return to;
+}
+
 /// The gradient but for what leads beyond the bounds.
 inline std::vector<double> within_bounds(std::vector<double> gradient, const std::vector<double>& theta,
                                          const std::vector<double>& lower, const std::vector<double>& upper) {

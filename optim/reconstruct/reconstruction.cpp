@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <functional>
 
+#include "core/base/clock.h"
 #include "core/base/description.h"
 #include "core/base/error.h"
 #include "core/base/file.h"
@@ -198,7 +198,7 @@ std::string start_yaml(const BackProjection& volume, const FirstSurface& first, 
 
 Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::string& place,
                                     const std::function<void(const std::string&)>& warning) {
-  const auto begun = std::chrono::steady_clock::now();
+  const auto begun = Clock::now();
   if (!spec.response.empty() && !file_exists(spec.response))
     throw InputError(spec.response + ": does not exist (a table of the detector's response: offsets in ps, values)");
   const std::string experiment = place + "/experiment.yaml";
@@ -253,7 +253,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
     measure(experiment, start, settings, warning);
     write_experiment();
   }
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  const double seconds = seconds_since(begun);
   result.files["start.yaml"] = start_yaml(volume, first, seconds);
   return result;
 }

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 #include <sys/resource.h>
 
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
 
+#include "core/base/clock.h"
 #include "core/base/description.h"
 #include "core/base/error.h"
 #include "core/base/file.h"
@@ -43,12 +43,6 @@
 
 namespace isochron {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Most memory that the process has had, in bytes.
 long long peak_memory() {
@@ -307,9 +301,7 @@ RunStatus go_on(const RunOptions& options, const std::function<void(const std::s
     });
   }
   const Problem problem(experiment, warning_of_scene);
-  problem.require_parameters();
-  require_two_samples(problem);
-  require_jacobian_fits(problem);
+  require_optimisable(problem);
   return Run(problem, options).execute();
 }
 
@@ -319,9 +311,7 @@ RunStatus start_run(const Experiment& experiment, const RunOptions& options) {
   Experiment copied = experiment;
   {
     const Problem problem(experiment, options.warning);
-    problem.require_parameters();
-    require_two_samples(problem);
-    require_jacobian_fits(problem);
+    require_optimisable(problem);
     require_memory(problem, run_memory(problem));
     require_levels(problem);
     if (options.loss) require_for_own_loss(problem);

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "optim/problem/vector_math.h"
 #include "optim/solvers/ceres_calls.h"
 #include "optim/solvers/optimizer.h"
 
@@ -132,8 +134,7 @@ class Lbfgs : public Optimizer {
     loss->rethrow();
     std::vector<double> next = loss->best();
     rejected_ = next == theta;
-    for (std::size_t i = 0; i < next.size(); ++i) next[i] = theta[i] + rate * (next[i] - theta[i]);
-    return next;
+    return part_way(theta, std::move(next), rate);
   }
   bool rejected() const override { return rejected_; }
   bool scatters() const override { return true; }

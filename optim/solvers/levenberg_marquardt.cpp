@@ -5,7 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
+#include "optim/problem/vector_math.h"
 #include "optim/solvers/ceres_calls.h"
 #include "optim/solvers/optimizer.h"
 #include "optim/solvers/quadratic_model.h"
@@ -135,8 +137,7 @@ class LevenbergMarquardt : public Optimizer {
       radius_ = std::clamp(summary.iterations.back().trust_region_radius, kLeastRadius, kFirstRadius);
     std::vector<double> next = loss->point(u.data());
     rejected_ = next == theta;
-    for (std::size_t i = 0; i < next.size(); ++i) next[i] = theta[i] + rate * (next[i] - theta[i]);
-    return next;
+    return part_way(theta, std::move(next), rate);
   }
   bool rejected() const override { return rejected_; }
   bool scatters() const override { return true; }
