@@ -90,11 +90,11 @@ void add_chart(CLI::App& app, Action& action) {
   sub->add_option("--seconds", command->seconds,
                   "about the whole time on idle cores; a quarter is for the reference, the target is not "
                   "counted")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->type_name("N");
   sub->add_option("--error", command->error_percent, "relative error whose time the table gives, in percent")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->type_name("PERCENT");
   CLI::Option* steps =
@@ -103,7 +103,7 @@ void add_chart(CLI::App& app, Action& action) {
              "steps of the finite differences, in units of the parameters; default: 4, 1 and 1/4 times the step "
              "that `check` would take")
           ->delimiter(',')
-          ->check(CLI::PositiveNumber)
+          ->check(positive_number())
           ->type_name("A,B,C");
   CLI::Option* techniques = sub->add_flag("--techniques", command->techniques,
                                           "what each technique brings: `auto` without each, in place of other methods")

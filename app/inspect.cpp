@@ -242,7 +242,7 @@ void add_inspect(CLI::App& app, Action& action) {
       "Measure how much of the model a scene needs: bounces, terms, sampling, numbers of samples", inspect_experiment);
   add_experiment_options(*sub, command->common);
   sub->add_option("--seconds", command->seconds, "about how many CPU seconds to spend, summed over cores; default 60")
-      ->check(CLI::Range(0.1, 1e6))
+      ->check(number(0.1, 1e6))
       ->type_name("N");
   sub->add_flag("--apply", command->apply, "write the advice into the experiment file");
   sub->footer(

@@ -4,6 +4,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <charconv>
+#include <cmath>
 #include <thread>
 
 #include "core/base/error.h"
@@ -43,6 +45,45 @@ void add_experiment_options(CLI::App& command, CommonOptions& options) {
       ->take_all()
       ->allow_extra_args(false);
   add_session_options(command, options);
+}
+
+CLI::Validator whole_number(std::int64_t low, std::int64_t high) {
+  const auto check = [=](const std::string& text) -> std::string {
+    std::int64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const bool is_one = error == std::errc() && end == text.data() + text.size();
+    return is_one && value >= low && value <= high
+               ? ""
+               : fmt::format("{} is no whole number from {} to {}", text, low, high);
+  };
+  return {check, fmt::format("INT in [{} - {}]", low, high)};
+}
+
+namespace {
+
+CLI::Validator number_check(const std::function<bool(double)>& holds, const std::string& allowed,
+                            const std::string& name) {
+  const auto check = [=](const std::string& text) -> std::string {
+    double value = 0;
+    const bool is_one = CLI::detail::lexical_cast(text, value) && std::isfinite(value);
+    return is_one && holds(value) ? "" : fmt::format("{} is no number {}", text, allowed);
+  };
+  return {check, name};
+}
+
+}  // namespace
+
+CLI::Validator number(double low, double high) {
+  return number_check([=](double value) { return value >= low && value <= high; },
+                      fmt::format("from {} to {}", low, high), fmt::format("FLOAT in [{} - {}]", low, high));
+}
+
+CLI::Validator positive_number() {
+  return number_check([](double value) { return value > 0; }, "above 0", "POSITIVE");
+}
+
+CLI::Validator non_negative_number() {
+  return number_check([](double value) { return value >= 0; }, "from 0 on", "NONNEGATIVE");
 }
 
 void begin_session(const CommonOptions& options) {

@@ -43,11 +43,17 @@ void warn(const std::string& text);
 void add_parameter_option(CLI::App& command, CommonOptions& options);
 /// --force, of those that may replace a run.
 void add_force_option(CLI::App& command, CommonOptions& options);
+/// Checks of options' values, which CLI11's own let pass: what is no number, is infinite, or does not fit.
+CLI::Validator whole_number(std::int64_t low, std::int64_t high);
+CLI::Validator number(double low, double high);
+CLI::Validator positive_number();
+CLI::Validator non_negative_number();
+
 /// --seed: a number that experiments may have.
 template <class Seed>
 void add_seed_option(CLI::App& command, Seed& seed) {
   command.add_option("--seed", seed, "seed of the random numbers")
-      ->check(CLI::Range(std::int64_t{0}, std::numeric_limits<std::int64_t>::max()))
+      ->check(whole_number(0, std::numeric_limits<std::int64_t>::max()))
       ->type_name("N");
 }
 /// Unknowns [begin, begin + count) that --parameter names; all for an empty name. Throws InputError.

@@ -59,7 +59,7 @@ std::string as_path(const std::string& folder) {
   return folder.starts_with('-') ? "./" + folder : folder;
 }
 
-/// Runs a module of the package isochron.
+/// Runs a module of the package isochron. -P: files of the current folder are no modules.
 ModuleResult run_module(const std::string& module, const std::vector<std::string>& more) {
   int ends[2];
   if (pipe2(ends, O_CLOEXEC) != 0) return {-1, fmt::format("cannot start: {}", std::strerror(errno))};
@@ -67,7 +67,7 @@ ModuleResult run_module(const std::string& module, const std::vector<std::string
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_adddup2(&actions, ends[1], STDERR_FILENO);
-  std::vector<const char*> arguments = {"/usr/bin/python3", "-m", module.c_str()};
+  std::vector<const char*> arguments = {"/usr/bin/python3", "-P", "-m", module.c_str()};
   for (const std::string& argument : more) arguments.push_back(argument.c_str());
   arguments.push_back(nullptr);
   const std::vector<std::string> variables = environment_with_package();

@@ -47,7 +47,7 @@ void add_reconstruct(CLI::App& app, Action& action) {
       ->type_name("IRF.csv");
   sub->add_option("--seconds", command->spec.seconds,
                   "work of the fit, as much as two cores do in that time; more gives less noise (default 300)")
-      ->check(CLI::Range(kLeastSeconds, kMostSeconds))
+      ->check(number(kLeastSeconds, kMostSeconds))
       ->type_name("N");
   add_seed_option(*sub, command->spec.seed);
   add_force_option(*sub, command->common);

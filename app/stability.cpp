@@ -73,7 +73,7 @@ void add_stability(CLI::App& app, Action& action) {
   sub->get_option("--at")->group("");
   sub->add_option("--seconds", command->seconds,
                   "about the time for the whole map on idle cores; every gradient of a width takes the same time")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str()
       ->type_name("N");
   sub->add_option("--iterations", command->iterations, "of each short reconstruction, by Adam")
@@ -84,11 +84,11 @@ void add_stability(CLI::App& app, Action& action) {
                   "standard deviations of the gates over the path length, 0: Dirac gates; default: 1e-1 to 1e-6 in "
                   "half decades and 0")
       ->delimiter(',')
-      ->check(CLI::NonNegativeNumber)
+      ->check(non_negative_number())
       ->type_name("A,B,C");
   sub->add_option("--steps", command->steps, "steps of the finite differences, as in `chart`")
       ->delimiter(',')
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->type_name("A,B,C");
   sub->footer(
       "Writes stability.csv and stability.png into -o, default runs/NAME-stability.\n"

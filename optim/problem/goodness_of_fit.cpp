@@ -246,7 +246,7 @@ const char* name(FitVerdict verdict) {
 
 FitVerdict GoodnessOfFit::verdict() const {
   if (!has_light() && background.p_value >= kRejection) return FitVerdict::no_signal;
-  return fit.is_rejected() ? FitVerdict::unexplained : FitVerdict::explained;
+  return lost() || fit.is_rejected() ? FitVerdict::unexplained : FitVerdict::explained;
 }
 
 GoodnessOfFit judge_fit(const CountModel& model, const GatedImage& counts, const ReadingLoss& loss,

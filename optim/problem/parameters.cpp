@@ -75,14 +75,23 @@ bool Parameters::target_known() const {
 std::vector<int> Parameters::moving_shapes() const {
   std::vector<int> shapes;
   for (std::size_t s = 0; s < motions_.size(); ++s)
-    if (!motions_[s].empty() || !camera_motions_.empty()) shapes.push_back(static_cast<int>(s));
+    if (!motions_[s].empty()) shapes.push_back(static_cast<int>(s));
   return shapes;
 }
 
 Scene Parameters::apply(const std::vector<double>& theta) const {
+  Scene scene = in_place(theta);
+  if (camera_motions_.empty()) return scene;
+  for (const Shape& shape : scene.shapes)
+    for (int v = shape.first_vertex; v < shape.first_vertex + shape.vertex_count; ++v)
+      view(theta, true, scene.positions[v], nullptr);
+  return scene;
+}
+
+Scene Parameters::in_place(const std::vector<double>& theta) const {
   Scene scene = scene_;
   for (std::size_t s = 0; s < scene.shapes.size(); ++s) {
-    if (motions_[s].empty() && camera_motions_.empty()) continue;
+    if (motions_[s].empty()) continue;
     const Shape& shape = scene.shapes[s];
     const std::vector<CarriedPoint> centers = pivots(static_cast<int>(s), theta);
     for (int v = 0; v < shape.vertex_count; ++v)
@@ -119,8 +128,12 @@ TangentBasis Parameters::tangent(const std::vector<double>& theta) const {
   for (int v = 0; v < layout.vertices; ++v) {
     moved.clear();
     const int s = shape_of[v];
-    if (s >= 0 && !(motions_[s].empty() && camera_motions_.empty()))
-      move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
+    if (s >= 0 && !(motions_[s].empty() && camera_motions_.empty())) {
+      Vec3 p = move(s, v - scene_.shapes[s].first_vertex, centers[s], theta, &moved);
+      view(theta, true, p, &moved);
+      if (!camera_motions_.empty())
+        std::sort(moved.begin(), moved.end(), [](const Moved& a, const Moved& b) { return a.column < b.column; });
+    }
     for (int axis = 0; axis < 3; ++axis) {
       for (const Moved& entry : moved)  // in the listed order within shape and camera
         if (entry.velocity[axis] != 0) basis.entries.push_back({entry.column, entry.velocity[axis]});

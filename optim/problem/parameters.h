@@ -86,8 +86,10 @@ class Parameters {
   /// Indices of the shapes that parameters move, as a whole or by their vertices.
   std::vector<int> moving_shapes() const;
 
-  /// The loaded scene with theta applied.
+  /// The loaded scene with theta applied. The camera stays: what moves it moves all else the other way.
   Scene apply(const std::vector<double>& theta) const;
+  /// The same with the shapes in the coordinates that the scene was loaded in, whatever moves the camera.
+  Scene in_place(const std::vector<double>& theta) const;
 
   /// d(dof)/d(theta) at theta. Entries that are exactly zero are left out.
   TangentBasis tangent(const std::vector<double>& theta) const;

@@ -232,9 +232,6 @@ Vec3 Parameters::move(int shape_index, int v, const std::vector<CarriedPoint>& p
       add(motion.first_component + slot, normal ? motion.normals[slot] : motion.direction);
     }
   }
-  view(theta, true, p, tangent);
-  if (tangent && !camera_motions_.empty())
-    std::sort(tangent->begin(), tangent->end(), [](const Moved& a, const Moved& b) { return a.column < b.column; });
   return p;
 }
 

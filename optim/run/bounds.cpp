@@ -18,7 +18,7 @@ bool reaches(double value, double bound, bool upper) {
 /// Whether bounds hold the unknown to a 400th of itself: whoever sets such ones has chosen the value. That of the gain of reconstructions is a 500th.
 bool hold(double lower, double upper) {
   constexpr double kRoom = 0.0025;
-  return upper - lower <= kRoom * std::max(std::abs(lower), std::abs(upper));
+  return std::isfinite(upper - lower) && upper - lower <= kRoom * std::max(std::abs(lower), std::abs(upper));
 }
 
 }  // namespace

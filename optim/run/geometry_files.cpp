@@ -62,7 +62,7 @@ void GeometryFiles::write(const std::string& moment, const std::vector<double>& 
   const auto formats = mesh_formats();
   const MeshFormat& format = *std::find_if(formats.begin(), formats.end(),
                                            [&](const MeshFormat& each) { return output_.geometry == each.name; });
-  const Scene scene = parameters_.apply(theta);
+  const Scene scene = parameters_.in_place(theta);
   for (const File& file : files_) {
     const Shape& shape = scene.shapes[file.shape];
     if (!all_known(scene, shape)) continue;

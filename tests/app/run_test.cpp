@@ -250,6 +250,19 @@ TEST_F(Program, StopsWhenTheImagesAgree) {
   EXPECT_NE(folder_.read("out/summary.yaml").find("status: converged\niterations: 0\n"), std::string::npos);
 }
 
+/// Files of the current folder that are called as Python's modules are none of those.
+TEST_F(Program, DrawsItsPlotsBesideFilesOfAnyName) {
+  for (const char* name : {"string.py", "html.py", "isochron.py"}) folder_.write(name, "raise SystemExit(3)\n");
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_.path());
+  const Result result =
+      run({"run", folder_.file("tiny.yaml"), "-o", folder_.file("out"), "--set", "optimizer.iterations=1"});
+  std::filesystem::current_path(before);
+  EXPECT_EQ(result.status, 0) << result.errors;
+  EXPECT_TRUE(folder_.has("out/rmse.png"));
+  EXPECT_TRUE(folder_.has("out/report.html"));
+}
+
 TEST_F(Program, DrawsItsPlots) {
   const Result result =
       run({"run", folder_.file("tiny.yaml"), "-o", folder_.file("out"), "--set", "optimizer.iterations=1"});

@@ -1,10 +1,10 @@
 // What the commands say of wrong input.
-#include "tests/app/program.h"
-
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <sstream>
+
+#include "tests/app/program.h"
 
 namespace isochron {
 namespace {
@@ -84,6 +84,23 @@ TEST_F(Program, APipeIsNoExperiment) {
   EXPECT_FALSE(waits);
   EXPECT_EQ(result.status, 2);
   EXPECT_NE(result.errors.find("is a pipe or a device"), std::string::npos) << result.errors;
+}
+
+TEST_F(Program, NumbersOfOptionsAreNumbersThatFit) {
+  const std::string file = folder_.file("tiny.yaml");
+  const std::vector<std::vector<std::string>> all = {
+      {"inspect", file, "--seconds", "nan"},  {"chart", file, "--seconds", "nan"},
+      {"chart", file, "--error", "inf"},      {"chart", file, "--steps", "0.1,0"},
+      {"stability", file, "--widths", "nan"}, {"render", file, "--seed", "9223372036854775808"},
+      {"run", file, "--seed", "-1"},          {"run", file, "--seed", "1.5"}};
+  for (const auto& arguments : all) {
+    const Result result = run(arguments);
+    EXPECT_EQ(result.status, 2) << arguments[2];
+    EXPECT_NE(result.errors.find(arguments[2] + ": "), std::string::npos) << result.errors;
+  }
+  EXPECT_EQ(
+      run({"render", file, "-o", folder_.file("out"), "--no-plots", "--quiet", "--seed", "9223372036854775807"}).status,
+      0);
 }
 
 /// Whether a warning names the shortest and the longest of a few paths of the tiny scene: about 4 and 9 units, by the random

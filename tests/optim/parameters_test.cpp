@@ -286,6 +286,9 @@ TEST(Parameters, CameraPoseIsAMotionOfAllElse) {
     EXPECT_NEAR(e.z, d.x, 1e-12);  // what lies ahead of the turned camera, along -x, lies along -z
     EXPECT_NEAR(e.y, d.y, 1e-12);
   }
+  // Files of meshes are in the coordinates of the scene.
+  EXPECT_TRUE(parameters.in_place(parameters.initial()).positions == scene.positions);
+  EXPECT_TRUE(parameters.moving_shapes().empty());
 }
 
 TEST(Parameters, TransposeIsTheAdjointOfTheTangent) {

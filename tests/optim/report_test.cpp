@@ -106,6 +106,19 @@ TEST_F(Report, BoundsOfManyUnknownsAreCounted) {
             "    upper: {bound: 1, count: 1, first: [1]}\n");
 }
 
+/// A bound on one side alone leaves room.
+TEST_F(Report, TellsWhichUnknownsEndedAtTheirOnlyBound) {
+  ParameterSpec gain;
+  gain.name = "gain";
+  gain.type = ParameterType::gain;
+  gain.initial = {2};
+  gain.lower = {1};
+  const Parameters parameters(scene_, {gain});
+  ASSERT_TRUE(std::isinf(parameters.upper()[0]));
+  EXPECT_EQ(bounds_report(find_at_bounds(parameters, {1})), "  gain ended at its lower bound 1\n");
+  EXPECT_TRUE(find_at_bounds(parameters, {1.1}).empty());
+}
+
 /// Bounds that leave no room are a choice.
 TEST_F(Report, UnknownsThatAreHeldAreNotAtBounds) {
   for (const double room : {0.0024, 0.0026}) {
@@ -191,6 +204,8 @@ TEST_F(Report, SaysWhetherTheDataAreExplained) {
 
 TEST_F(Report, ARunLeftItsDataWhereItsLightIsGoneOrItIsWorseThanItsStart) {
   EXPECT_TRUE(left_its_data(fit_of(1e-4, 0.5, 1e-4), state_, last_));
+  EXPECT_TRUE(left_its_data(fit_of(0.5, 0.5, 1e-4), state_, last_));
+  EXPECT_EQ(fit_of(0.5, 0.5, 1e-4).verdict(), FitVerdict::unexplained) << "no verdict beside `diverged` says otherwise";
   EXPECT_FALSE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));
   last_.loss = state_.loss_initial + 3.1 * std::hypot(last_.loss_noise, state_.loss_noise_initial);
   EXPECT_TRUE(left_its_data(fit_of(1e-4, 0, 0), state_, last_));

@@ -149,7 +149,8 @@ def viewer_of(run, plan, gate, scale, difference, style):
 
 def derivative_files(run):
     """(path, where it comes from): of `isochron derive` in the folder, else what the report rendered."""
-    own = [p for p in sorted(run.directory.glob("*.exr")) if p.stem not in ("target", "initial", "final")]
+    images = {"target", "initial", "final", "render"} - {p.name for p in run.parameters}
+    own = [p for p in sorted(run.directory.glob("*.exr")) if p.stem not in images]
     if own:
         return own, "from derive's files in the folder"
     folder = run.directory / "report/derivatives"
