@@ -71,9 +71,7 @@ class PreparedScene {
 
   bool captures() const { return scene.capture.has_value(); }
   int pixels() const { return camera.pixels(); }
-  bool leaves_out(int pixel) const {
-    return captures() && !scene.capture->left_out.empty() && scene.capture->left_out[pixel];
-  }
+  bool leaves_out(int pixel) const { return captures() && scene.capture->leaves_out(pixel); }
   /// That have samples.
   double share_of_pixels() const {
     if (!captures() || scene.capture->left_out.empty()) return 1;

@@ -246,9 +246,8 @@ MethodRun::Estimate MethodRun::gradient(const std::vector<double>& theta, const 
   problem_.penalty().add_gradient(theta, problem_.penalty_scale(target), penalty);
   const double before_derivatives = cpu_seconds();
   Estimate result;
-  for (int component : components_) {
+  for (int component : components_)
     result.gradient.push_back(inner_product(adjoint, derivative(theta, component, iteration)) + penalty[component]);
-  }
   const double share = static_cast<double>(theta.size()) / static_cast<double>(components_.size());
   result.core_seconds = before_derivatives - start + share * (cpu_seconds() - before_derivatives);
   return result;

@@ -38,32 +38,32 @@ std::optional<std::pair<double, double>> narrowed(const Problem& problem, const 
   return std::pair{low + first * width, low + (last + 1) * width};
 }
 
-/// What light has brought to a reading; zero where there was none, as where the reading was left out and has not even its background.
-double light_of(double value, double background) {
-  return value - background <= kRounding * background ? 0 : value - background;
-}
-
-/// Of an image of readings at theta: whether light has brought anything.
-bool has_light(const Problem& problem, const std::vector<double>& theta, const GatedImage& image) {
+/// f(place in the image's data, what light has brought there) of every reading at theta. Nothing was brought to a reading that was left out, which
+/// has not even its background.
+template <class F>
+void for_each_light(const Problem& problem, const std::vector<double>& theta, const GatedImage& image, F&& f) {
   const Scene scene = problem.parameters().apply(theta);
   for (int p = 0; p < image.pixels(); ++p) {
     const double background = scene.detector.background[scene.detector.background_of(scene.capture, p)];
     for (int g = 0; g < image.gates; ++g)
-      for (int c = 0; c < image.channels; ++c)
-        if (light_of(image.at(p, g, c), background) != 0) return true;
+      for (int c = 0; c < image.channels; ++c) {
+        const double light = image.at(p, g, c) - background;
+        f(image.index(p, g, c), light <= kRounding * background ? 0 : light);
+      }
   }
-  return false;
+}
+
+bool has_light(const Problem& problem, const std::vector<double>& theta, const GatedImage& image) {
+  bool any = false;
+  for_each_light(problem, theta, image, [&](std::size_t, double light) { any |= light != 0; });
+  return any;
 }
 
 /// An image of readings at theta less their background.
-GatedImage light_of(const Problem& problem, const std::vector<double>& theta, GatedImage image) {
-  const Scene scene = problem.parameters().apply(theta);
-  for (int p = 0; p < image.pixels(); ++p) {
-    const double background = scene.detector.background[scene.detector.background_of(scene.capture, p)];
-    for (int g = 0; g < image.gates; ++g)
-      for (int c = 0; c < image.channels; ++c) image.at(p, g, c) = light_of(image.at(p, g, c), background);
-  }
-  return image;
+GatedImage light_of(const Problem& problem, const std::vector<double>& theta, const GatedImage& image) {
+  GatedImage light = image;
+  for_each_light(problem, theta, image, [&](std::size_t i, double value) { light.data[i] = value; });
+  return light;
 }
 
 bool is_black(const GatedImage& image, int gate) {
@@ -125,8 +125,8 @@ std::vector<double> point_of_target(const Problem& problem, const std::vector<do
   return problem.parameters().target_known() ? problem.parameters().target() : theta;
 }
 
-/// The first bins of a histogram are often dark.
-bool bins(const Problem& problem) {
+/// Histograms often begin with dark bins, which are nothing to warn of.
+bool has_bins(const Problem& problem) {
   return problem.experiment().gates.kind == "bins";
 }
 
@@ -135,7 +135,7 @@ std::string warning_about(const Problem& problem, const std::vector<double>& the
                           const std::string& what) {
   const int gates = problem.gates().size();
   if (dark.empty()) return {};
-  if (static_cast<int>(dark.size()) < gates && bins(problem)) return {};
+  if (static_cast<int>(dark.size()) < gates && has_bins(problem)) return {};
   std::string text = "no light reaches the gates of " + what;
   if (static_cast<int>(dark.size()) < gates)
     text = fmt::format("no light reaches {} {} of {} of {}", dark.size() == 1 ? "gate" : "gates", ranges(dark), gates,
@@ -180,12 +180,10 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
                              const std::string& what) {
   const Scene scene = problem.parameters().apply(theta);
   const int pixels = problem.scene().camera.width * problem.scene().camera.height;
-  const auto is_black = [&](int p) {
-    return scene.capture && !scene.capture->left_out.empty() && scene.capture->left_out[p];
-  };
   double background = 0;
   for (int p = 0; p < pixels; ++p)
-    if (!is_black(p)) background += scene.detector.background[scene.detector.background_of(scene.capture, p)] / pixels;
+    if (!scene.capture || !scene.capture->leaves_out(p))
+      background += scene.detector.background[scene.detector.background_of(scene.capture, p)] / pixels;
   constexpr double kOfSums = 1e-9;  // over all pixels
   std::vector<int> dark;
   for (std::size_t g = 0; g < means.size(); ++g)
@@ -197,7 +195,7 @@ std::string darkness_warning(const Problem& problem, const std::vector<double>& 
                              const GatedImage& target) {
   const std::vector<double> of_target = point_of_target(problem, theta);
   const bool lit = has_light(problem, theta, image), lit_target = has_light(problem, of_target, target);
-  if (lit && lit_target && bins(problem)) return {};
+  if (lit && lit_target && has_bins(problem)) return {};
   const GatedImage light = light_of(problem, theta, image), wanted = light_of(problem, of_target, target);
   if (!lit_target && lit) return warning_about(problem, of_target, black_gates({wanted}), "the target");
   if (!lit && lit_target) return warning_about(problem, theta, black_gates({light}), "the image");

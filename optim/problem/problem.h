@@ -176,12 +176,17 @@ class Problem {
   bool by_differences() const;
 
  private:
-  /// The same with a renderer of the scene at theta, by a share of the samples; `parts`: see evaluate(), of the first image.
-  std::vector<std::vector<double>> transpose_apply(const std::vector<double>& theta, std::span<const GatedImage> images,
-                                                   std::uint32_t iteration, const Renderer& renderer,
-                                                   const TangentBasis& basis, Share share, ProgressStage& stage,
-                                                   std::vector<std::vector<double>>* parts = nullptr) const;
-  /// Of a gradient, for a ProgressStage.
+  /// transpose_apply() by a share of the samples, by differences of images or by the terms of derivatives. `parts`: see evaluate(), of the
+  /// first image.
+  std::vector<std::vector<double>> apply_differences(const std::vector<double>& theta,
+                                                     std::span<const GatedImage> images, std::uint32_t iteration,
+                                                     Share share, ProgressStage& stage,
+                                                     std::vector<std::vector<double>>* parts = nullptr) const;
+  std::vector<std::vector<double>> apply_terms(const Renderer& renderer, const TangentBasis& basis,
+                                               std::span<const GatedImage> images, std::uint32_t iteration, Share share,
+                                               ProgressStage& stage,
+                                               std::vector<std::vector<double>>* parts = nullptr) const;
+  /// Steps of a ProgressStage that a gradient is.
   int gradient_steps() const;
   EstimatorOptions guided(EstimatorOptions options, int visibility_samples) const;
   /// As `target.histograms` says, in the readings and in the scene.

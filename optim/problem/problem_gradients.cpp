@@ -14,7 +14,7 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   Scene scene = parameters_->apply(theta);
   if (!coordinates_fit(scene)) return no_evaluation(target);
   ReadingLoss rho = reading_loss(target);
-  // Estimates about the end of a run have numbers beyond those of iterations, and all histograms.
+  // Estimates about the end of a run, whose numbers are beyond those of iterations, are of the histograms that were chosen first.
   if (redraws_histograms() && iteration <= kMostIterations + 1u) {
     rho.readings = drawn_readings(iteration);
     scene.capture->left_out = rho.readings.left_out();
@@ -28,8 +28,10 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
   const GatedImage adjoint = loss_adjoint(image, target, rho);
   stage.advance();
   result.image = std::move(image.image);
+  const std::span<const GatedImage> adjoints(&adjoint, 1);
   result.gradient =
-      std::move(transpose_apply(theta, {&adjoint, 1}, iteration, renderer, basis, share, stage, parts)[0]);
+      std::move((by_differences() ? apply_differences(theta, adjoints, iteration, share, stage, parts)
+                                  : apply_terms(renderer, basis, adjoints, iteration, share, stage, parts))[0]);
   penalty_.add_gradient(theta, penalty_scale(target), result.gradient);
   return result;
 }
@@ -37,36 +39,39 @@ Evaluation Problem::evaluate(const std::vector<double>& theta, const GatedImage&
 std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<double>& theta,
                                                           std::span<const GatedImage> images,
                                                           std::uint32_t iteration) const {
+  ProgressStage stage("differentiating", gradient_steps());
+  if (by_differences()) return apply_differences(theta, images, iteration, {}, stage);
   const Scene scene = parameters_->apply(theta);
   const TangentBasis basis = parameters_->tangent(theta);
   const Renderer renderer = this->renderer(scene, estimator(experiment_.samples.visibility), &basis);
-  ProgressStage stage("differentiating", gradient_steps());
-  return transpose_apply(theta, images, iteration, renderer, basis, {}, stage);
+  return apply_terms(renderer, basis, images, iteration, {}, stage);
 }
 
-std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<double>& theta,
-                                                          std::span<const GatedImage> images, std::uint32_t iteration,
-                                                          const Renderer& renderer, const TangentBasis& basis,
-                                                          Share share, ProgressStage& stage,
-                                                          std::vector<std::vector<double>>* parts) const {
-  const SampleSpec& samples = experiment_.samples;
+std::vector<std::vector<double>> Problem::apply_differences(const std::vector<double>& theta,
+                                                            std::span<const GatedImage> images, std::uint32_t iteration,
+                                                            Share share, ProgressStage& stage,
+                                                            std::vector<std::vector<double>>* parts) const {
   std::vector<std::vector<double>> products(images.size());
-  if (by_differences()) {
-    if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
-    for (int i = 0; i < parameters_->size(); ++i) {
-      const GatedImage difference =
-          finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(samples.primal));
-      for (std::size_t k = 0; k < images.size(); ++k) products[k].push_back(inner_product(images[k], difference));
-      const std::size_t values = difference.data.size() / difference.pixels();
-      for (std::size_t k = 0; parts && k < difference.data.size(); ++k)
-        (*parts)[k / values % kGradientParts][i] += images[0].data[k] * difference.data[k];
-      stage.advance();
-    }
-    return products;
+  if (parts) parts->assign(kGradientParts, std::vector<double>(parameters_->size(), 0.0));
+  for (int i = 0; i < parameters_->size(); ++i) {
+    const GatedImage difference =
+        finite_difference(theta, i, stream(Pass::finite_difference, iteration), share.of(experiment_.samples.primal));
+    for (std::size_t k = 0; k < images.size(); ++k) products[k].push_back(inner_product(images[k], difference));
+    const std::size_t values = difference.data.size() / difference.pixels();
+    for (std::size_t k = 0; parts && k < difference.data.size(); ++k)
+      (*parts)[k / values % kGradientParts][i] += images[0].data[k] * difference.data[k];
+    stage.advance();
   }
+  return products;
+}
+
+std::vector<std::vector<double>> Problem::apply_terms(const Renderer& renderer, const TangentBasis& basis,
+                                                      std::span<const GatedImage> images, std::uint32_t iteration,
+                                                      Share share, ProgressStage& stage,
+                                                      std::vector<std::vector<double>>* parts) const {
   std::vector<std::vector<double>> dof_gradients(images.size(), std::vector<double>(basis.row_begin.size() - 1, 0.0));
   for (const Term term : kTerms) {
-    const SampleRange range = share.of(samples.term(term));
+    const SampleRange range = share.of(experiment_.samples.term(term));
     if (range.count() == 0) continue;
     std::vector<std::vector<double>> of_term;
     renderer.add_gradients(term, images, stream(pass_of(term), iteration), range, dof_gradients,
@@ -74,7 +79,8 @@ std::vector<std::vector<double>> Problem::transpose_apply(const std::vector<doub
     if (parts) parts->insert(parts->end(), of_term.begin(), of_term.end());
     stage.advance();
   }
-  for (std::size_t k = 0; k < images.size(); ++k) products[k] = basis.transpose_apply(dof_gradients[k]);
+  std::vector<std::vector<double>> products;
+  for (const std::vector<double>& dof_gradient : dof_gradients) products.push_back(basis.transpose_apply(dof_gradient));
   return products;
 }
 

@@ -37,6 +37,7 @@ RenderedCurvature::RenderedCurvature(const Problem& problem, const GatedImage& t
       prior_(problem.prior()),
       smoothing_{problem.penalty_scale(target).slopes, 0},
       priors_{0, problem.penalty_scale(target).priors},
+      both_{smoothing_.slopes, priors_.priors},
       scene_(problem.parameters().apply(theta)),
       basis_(problem.parameters().tangent(theta)) {
   Evaluation at = problem.evaluate(theta, target, kMatrixIteration);
@@ -60,7 +61,7 @@ const std::vector<double>& RenderedCurvature::diagonal() const {
   for (const std::vector<double>& found :
        probe_diagonals(problem_, theta_, weights_, kProductsIteration, {.count = kProbesOfDiagonal}))
     for (std::size_t i = 0; i < mean.size(); ++i) mean[i] += found[i] / kProbesOfDiagonal;
-  for (const PenaltyScale& scale : {smoothing_, priors_}) prior_.add_diagonal(scale, mean);
+  prior_.add_diagonal(both_, mean);
   return diagonal_ = std::move(mean);
 }
 
@@ -114,10 +115,9 @@ std::vector<std::vector<double>> RenderedCurvature::pulls(int count, std::uint32
 }
 
 PosteriorSamples RenderedCurvature::samples(int count) const {
-  const PenaltyScale scale{smoothing_.slopes, priors_.priors};
   std::vector<std::vector<double>> gradients = pulls(count, kSampleIteration);
   for (int k = 0; k < count; ++k)
-    prior_.add_noise(scale, problem_.stream(Pass::probe, kMatrixIteration),
+    prior_.add_noise(both_, problem_.stream(Pass::probe, kMatrixIteration),
                      static_cast<std::uint32_t>(kProbesOfDiagonal + k), gradients[k]);
   const std::vector<double>& at_first = diagonal();
   const std::vector<double>&low = problem_.parameters().lower(), &high = problem_.parameters().upper();
@@ -130,8 +130,7 @@ PosteriorSamples RenderedCurvature::samples(int count) const {
 }
 
 ApproximateInverse RenderedCurvature::preconditioner(std::vector<std::size_t> free) const {
-  const auto metric = std::make_shared<const Metric>(diagonal(), prior_.couplings({smoothing_.slopes, priors_.priors}),
-                                                     std::move(free));
+  const auto metric = std::make_shared<const Metric>(diagonal(), prior_.couplings(both_), std::move(free));
   return [metric](const std::vector<double>& residual) { return metric->solve(residual); };
 }
 
@@ -160,7 +159,7 @@ std::vector<std::vector<double>> RenderedCurvature::products(const std::vector<s
     }
     for (const std::vector<double>& dof_gradient : dof_gradients) {
       products.push_back(basis_.transpose_apply(dof_gradient));
-      prior_.add_product({smoothing_.slopes, priors_.priors}, vectors[products.size() - 1], products.back());
+      prior_.add_product(both_, vectors[products.size() - 1], products.back());
     }
   }
   return products;

@@ -59,7 +59,7 @@ class RenderedCurvature : public CurvatureProducts {
   const GatedImage& target_;
   const std::vector<double>& theta_;
   const QuadraticPenalty prior_;
-  PenaltyScale smoothing_, priors_;  ///< of each part of the penalty
+  PenaltyScale smoothing_, priors_, both_;  ///< of each part of the penalty, and of the whole
   Scene scene_;
   TangentBasis basis_;
   std::vector<double> weights_, first_gradient_;  ///< at theta

@@ -45,9 +45,7 @@ void require_optimisable(const Problem& problem) {
 SplitImage RenderedObjective::render(const std::vector<double>& theta, std::uint32_t iteration) const {
   const Scene scene = problem_.parameters().apply(theta);
   const Renderer renderer = problem_.renderer(scene, problem_.estimator());
-  SplitImage image =
-      render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
-  return image;
+  return render_halves(renderer, problem_.stream(Pass::primal, iteration), {0, problem_.experiment().samples.primal});
 }
 
 double RenderedObjective::loss(const std::vector<double>& theta, std::uint32_t iteration) const {

@@ -16,6 +16,7 @@
 #include "core/gates/gate_description.h"
 #include "core/image/npy.h"
 #include "core/scene/mesh_writer.h"
+#include "optim/problem/goodness_of_fit.h"
 #include "optim/problem/vector_math.h"
 #include "optim/reconstruct/fit_settings.h"
 #include "optim/reconstruct/start_surface.h"
@@ -153,14 +154,12 @@ std::vector<std::uint8_t> usable_points(const CaptureFile& capture, const std::s
   return used;
 }
 
-/// Of points that are used.
-bool are_whole(const GatedImage& counts, const std::vector<std::uint8_t>& used) {
-  for (int pixel = 0; pixel < counts.pixels(); ++pixel)
-    for (int g = 0; g < counts.gates; ++g)
-      if (const double value = counts.at(pixel, g);
-          value != std::floor(value) && (used.empty() || used[pixel % used.size()] != 0))
-        return false;
-  return true;
+/// Of the points that are used, under all spots.
+Readings readings_of(const GatedImage& counts, const std::vector<std::uint8_t>& used) {
+  Readings readings;
+  while (!used.empty() && std::ssize(readings.pixel) < counts.pixels())
+    readings.pixel.insert(readings.pixel.end(), used.begin(), used.end());
+  return readings;
 }
 
 BackProjection back_projected(const CaptureFile& capture, const DetectorResponse& response,
@@ -223,7 +222,7 @@ Reconstruction begin_reconstruction(const ReconstructionSpec& spec, const std::s
       warning(fmt::format("{}: {} of {} points are left out: they count nothing, or what is no count", spec.capture,
                           std::ranges::count(used, 0), used.size()));
   }
-  if (warning && !are_whole(capture.counts, used))
+  if (warning && !are_whole_numbers(capture.counts, readings_of(capture.counts, used)))
     warning(fmt::format(
         "{}: has values that are no whole numbers: smoothing and standard errors take them for numbers of photons all "
         "the same, and whether the surface explains them is not judged",

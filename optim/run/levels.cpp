@@ -87,11 +87,11 @@ class Levels {
     try {
       write_target();
       const Mesh loaded = mesh_of(load_scene(experiment_.scene), remeshed_.shape);
+      const auto ready = [&](int each) { return file_exists(folder(each) + "/experiment.yaml"); };
       for (int level = 1;; ++level) {
-        const auto ready = [&](int each) { return file_exists(folder(each) + "/experiment.yaml"); };
         if (!ready(level)) prepare(level, edge_length_of(level, remeshed_.remesh, loaded));
         if (ready(level + 1)) {  // which begins once this one has brought what it has
-          levels_.push_back(found_level(level));
+          on_first_rank([&] { levels_.push_back(found_level(level)); });
           continue;
         }
         status_ = run(level);
@@ -304,8 +304,7 @@ class Levels {
   const std::function<RunStatus(const RunOptions&)>& run_level_;
   const std::string folder_;  ///< absolute
   std::vector<Level> levels_;
-  std::vector<double>
-      evidence_;  ///< factors at the end of the level that ran last; empty: not known, as after a resume
+  std::vector<double> evidence_;  ///< factors at the end of the level that ran last; empty: not known
   RunStatus status_ = RunStatus::iterations_reached;
   std::string report_;
 };

@@ -40,14 +40,14 @@ struct RunOptions {
   std::string loss_name;
   std::function<void(const Progress&)> progress;  ///< after every row of the log
   /// The same with all that the row is about; `closing`: it is of final parameters that no iteration had. What it throws ends
-  /// the run; Interrupted as `stop` does.
+  /// the run; Interrupted as a requested stop does.
   std::function<void(const LogRow&, const std::vector<double>& theta, const Evaluation& now, bool closing)> row;
   /// Whether standard errors of what was found are stated, and expected counts rendered until their noise does not decide the verdict; of
   /// a level that others follow they are not.
   bool errors = true;
   bool followed_unless_explained =
       false;  ///< another level follows, which states the errors, where the counts are not explained
-  /// Of a run that another level follows: gets the factors of evidence (see evidence.h), where samples of the posterior were made.
+  /// Gets the factors of evidence (evidence.h) where another level follows and samples of the posterior were made.
   std::function<void(std::vector<double>)> evidence;
   /// Their distances from what is found add to the errors of its vertices.
   EarlierSurfaces earlier;
@@ -55,8 +55,8 @@ struct RunOptions {
   std::function<void(const std::string&)> report;   ///< at the end, text of run_report()
 };
 
-/// Optimises from the initial values. A stop that is requested (progress.h) leaves a checkpoint. Throws InputError, before any rendering, when the experiment does not
-/// fit its scene, has no parameters, or the folder cannot be written or holds a run already.
+/// Optimises from the initial values. A stop that is requested (progress.h) leaves a checkpoint. Throws InputError, before any rendering, when
+/// the experiment does not fit its scene, has no parameters, or the folder cannot be written or holds a run already.
 RunStatus start_run(const Experiment& experiment, const RunOptions& options);
 
 /// Goes on from the last checkpoint of options.folder, or from the start when there is none yet. Throws

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <initializer_list>
 #include <utility>
 
 #include "core/base/error.h"
@@ -20,40 +21,26 @@ namespace {
 /// Folders within that of a run.
 constexpr const char* kParts[] = {"inputs", "geometry", "frames", "report", "levels"};
 
+void remove_files(const std::string& folder, std::initializer_list<const char*> names) {
+  for (const char* name : names) std::filesystem::remove(std::filesystem::path(folder) / name);
+}
+
+/// What a run would go on from.
+void clear_state(const std::string& folder) {
+  remove_files(folder, {"checkpoint.yaml", "checkpoint.previous.yaml", "checkpoint.new.yaml", "log.csv", "summary.yaml",
+                        "target.exr"});
+  if (file_exists(folder + "/levels/1/experiment.yaml")) std::filesystem::remove_all(folder + "/levels");
+}
+
 /// Everything a run writes, experiment.yaml first: without it a half-cleared folder is no run. Of a reconstruction's files those stay that its
 /// experiment reads, scene.yaml and start.ply: another run may be of these.
 void clear_run(const std::string& folder) {
-  constexpr const char* kFiles[] = {"experiment.yaml",
-                                    "checkpoint.yaml",
-                                    "checkpoint.previous.yaml",
-                                    "checkpoint.new.yaml",
-                                    "log.csv",
-                                    "summary.yaml",
-                                    "own_loss.yaml",
-                                    "target.exr",
-                                    "initial.exr",
-                                    "final.exr",
-                                    "final.h5",
-                                    "target.png",
-                                    "initial.png",
-                                    "final.png",
-                                    "residual.png",
-                                    "rmse.png",
-                                    "capture.png",
-                                    "report.html",
-                                    "start.yaml",
-                                    "surface.png",
-                                    "back_projection.ply"};
-  for (const char* file : kFiles) std::filesystem::remove(std::filesystem::path(folder) / file);
+  remove_files(folder, {"experiment.yaml"});
+  clear_state(folder);
+  remove_files(folder, {"own_loss.yaml", "initial.exr", "final.exr", "final.h5", "target.png", "initial.png",
+                        "final.png", "residual.png", "rmse.png", "capture.png", "report.html", "start.yaml",
+                        "surface.png", "back_projection.ply"});
   for (const char* part : kParts) std::filesystem::remove_all(std::filesystem::path(folder) / part);
-}
-
-/// What a run would go on from. A run that was killed as its folder was cleared may have left it.
-void clear_state(const std::string& folder) {
-  for (const char* file :
-       {"checkpoint.yaml", "checkpoint.previous.yaml", "checkpoint.new.yaml", "log.csv", "summary.yaml", "target.exr"})
-    std::filesystem::remove(std::filesystem::path(folder) / file);
-  if (file_exists(folder + "/levels/1/experiment.yaml")) std::filesystem::remove_all(folder + "/levels");
 }
 
 /// Renames a folder to the first free of FOLDER.1, FOLDER.2, ...; returns the new name.
@@ -114,7 +101,7 @@ FolderLock prepare_run_folder(const std::string& folder, bool force,
   make_output_folder(folder);
   FolderLock lock(folder, warning);
   if (!std::filesystem::exists(folder + "/experiment.yaml")) {
-    clear_state(folder);
+    clear_state(folder);  // as a run leaves it that was killed while its folder was cleared
     return lock;
   }
   if (force) {

@@ -134,6 +134,7 @@ def _write_enumeration(file: h5py.File, name: str, members: dict[str, int], valu
 
 @contextlib.contextmanager
 def _replacing(path: Any) -> Iterator[pathlib.Path]:
+    """The same with one line where it cannot be written."""
     try:
         with replacing(path) as temporary:
             yield temporary

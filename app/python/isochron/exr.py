@@ -19,6 +19,7 @@ from isochron.files import replacing
 
 MAGIC = 20000630
 SAMPLE_TYPES = {0: np.dtype("<u4"), 1: np.dtype("<f2"), 2: np.dtype("<f4")}
+MOST_OF_HEADER = 1 << 24  # bytes, by far
 LINES_PER_BLOCK = {0: 1, 2: 1, 3: 16}  # by compression: none, ZIPS, ZIP
 
 
@@ -180,16 +181,14 @@ def read(path: Any, names: Collection[str] | None = None) -> dict[str, np.ndarra
 
 def attributes(path: Any) -> dict[str, bytes]:
     """The header: name -> value as bytes. Raises ExrError, OSError."""
-    most = 1 << 24  # bytes of a header, by far
     with _reading(path) as file:
-        return _header(file.read(most))[0]
+        return _header(file.read(MOST_OF_HEADER))[0]
 
 
 def channel_names(path: Any) -> list[str]:
     """In the order in which they are stored. Raises ExrError, OSError."""
-    header = attributes(path)
-    with _reading(path):
-        return [name for name, _ in _channels(header["channels"])]
+    with _reading(path) as file:
+        return [name for name, _ in _channels(_header(file.read(MOST_OF_HEADER))[0]["channels"])]
 
 
 def write(path: Any, images: Mapping[str, Any], notes: Mapping[str, str] | None = None) -> None:

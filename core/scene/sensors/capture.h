@@ -31,6 +31,7 @@ struct Capture {
   std::vector<char> left_out;        ///< of each pixel, whether no sample starts there, and it is black; empty: none
   std::vector<std::string> assumed;  ///< lines of what the file of the geometry lacks and what is taken in its place
 
+  bool leaves_out(int pixel) const { return !left_out.empty() && left_out[pixel]; }
   bool confocal() const { return spots.empty(); }
   /// Images have the grid's columns, and its rows once for each spot.
   int image_rows() const { return rows * (confocal() ? 1 : static_cast<int>(spots.size())); }
