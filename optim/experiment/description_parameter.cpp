@@ -266,8 +266,10 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "evenly, those by adam to half as many, others in each iteration; 0: to all",
                 {.unset = spec.remesh.coarse_histograms == 0});
     const auto adam = [&spec](Keys& keys_of_adam) {
-      keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
-                         "of each such level; in the last one steps shrink after a third of them", {.required = true});
+      keys_of_adam.value(
+          "iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations / 2),
+          "of each such level; the last one has twice as many, and its steps shrink after a third of them",
+          {.required = true});
       keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate),
                          "see `optimizer`; half of it in the last such level",
                          {.required = true, .unit = "the parameter's `scale`"});

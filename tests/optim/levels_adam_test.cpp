@@ -34,7 +34,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     const Experiment one = load_experiment(folder + "/experiment.yaml");
     const bool adam = level == 2;
     EXPECT_EQ(one.optimizer.method, adam ? OptimizerMethod::adam : OptimizerMethod::quasi_newton);
-    EXPECT_EQ(one.optimizer.iterations, adam ? 9 : 4);
+    EXPECT_EQ(one.optimizer.iterations, adam ? 18 : 4);
     EXPECT_EQ(one.parameters[0].slopes, adam ? 1e-4 : 0.01);
     EXPECT_EQ(one.samples.primal, 32);
     EXPECT_EQ(one.samples.interior, adam ? 64 : 32);
@@ -43,7 +43,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     if (adam) {
       EXPECT_EQ(one.optimizer.learning_rate, 0.01);
       EXPECT_EQ(one.optimizer.window(), 0);
-      EXPECT_NEAR(one.optimizer.decay.factor(9), 1.0 / 64, 1e-12);
+      EXPECT_NEAR(one.optimizer.decay.factor(18), 1.0 / 64, 1e-12);
     }
   }
   YamlMap summary = open_yaml(folder_.file("out/levels/2/summary.yaml")).map();
@@ -129,9 +129,9 @@ TEST_F(LevelsTest, AdamsStepsShrinkOnceInTheEnd) {
   };
   EXPECT_EQ(adam(2).iterations, 9);
   EXPECT_EQ(adam(2).decay.factor(8), 1);
-  EXPECT_EQ(adam(3).iterations, 9);
-  EXPECT_EQ(adam(3).decay.factor(3), 1);
-  EXPECT_NEAR(adam(3).decay.factor(8), 1.0 / 32, 1e-12);
+  EXPECT_EQ(adam(3).iterations, 18);
+  EXPECT_EQ(adam(3).decay.factor(6), 1);
+  EXPECT_NEAR(adam(3).decay.factor(16), 1.0 / 32, 1e-12);
   const auto edge = [&](int level) {
     return mean_edge_length(
         mesh_of(load_scene(folder_.file(fmt::format("out/levels/{}/scene/scene.yaml", level))), "hill"));
@@ -141,7 +141,7 @@ TEST_F(LevelsTest, AdamsStepsShrinkOnceInTheEnd) {
   EXPECT_NEAR(edge(3) / edge(2), 0.5, 0.1);
   EXPECT_NEAR(edge(4) / edge(3), 1, 0.1);
   run(2);
-  EXPECT_LT(adam(2).decay.factor(8), 0.1);
+  EXPECT_LT(adam(2).decay.factor(16), 0.1);
 }
 
 /// The last property of a binary PLY file's vertices, which have so many, all of them doubles.
