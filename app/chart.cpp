@@ -108,11 +108,14 @@ void add_chart(CLI::App& app, Action& action) {
   CLI::Option* techniques = sub->add_flag("--techniques", command->techniques,
                                           "what each technique brings: `auto` without each, in place of other methods")
                                 ->excludes(steps);
-  sub->add_flag("--solvers", command->solvers,
-                "reconstructions instead: error of the parameters against time for every optimiser")
-      ->excludes(techniques);
+  CLI::Option* solvers =
+      sub->add_flag("--solvers", command->solvers,
+                    "reconstructions instead: error of the parameters against time for every optimiser")
+          ->excludes(techniques)
+          ->excludes(steps);
   sub->add_option("--seeds", command->seeds, "with --solvers: runs of each optimiser")
       ->check(CLI::Range(1, 1000))
+      ->needs(solvers)
       ->capture_default_str()
       ->type_name("N");
   sub->footer(

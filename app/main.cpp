@@ -79,7 +79,8 @@ int flushed(int status) {
 int run_program(int argc, char** argv) {
   isochron::keep_freed_memory();
   isochron::end_without_hdf5();
-  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of its write
+  std::signal(SIGPIPE, SIG_IGN);                  // a closed pipe is an error of its write
+  std::setvbuf(stdout, nullptr, _IOLBF, BUFSIZ);  // tables and messages stay in order where both go to one file
   spdlog::set_default_logger(spdlog::stderr_color_mt("isochron"));
   spdlog::set_pattern("%n: %^%l%$: %v");
   isochron::keep_messages_off_the_bar();

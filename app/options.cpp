@@ -82,10 +82,6 @@ CLI::Validator positive_number() {
   return number_check([](double value) { return value > 0; }, "above 0", "POSITIVE");
 }
 
-CLI::Validator non_negative_number() {
-  return number_check([](double value) { return value >= 0; }, "from 0 on", "NONNEGATIVE");
-}
-
 void begin_session(const CommonOptions& options) {
   if (options.quiet) spdlog::set_level(spdlog::level::warn);
   set_thread_count(options.threads);

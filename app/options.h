@@ -47,7 +47,6 @@ void add_force_option(CLI::App& command, CommonOptions& options);
 CLI::Validator whole_number(std::int64_t low, std::int64_t high);
 CLI::Validator number(double low, double high);
 CLI::Validator positive_number();
-CLI::Validator non_negative_number();
 
 /// --seed: a number that experiments may have.
 template <class Seed>

@@ -12,7 +12,9 @@
 #include "app/interrupt.h"
 #include "app/plots.h"
 #include "app/progress.h"
+#include "core/base/error.h"
 #include "core/base/progress.h"
+#include "optim/experiment/description.h"
 #include "optim/experiment/files.h"
 #include "optim/problem/memory.h"
 
@@ -34,14 +36,22 @@ std::vector<double> default_widths(const Scene& scene) {
   return widths;
 }
 
+void require_widths(const std::vector<double>& widths) {
+  for (const double width : widths)
+    if (width != 0 && !(width >= kLeastRelativeWidth && width <= 1))
+      throw InputError(fmt::format("--widths: {} (allowed: 0, or {} to 1)", width, kLeastRelativeWidth));
+}
+
 int stability(const StabilityCommand& command) {
   begin_session(command.common);
+  require_widths(command.widths);
   Experiment experiment = read_experiment(command.common);
   StabilityOptions options;
   with_relative_width(experiment.gates, 0.1);  // steady gates fail here
   const Problem problem(experiment, warn);
   options.widths = command.widths.empty() ? default_widths(problem.scene()) : command.widths;
   std::sort(options.widths.begin(), options.widths.end(), std::greater<>());
+  options.widths.erase(std::unique(options.widths.begin(), options.widths.end()), options.widths.end());
   problem.require_parameters();
   const std::vector<double> theta = problem.parameters().initial();
   require_memory(problem, image_memory(problem));
@@ -84,7 +94,6 @@ void add_stability(CLI::App& app, Action& action) {
                   "standard deviations of the gates over the path length, 0: Dirac gates; default: 1e-1 to 1e-6 in "
                   "half decades and 0")
       ->delimiter(',')
-      ->check(non_negative_number())
       ->type_name("A,B,C");
   sub->add_option("--steps", command->steps, "steps of the finite differences, as in `chart`")
       ->delimiter(',')

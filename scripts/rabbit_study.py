@@ -109,7 +109,7 @@ def sweep(options, name):
         options = argparse.Namespace(**{**vars(options), "methods": ["fit"]})
     rows = []
     with tempfile.TemporaryDirectory() as temporary:
-        for seed, photons, points in itertools.product(range(1, options.seeds + 1), values["photons"], values["points"]):
+        for seed, photons, points in itertools.product(range(options.first, options.first + options.seeds), values["photons"], values["points"]):
             for row in measure(options, photons, points, values["seconds"], seed, pathlib.Path(temporary)):
                 rows.append(row)
                 print(*row, flush=True)
@@ -155,6 +155,7 @@ def main():
     parser.add_argument("--seconds", type=float, nargs="+", help="sweep: 30 60 120 300")
     parser.add_argument("--verdicts", type=float, nargs="+", help=f"sweep: 20 200 2000; reconstructions of {VERDICT_SECONDS} s")
     parser.add_argument("--seeds", type=int, default=1, help="captures of each kind (default 1)")
+    parser.add_argument("--first", type=int, default=1, help="seed of the first of them (default 1)")
     parser.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS, help="default: all")
     parser.add_argument("--output", type=pathlib.Path, default=ROOT / "experiments/measured", help="default: experiments/measured")
     parser.add_argument("--table", choices=SWEEPS, help="print the table of a sweep that was measured before, as a page has it")

@@ -59,6 +59,16 @@ bool is_abandoned(const std::string& file) {
   return abandoned;
 }
 
+/// The file that a symbolic link stands for, whether it is there or not; any other path as it is.
+std::string target_of(const std::string& path) {
+  constexpr int kMostLinks = 40;  // as the system's own limit
+  std::filesystem::path target = path;
+  std::error_code error;
+  for (int i = 0; i < kMostLinks && std::filesystem::is_symlink(target, error); ++i)
+    target = target.parent_path() / std::filesystem::read_symlink(target, error);
+  return target.string();
+}
+
 /// 0, or the errno of what failed.
 int write_all(int descriptor, std::string_view contents) {
   for (std::size_t done = 0; done < contents.size();) {
@@ -137,7 +147,7 @@ std::optional<std::string> read_here(const std::string& path, std::string& probl
 
 }  // namespace
 
-NewFile::NewFile(std::string path) : path_(std::move(path)) {}
+NewFile::NewFile(const std::string& path) : path_(target_of(path)) {}
 
 NewFile::~NewFile() {
   if (descriptor_ >= 0) ::close(descriptor_);
@@ -177,6 +187,8 @@ void NewFile::seek(std::uint64_t position) {
 
 void NewFile::finish() {
   flush();
+  struct stat before {};
+  if (::stat(path_.c_str(), &before) == 0) ::fchmod(descriptor_, before.st_mode & 0777);
   int error = ::fsync(descriptor_) == 0 ? 0 : errno;
   if (::close(std::exchange(descriptor_, -1)) != 0 && error == 0) error = errno;
   if (error == 0 && std::rename(temporary_.c_str(), path_.c_str()) != 0) error = errno;

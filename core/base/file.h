@@ -9,7 +9,8 @@ namespace isochron {
 // Files are those of rank 0 (ranks.h), which tells the others what it found.
 
 /// Writes a whole file or nothing: to a temporary file beside it, which is flushed to the disk and then
-/// renamed. A reader, or a run after a crash, sees the old contents or the new. Leaves no temporary file behind
+/// renamed. A reader, or a run after a crash, sees the old contents or the new. A file that is replaced keeps its
+/// permissions, and a symbolic link goes on to stand for it. Leaves no temporary file behind
 /// where it fails, and throws with path and reason: InputError where the path is at fault (no such folder, no
 /// permission, a folder of that name), else, as on a full disk, std::runtime_error.
 void write_file_atomically(const std::string& path, const std::string& contents);
@@ -17,7 +18,7 @@ void write_file_atomically(const std::string& path, const std::string& contents)
 /// The same in parts, for contents too large to be held twice. Only on rank 0 (on_first_rank). Throws as above.
 class NewFile {
  public:
-  explicit NewFile(std::string path);
+  explicit NewFile(const std::string& path);
   /// Without finish() nothing is left of it.
   ~NewFile();
   NewFile(const NewFile&) = delete;

@@ -27,6 +27,9 @@ Field file_name(std::string& variable);
 
 /// Bins that were not given (GateSpec::needs_bins) are left to whoever sets them, who is to call check_gates.
 void describe(Keys& keys, GateSpec& gates, ExperimentFolder& folder);
+/// The least standard deviation of gates that are no Dirac gates, over the longest centre. Path lengths are sums of doubles, each rounded
+/// to 1e-16 of itself, over thousands of segments at most: narrower gates see nothing but rounding, and in the end their peaks overflow.
+inline constexpr double kLeastRelativeWidth = 1e-12;
 /// Throws InputError at `value` where no gates can be made or double precision does not resolve them.
 void check_gates(const GateSpec& gates, const YamlValue& value);
 /// `target_required`: whether there is no target without the parameter's.

@@ -33,10 +33,8 @@ Field centers(std::vector<double>& variable) {
   return {"list of numbers, or {start, stop, count}", "at least 0", read, [&variable] { return yaml_list(variable); }};
 }
 
-/// Path lengths are sums of doubles, each rounded to 1e-16 of itself, over thousands of segments at most: narrower gates
-/// see nothing but rounding, and in the end their peaks overflow.
 void require_resolved(const GateSet& gates, const YamlValue& value) {
-  constexpr double kLeastRelativeWidth = 1e-12, kLeastWidth = 1e-100, kMostWidth = 1e100;
+  constexpr double kLeastWidth = 1e-100, kMostWidth = 1e100;
   if (gates.shape().is_unbounded() || gates.shape().is_dirac()) return;
   double longest = 0;
   for (int g = 0; g < gates.size(); ++g) longest = std::max(longest, std::abs(gates.center(g)));

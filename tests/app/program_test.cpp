@@ -21,6 +21,9 @@ TEST_F(Program, PlotNeedsAFolder) {
   const Result result = run({"plot", folder_.file("nowhere")});
   EXPECT_EQ(result.status, 2);
   EXPECT_EQ(result.errors, "isochron: error: plot: " + folder_.file("nowhere") + ": no such folder\n");
+  const Result nothing = run({"plot", folder_.path()});
+  EXPECT_EQ(nothing.status, 2);
+  EXPECT_NE(nothing.errors.find(": nothing to draw (allowed: "), std::string::npos) << nothing.errors;
 }
 
 TEST_F(Program, EveryCommandHasAFolderOfItsOwn) {

@@ -37,6 +37,9 @@ TEST_F(Program, WrongInputEndsWithStatusTwoAndOneLine) {
       {"chart", file, "-o", out, "--solvers", "--at", "target", "--set", "parameters[0].initial=0", "--set",
        "parameters[1].initial=10"},
       {"stability", file, "-o", out, "--widths", "0.1,-1"},
+      {"stability", file, "-o", out, "--widths", "1e-300"},
+      {"chart", file, "-o", out, "--seeds", "2"},
+      {"chart", file, "-o", out, "--solvers", "--steps", "0.1"},
       {"stability", file, "-o", out, "--set", "gates={kind: steady}"},
       {"resume", out},
   };

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <filesystem>
 
 #include "tests/scene/temporary_folder.h"
 
@@ -44,6 +45,22 @@ TEST(WriteFileAtomically, WritesAndReplaces) {
   write_file_atomically(folder.path("f"), large);
   EXPECT_EQ(folder.read("f"), large);
   EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(WriteFileAtomically, KeepsLinksAndPermissions) {
+  namespace fs = std::filesystem;
+  TemporaryFolder folder;
+  write_file_atomically(folder.path("f"), "old");
+  constexpr fs::perms kOwn = fs::perms::owner_read | fs::perms::owner_write | fs::perms::owner_exec;
+  fs::permissions(folder.path("f"), kOwn);
+  for (const char* target : {"f", "later"}) {
+    const std::string link = folder.path(std::string("link_to_") + target);
+    fs::create_symlink(target, link);  // beside it, wherever the process is
+    write_file_atomically(link, "new");
+    EXPECT_TRUE(fs::is_symlink(link));
+    EXPECT_EQ(folder.read(target), "new");
+  }
+  EXPECT_EQ(fs::status(folder.path("f")).permissions(), kOwn);
 }
 
 TEST(RemoveTemporaries, WhatAKilledProcessLeft) {
