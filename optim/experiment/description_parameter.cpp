@@ -266,10 +266,12 @@ void describe(Keys& keys, ParameterSpec& spec, ExperimentFolder& folder, bool ta
                 "evenly, those by adam to half as many, others in each iteration; 0: to all",
                 {.unset = spec.remesh.coarse_histograms == 0});
     const auto adam = [&spec](Keys& keys_of_adam) {
+      keys_of_adam.value("iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations),
+                         "of each such level", {.required = true});
       keys_of_adam.value(
-          "iterations", field::integer(spec.remesh.adam_iterations, 1, kMostIterations / 2),
-          "of each such level; the last one has twice as many, and its steps shrink after a third of them",
-          {.required = true});
+          "last", field::integer(spec.remesh.adam_last, 0, kMostIterations),
+          "iterations of the last such level, whose steps shrink after a third of them; 0: as many as others",
+          {.unset = spec.remesh.adam_last == 0});
       keys_of_adam.value("learning_rate", field::positive(spec.remesh.adam_rate),
                          "see `optimizer`; half of it in the last such level",
                          {.required = true, .unit = "the parameter's `scale`"});

@@ -48,6 +48,7 @@ struct RemeshSpec {
   double outline_slopes = 0;  ///< weight of their slopes in that level, in place of ParameterSpec::slopes
   int coarse_histograms = 0;  ///< of a capture: so many are used before the finer levels; 0: all are
   int adam_iterations = 0;    ///< of each level that adam fits, see steps_by_adam; 0: there is none
+  int adam_last = 0;          ///< of the last such level; 0: as many
   double adam_rate = 0;       ///< their OptimizerSpec::learning_rate
   double adam_slopes = 0;     ///< weight of the offsets' slopes in these levels, in place of ParameterSpec::slopes
 

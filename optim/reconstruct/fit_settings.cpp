@@ -19,6 +19,9 @@ constexpr int kLeastSamples = 16, kMostSamples = 4096;
 /// A sample's work where light goes and comes back on two ways, over that of a confocal one: levels by adam of the blob under 8 x 8 spots took
 /// 20.7 s, confocal ones 15.2.
 constexpr double kTwoWays = 1.35;
+/// Iterations of the last level by adam there, over those of confocal captures: by trials with the blob under 8 x 8 spots and with rabbits
+/// (optim/README.md, Levels by adam).
+constexpr int kOnTwoWays = 2;
 /// The first finds the outline and the second the albedo; seven of adam move borders; the last has all histograms, for the
 /// evidence of the level after it.
 constexpr int kCoarseLevels = 10;
@@ -116,6 +119,7 @@ FitSettings fit_settings(const Mesh& start, double resolution, const FitWork& wo
   settings.coarse_levels = kCoarseLevels;
   settings.levels = kCoarseLevels + 1;
   settings.more_levels = 1;
+  if (!work.confocal) settings.adam_last *= kOnTwoWays;
   // An image of a coarse level has kLeastCoarseHistograms at least, or all that there are: more samples of each would take too long.
   const double seconds = work.seconds / (work.confocal ? 1 : kTwoWays),
                of_coarse_image = kCoarseSamplesPerSecond * seconds,

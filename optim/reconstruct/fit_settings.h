@@ -24,9 +24,9 @@ struct FitSettings {
   double edge_length = 1;  ///< of the first level
   double bending = 1;  ///< and first variation: nats per unit of curvature (a sphere has 50, the border of a disc 1.1)
   int coarse_histograms = 0;  ///< that coarse levels are fitted to; 0: all
-  /// Of the last level by adam, and the largest step in edge lengths. From a silhouette of 0.85, one level of 150 comes to 0.90 with steps of
-  /// 0.022, to 0.91 with 0.044 and 0.088, where more that is not there is left.
-  int adam_iterations = 72;
+  /// Of levels by adam and of the last of them, and the largest step in edge lengths. From a silhouette of 0.85, one level of 150 comes to
+  /// 0.90 with steps of 0.022, to 0.91 with 0.044 and 0.088, where more that is not there is left.
+  int adam_iterations = 72, adam_last = 72;
   double adam_rate = 0.044;
   double adam_motion = 0;         ///< weight of the offsets' slopes there
   double motion = 0, albedo = 0;  ///< weights of slopes

@@ -65,7 +65,7 @@ parameters:
     initial: 0
     scale: {edge:.4g}   # so that steps of adam are shares of the edges
     smoothing: {{bending: {bending}, variation: {bending}, slopes: {motion:.4g}, evidence: true}}
-    remesh: {{levels: {levels}, more_levels: {more}, coarse_levels: {coarse}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
+    remesh: {{levels: {levels}, more_levels: {more}, coarse_levels: {coarse}, coarse_histograms: {histograms}, adam: {{iterations: {steps}, last: {last_steps}, learning_rate: {rate}, slopes: {free:.4g}}}, edge_length: {edge:.4g}, outline: {{albedo: {share}, slopes: {slopes:.4g}}}}}
   - name: albedo            # what is known is gain * albedo, so that 1 is no bound of nature
     type: albedo
     shape: surface
@@ -87,10 +87,11 @@ output: {{histogram_samples: {primal}, frames: 0}}
       fmt::arg("response", response_text(spec, set.bin)), fmt::arg("bending", set.bending),
       fmt::arg("motion", set.motion), fmt::arg("levels", set.levels), fmt::arg("more", set.more_levels),
       fmt::arg("coarse", set.coarse_levels), fmt::arg("histograms", set.coarse_histograms),
-      fmt::arg("steps", set.adam_iterations), fmt::arg("rate", set.adam_rate), fmt::arg("free", set.adam_motion),
-      fmt::arg("share", set.outline_share), fmt::arg("slopes", set.outline_slopes), fmt::arg("edge", set.edge_length),
-      fmt::arg("albedo", set.albedo), fmt::arg("gain", set.gain), fmt::arg("low", 0.999 * set.gain),
-      fmt::arg("high", 1.001 * set.gain), fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
+      fmt::arg("steps", set.adam_iterations), fmt::arg("last_steps", set.adam_last), fmt::arg("rate", set.adam_rate),
+      fmt::arg("free", set.adam_motion), fmt::arg("share", set.outline_share), fmt::arg("slopes", set.outline_slopes),
+      fmt::arg("edge", set.edge_length), fmt::arg("albedo", set.albedo), fmt::arg("gain", set.gain),
+      fmt::arg("low", 0.999 * set.gain), fmt::arg("high", 1.001 * set.gain),
+      fmt::arg("per", set.background_per_point ? ", per: pixel, initial: 1" : ""),
       fmt::arg("capture", quoted_path(spec.capture)), fmt::arg("first", set.window.first),
       fmt::arg("last", set.window.last), fmt::arg("mask", masked ? "\n  mask: mask.npy" : ""),
       fmt::arg("primal", set.samples), fmt::arg("interior", std::max(2, set.samples / 2)));

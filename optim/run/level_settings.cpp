@@ -34,8 +34,7 @@ void step_by_adam(const RemeshSpec& remesh, int level, Experiment& level_experim
   adam.stop_window = 0;
   adam.iterations = remesh.adam_iterations;
   if (level == remesh.last_by_adam()) {
-    // Noise averages out while steps shrink. As many iterations as other levels have leave 8 x 8 spots unexplained (experiments/README.md).
-    adam.iterations *= 2;
+    if (remesh.adam_last > 0) adam.iterations = remesh.adam_last;
     adam.decay = {.start = adam.iterations / 3, .half_life = adam.iterations / 9.0};
   }
   level_experiment.samples.interior *= 2;

@@ -34,7 +34,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     const Experiment one = load_experiment(folder + "/experiment.yaml");
     const bool adam = level == 2;
     EXPECT_EQ(one.optimizer.method, adam ? OptimizerMethod::adam : OptimizerMethod::quasi_newton);
-    EXPECT_EQ(one.optimizer.iterations, adam ? 18 : 4);
+    EXPECT_EQ(one.optimizer.iterations, adam ? 9 : 4);
     EXPECT_EQ(one.parameters[0].slopes, adam ? 1e-4 : 0.01);
     EXPECT_EQ(one.samples.primal, 32);
     EXPECT_EQ(one.samples.interior, adam ? 64 : 32);
@@ -43,7 +43,7 @@ TEST_F(LevelsTest, CoarseLevelsGoOnByAdam) {
     if (adam) {
       EXPECT_EQ(one.optimizer.learning_rate, 0.01);
       EXPECT_EQ(one.optimizer.window(), 0);
-      EXPECT_NEAR(one.optimizer.decay.factor(18), 1.0 / 64, 1e-12);
+      EXPECT_NEAR(one.optimizer.decay.factor(9), 1.0 / 64, 1e-12);
     }
   }
   YamlMap summary = open_yaml(folder_.file("out/levels/2/summary.yaml")).map();
@@ -108,8 +108,8 @@ TEST(Remesh, EdgesAreHalvedBehindTheCoarseLevels) {
   EXPECT_EQ(halvings(), "001112") << "the third is adam's last";
 }
 
-/// Steps shrink in the last level by adam alone, even if a run ends before its coarse levels do. The
-/// last coarse ones have edges and steps of half the length.
+/// Steps shrink in the last level by adam alone, even if a run ends before its coarse levels do. It has
+/// iterations of its own. The last coarse ones have edges and steps of half the length.
 TEST_F(LevelsTest, AdamsStepsShrinkOnceInTheEnd) {
   const Problem problem(load_experiment(experiment("hill", "target: 0", "{samples: 256}")));
   write_exr(folder_.file("target.exr"), problem.make_target(), {});
@@ -118,7 +118,7 @@ TEST_F(LevelsTest, AdamsStepsShrinkOnceInTheEnd) {
     anew.force = true;
     start_run(load_experiment(experiment("flat",
                                          fmt::format("remesh: {{levels: {}, coarse_levels: 4, edge_length: 0.5, adam: "
-                                                     "{{iterations: 9, learning_rate: 0.01, slopes: 1e-9}}}}",
+                                                     "{{iterations: 9, last: 18, learning_rate: 0.01, slopes: 1e-9}}}}",
                                                      levels),
                                          "{images: target.exr}")),
               anew);
