@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kHugePage = std::size_t{2} << 20, kLarge = 2 * kHugePage;
 
 /// What the library keeps by itself, aligned to a huge page, and what is kept of larger blocks in all.
-constexpr std::size_t kOfLibrary = std::size_t{32} << 20, kMostKept = std::size_t{1} << 30;
+constexpr std::size_t kOfLibrary = std::size_t{32} << 20, kMostKept = std::size_t{256} << 20;
 
 std::size_t whole_pages(std::size_t size) {
   return (size + kHugePage - 1) / kHugePage * kHugePage;

@@ -43,13 +43,9 @@ double Worker::start_at_wall(int pixel, Rng& rng, double hidden) {
     x = *hit;
   }
   const Vec3 d = x.p - s.p;
-  const double r = length(d);
-  const Vec3 to_spot = scene.scene.capture->spot_of(pixel).p - x.p;
-  const auto has_front = [&] { return !scene.two_sided(x.triangle) && !scene.transparent(x.triangle); };
-  if (!(r > 0) || (!(dot(x.n, d) < 0) && has_front())) return 0;
-  // A path's only bounce is lit from the spot, too.
-  if (options.max_bounces == 1 && !(dot(x.n, to_spot) > 0) && has_front() && !scene.emits(x.triangle)) return 0;
-  const double shortest = r + length(to_spot) * scene.least_index();
+  const double r = length(d), cos_x = -dot(x.n, d);
+  if (!(r > 0) || (!(cos_x > 0) && !scene.two_sided(x.triangle) && !scene.transparent(x.triangle))) return 0;
+  const double shortest = r + length(x.p - scene.scene.capture->spot_of(pixel).p) * scene.least_index();
   if (path.length.back() + shortest > gates.upper()) return 0;
   const double received = scene.importance(pixel, d / r) * solid_angle_to_area(s.p, x);
   if (!(received > 0) || by_area != scene.hidden.takes(x.triangle, hidden, received)) return 0;

@@ -16,12 +16,6 @@ SplitImage render_expected(const Problem& problem, const std::vector<double>& th
                                         "rendering the expected counts");
 }
 
-/// Of the samples, after which noise makes no more than kMostImageShare, if its variance goes with one over their number.
-int doublings_wanted(double image_share, int most) {
-  const double noise = image_share / (1 - image_share), allowed = kMostImageShare / (1 - kMostImageShare);
-  return static_cast<int>(std::clamp(std::ceil(std::log2(noise / allowed)), 1.0, static_cast<double>(most)));
-}
-
 /// The mean of two images of as many samples each, half by half.
 SplitImage mean_of(SplitImage a, const SplitImage& b) {
   const double first = (a.first + b.first) / 2;
@@ -90,10 +84,8 @@ GoodnessOfFit judge_rendered_fit(const Problem& problem, const std::vector<doubl
   const int samples = fit_samples(problem);
   image = render_expected(problem, theta, samples, 0);
   GoodnessOfFit fit = judge_fit(problem, theta, image, target, determined);
-  for (int done = 0; done < doublings && problem.scene().capture && fit.fit.image_share > kMostImageShare;) {
-    const int wanted = doublings_wanted(fit.fit.image_share, doublings - done);
-    for (const int end = done + wanted; done < end; ++done)
-      image = mean_of(std::move(image), render_expected(problem, theta, samples << done, done + 1));
+  for (int i = 0; i < doublings && problem.scene().capture && fit.fit.image_share > kMostImageShare; ++i) {
+    image = mean_of(std::move(image), render_expected(problem, theta, samples << i, i + 1));
     fit = judge_fit(problem, theta, image, target, determined, fit.background);
   }
   return fit;
