@@ -6,6 +6,7 @@ numbers of these means and of the background are drawn.
 """
 
 import argparse
+import functools
 import pathlib
 import sys
 import tempfile
@@ -51,6 +52,13 @@ def expected(folder, scene, settings, seed):
     return captures.read_capture(folder / "render/render.h5")
 
 
+@functools.lru_cache(maxsize=1)  # studies draw several numbers of photons of one seed
+def expected_alone(scene, settings, seed):
+    """The same where the scene needs no other file."""
+    with tempfile.TemporaryDirectory() as temporary:
+        return expected(pathlib.Path(temporary), scene, settings, seed)
+
+
 def write(path, light, counts, laser):
     captures.write_capture(path, counts, light.delta_t, light.t_start, light.points, [0, 0, 1], laser, "simulated")
 
@@ -79,9 +87,7 @@ def parser():
 def main(arguments=None):
     """Of the command line where there are no arguments."""
     options = parser().parse_args(None if arguments is None else list(map(str, arguments)))
-    with tempfile.TemporaryDirectory() as temporary:
-        settings = EXPERIMENT.format(samples=options.samples, bounces=options.bounces)
-        light = expected(pathlib.Path(temporary), scene(options), settings, options.seed)
+    light = expected_alone(scene(options), EXPERIMENT.format(samples=options.samples, bounces=options.bounces), options.seed)
     counts = means(light, options.counts, options.background)
     if not options.no_noise:
         counts = np.random.default_rng(options.seed).poisson(counts)
