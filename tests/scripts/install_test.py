@@ -75,8 +75,9 @@ class InstallTest(unittest.TestCase):
         # The program looks nowhere else: without the package there are no pictures.
         (packages / "isochron").rename(packages / "hidden")
         try:
-            command = [self.program, "plot", self.scratch()]
-            result = subprocess.run(command, capture_output=True, text=True, check=False)
+            folder = self.scratch()
+            (folder / "log.csv").touch()
+            result = subprocess.run([self.program, "plot", folder], capture_output=True, text=True, check=False)
             self.assertRegex(result.stderr, "No module named '?isochron")
         finally:
             (packages / "hidden").rename(packages / "isochron")
