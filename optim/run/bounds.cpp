@@ -46,6 +46,16 @@ std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vec
   return found;
 }
 
+void drop_held_steps(const Parameters& parameters, const std::vector<double>& theta, ParameterErrors& errors) {
+  const std::vector<std::string>& names = parameters.component_names();
+  std::erase_if(errors.steps_left, [&](const auto& left) {
+    const auto& [name, step] = left;
+    const std::size_t i = std::find(names.begin(), names.end(), name) - names.begin();
+    const double reached = std::clamp(theta[i] + step, parameters.lower()[i], parameters.upper()[i]);
+    return std::abs(reached - theta[i]) <= errors.values[i];
+  });
+}
+
 std::string bounds_report(const std::vector<AtBound>& found) {
   std::string text;
   for (const AtBound& at : found) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "optim/problem/parameters.h"
+#include "optim/problem/standard_errors.h"
 
 namespace isochron {
 
@@ -22,6 +23,9 @@ bool is_at_bound(const Parameters& parameters, const std::vector<double>& theta,
 /// In the order of the parameters, lower bounds first. Without unknowns whose bounds are within 0.25 % of each other: these were chosen, and
 /// are no surprise.
 std::vector<AtBound> find_at_bounds(const Parameters& parameters, const std::vector<double>& theta);
+
+/// Drops from `errors.steps_left` the steps that bounds cut to no more than the standard error: what they hold is at the minimum that they allow.
+void drop_held_steps(const Parameters& parameters, const std::vector<double>& theta, ParameterErrors& errors);
 
 /// A line for each, indented by two blanks: `gain ended at its lower bound 0.01`.
 std::string bounds_report(const std::vector<AtBound>& found);

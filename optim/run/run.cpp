@@ -28,6 +28,7 @@
 #include "optim/problem/rendered_objective.h"
 #include "optim/problem/surface_errors.h"
 #include "optim/problem/vector_math.h"
+#include "optim/run/bounds.h"
 #include "optim/run/checkpoint.h"
 #include "optim/run/fit.h"
 #include "optim/run/frames.h"
@@ -235,6 +236,7 @@ class Run {
     errors_ = together() ? joint_errors(curvature.all(), curvature.gradients(), noise, blocks, names, theta)
                          : eliminated_errors(curvature, curvature.diagonal(), curvature.prior_diagonal(),
                                              curvature.gradients(), noise, blocks, names, theta);
+    drop_held_steps(parameters_, theta, errors_);
     if (samples.count() == 0 || !has_surface_errors(problem_)) return {};
     std::vector<double> errors = surface_errors(problem_, samples, theta, noise.scale);
     if (!options_.earlier.meshes.empty())

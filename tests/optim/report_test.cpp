@@ -131,6 +131,26 @@ TEST_F(Report, UnknownsThatAreHeldAreNotAtBounds) {
   }
 }
 
+/// What a bound holds has no step left, unless the bound leaves room for more than the standard error.
+TEST_F(Report, StepsThatBoundsCutAreNotLeft) {
+  ParameterSpec bounded = albedo("wall", {0.5}, {});
+  bounded.lower = {0.5};
+  bounded.upper = {0.75};
+  const Parameters parameters(scene_, {bounded});
+  const auto is_left = [&](double theta, double step) {
+    ParameterErrors errors;
+    errors.values = {0.1};
+    errors.steps_left = {{"wall", step}};
+    drop_held_steps(parameters, {theta}, errors);
+    return !errors.steps_left.empty();
+  };
+  EXPECT_FALSE(is_left(0.5, -0.2));
+  EXPECT_FALSE(is_left(0.7, 0.2));
+  EXPECT_TRUE(is_left(0.5, 0.2));
+  EXPECT_TRUE(is_left(0.7, -0.2));
+  EXPECT_TRUE(is_left(0.62, 0.2));
+}
+
 TEST_F(Report, SummaryHasErrorsAndCost) {
   const Parameters parameters(scene_, {albedo("wall", {0.5}, {0.7}), albedo("thing", {0.25}, {})});
   state_.theta = {0.6875, 0.375};
